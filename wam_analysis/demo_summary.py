@@ -25,7 +25,7 @@ from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
-from wam_sim.reactions import STEADY, RecordedReaction, reactions_of, steady_begin, watched_times, within
+from wam_sim.reactions import STEADY, RecordedReaction, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
@@ -168,7 +168,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     missing = [name for name in RECORDED if not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
-    reactions = tuple(_with_forces(one, traces) for one in reactions_of(run, _end(traces, steps)))
+    reactions = tuple(_with_forces(one, traces) for one in run.reactions(_end(traces, steps)))
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     certainty = certainty_of(run, traces)
     refused = {press.step for press in presses if press.is_refused}

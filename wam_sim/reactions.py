@@ -1,12 +1,11 @@
 """What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
-from wam_control.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL, stated
+from wam_control.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL
 from wam_control.scenario import ScenarioStep
 from wam_control.task import TaskCommand, watched_axes
-from wam_sim.recording import RecordedRun, RecordedStep
 
 FAULT = "fault"
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
@@ -43,11 +42,36 @@ class RecordedReaction(NamedTuple):
         return TOO_MUCH if self.name == CONTACT_FORCE else UNREACHED
 
 
+class Played(Protocol):
+    """A step of a scenario that was played, recorded or not."""
+
+    @property
+    def name(self) -> str:
+        """Name of the step."""
+
+    @property
+    def begin(self) -> int:
+        """When it began, ns."""
+
+    @property
+    def end(self) -> int:
+        """When it ended, ns."""
+
+
+Step = TypeVar("Step", bound=Played)
+
+
 class PlayedStep(NamedTuple):
-    """A step of a scenario and when it was played."""
+    """A step of a scenario that is at hand, and when it was played, ns."""
 
     step: ScenarioStep
-    recorded: RecordedStep
+    begin: int
+    end: int
+
+    @property
+    def name(self) -> str:
+        """Name of the step."""
+        return self.step.name
 
 
 def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple[RecordedReaction, ...]:
@@ -56,12 +80,12 @@ def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple
     return tuple(one for one in parts if one.end - one.begin > BRIEF or (one.begin < one.end == end))
 
 
-def steady_begin(step: RecordedStep) -> int:
+def steady_begin(step: Played) -> int:
     """When what is taken as the steady state of a step begins, ns."""
     return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
 
 
-def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[RecordedReaction]:
+def unmet(reactions: Sequence[RecordedReaction], step: Played) -> list[RecordedReaction]:
     """Why what a step commands is not met, nothing where it is.
 
     Refused in its steady state, with more force than allowed in all of it, not reached at its end, a posture too fast.
@@ -79,10 +103,10 @@ def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[Rec
 def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
     """A sentence for each reason why what a step commands is not met."""
     return [
-        f"{step.name} {why.outcome}: {why.reason}"
-        for step, recorded in played
-        if step.commands_arm
-        for why in unmet(reactions, recorded)
+        f"{one.name} {why.outcome}: {why.reason}"
+        for one in played
+        if one.step.commands_arm
+        for why in unmet(reactions, one)
     ]
 
 
@@ -102,7 +126,7 @@ def watched_times(
     return [(begin, end) for axes, begin, end in times if axes]
 
 
-def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_time: float) -> bool:
+def is_too_short(times: Sequence[tuple[int, int]], step: Played, settling_time: float) -> bool:
     """Whether the task of a step commands a force that lasts too briefly to be assessed at its end.
 
     Parameters
@@ -117,9 +141,9 @@ def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_
 def unassessed(
     reactions: Sequence[RecordedReaction],
     times: Sequence[tuple[int, int]],
-    steps: Sequence[RecordedStep],
+    steps: Sequence[Step],
     settling_time: float,
-) -> list[RecordedStep]:
+) -> list[Step]:
     """The steps of whose command nothing is reported because it lasts too briefly; arguments as of `is_too_short`."""
     return [one for one in steps if is_too_short(times, one, settling_time) and not unmet(reactions, one)]
 
@@ -140,17 +164,6 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
         begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
     return lines
-
-
-def reactions_of(run: RecordedRun, end: int) -> tuple[RecordedReaction, ...]:
-    """All of a run up to its end, ns, in the order of time."""
-    of = {
-        name: [(stamp, status) for stamp, status in run.stamped_statuses() if status.node == name]
-        for name in ("force_loop", "driver")
-    }
-    loop = lasting(((stamp, stated(status)) for stamp, status in of["force_loop"]), end)
-    faults = ((stamp, {FAULT: status.fault} if status.fault else {}) for stamp, status in of["driver"])
-    return tuple(sorted((*loop, *lasting(faults, end))))
 
 
 def lasting(found: Iterable[tuple[int, Mapping[str, str]]], end: int) -> list[RecordedReaction]:

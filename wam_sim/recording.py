@@ -9,10 +9,12 @@ from typing import Any, NamedTuple
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
+from wam_control.reaction_status import stated
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, DONE, parse
 from wam_description.topics import TOPICS
+from wam_sim.reactions import FAULT, RecordedReaction, lasting
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
 
 
@@ -119,6 +121,16 @@ class RecordedRun(NamedTuple):
             (status.stamp or (known[row][1] if known else 0), status)
             for row, status in zip(newest, self.statuses, strict=True)
         ]
+
+    def reactions(self, end: int) -> tuple[RecordedReaction, ...]:
+        """What the force loop and the driver did up to an end, ns, instead of what was commanded; in order of time."""
+        of = {
+            name: [(stamp, status) for stamp, status in self.stamped_statuses() if status.node == name]
+            for name in ("force_loop", "driver")
+        }
+        loop = lasting(((stamp, stated(status)) for stamp, status in of["force_loop"]), end)
+        faults = ((stamp, {FAULT: status.fault} if status.fault else {}) for stamp, status in of["driver"])
+        return tuple(sorted((*loop, *lasting(faults, end))))
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""

@@ -25,7 +25,6 @@ from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode
 from wam_sim.bus import Bus, Rows, of_node
 from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
-from wam_sim.recording import RecordedStep
 
 FORCE_LOOP, SCENARIO = "force_loop", "scenario"
 
@@ -134,9 +133,8 @@ class Simulation:
     @property
     def played(self) -> list[PlayedStep]:
         """The steps that have begun so far, and when."""
-        ends = [*self._begins[1:], self.driver.stamp]
-        times = zip(self._steps, self._begins, ends, strict=False)
-        return [PlayedStep(step, RecordedStep(step.name, begin, end, {})) for step, begin, end in times]
+        times = zip(self._steps, self._begins, [*self._begins[1:], self.driver.stamp], strict=False)
+        return [PlayedStep(*one) for one in times]
 
     @property
     def unmet(self) -> str:

@@ -188,8 +188,8 @@ def _unassessed(
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
     settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
-    times = watched_times((step.task, recorded.begin, recorded.end) for step, recorded in played)
-    brief = unassessed(reactions, times, [recorded for _, recorded in played], settling)
+    times = watched_times((one.step.task, one.begin, one.end) for one in played)
+    brief = unassessed(reactions, times, played, settling)
     return f"{', '.join(one.name for one in brief)}: {too_short(settling)}" if brief else ""
 
 
