@@ -392,6 +392,56 @@ def test_a_controller_that_returns_nothing_is_named_in_the_simulation_too(config
     assert "silent runs, but did not publish joint_effort_command and joint_velocity_command: let each of" in fault
 
 
+def without(configuration: Configuration, node: str) -> Configuration:
+    """The same nodes but one."""
+    return configuration.with_values({"nodes": [name for name in configuration.shared.nodes if name != node]})
+
+
+def silent_after(node: Any, steps: int) -> Any:
+    """A node of the stack that returns nothing any more after so many steps."""
+
+    class Silent(node):  # type: ignore[misc]
+        count = 0
+
+        @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
+        def step(self, inputs: Inputs) -> Outputs:
+            self.count += 1
+            return super().step(inputs) if self.count <= steps else {}
+
+    return Silent
+
+
+@pytest.mark.parametrize("steps", [0, 50, 300])
+def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
+    steps: int,
+) -> None:
+    """The nodes that wait for it refuse what the others send, and the driver brakes, as over topics."""
+    wam = Configuration.load(packaged("wam"))
+    silent = silent_after(declared("gravity").node, steps)
+    plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]
+    run = Simulation(without(wam, "gravity"), plan, {"my_gravity": silent})
+    failure = run.play()
+    assert "my_gravity runs, but did not publish gravity_effort: let each of its steps return that" in failure
+    assert run.driver.safety.fault in failure
+
+
+def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason() -> None:
+    class Silent:
+        name, parameters = "my_transform", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+        @reaction(Input("motor_states", "position"), outputs=("joint_states",), thinned=True)
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    wam = Configuration.load(packaged("wam"))
+    run = Simulation(without(wam, "transform"), [ScenarioStep("wait", 0.3)], {"my_transform": Silent})
+    text = "the scenario gets no joint_states for .*; my_transform runs, but did not publish joint_states: let each"
+    with pytest.raises(ValueError, match=text):
+        run.play()
+
+
 @pytest.mark.parametrize(
     ("given", "text"),
     [
