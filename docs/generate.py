@@ -95,7 +95,7 @@ def topics(configuration: Configuration) -> str:
     rows = [
         [
             f"`{topic.name}`",
-            topic.type.replace("/msg/", "/"),
+            topic.type,
             nodes(interface.publishers(topic.name)),
             nodes([name for name in interface.subscribers(topic.name) if name != "recorder"]),
             rate(topic.rate, timing),

@@ -87,7 +87,7 @@ CASES: dict[str, dict[str, Any]] = {
     "two surfaces, one of them hardening": {
         "world.obstacles.names": ("bench", "foam"),
         "world.obstacles.shapes": ("box", "cylinder"),
-        "world.obstacles.positions": (0.45, 0.0, 0.35, 0.45, 0.25, 0.6),
+        "world.obstacles.positions": (0.8, 0.0, 0.28, 0.45, 0.25, 0.6),
         "world.obstacles.rotations": (0.0,) * 6,
         "world.obstacles.sizes": (0.4, 0.4, 0.1, 0.1, 0.2, 0.0),
         "world.obstacles.stiffness": (4000.0, 900.0),

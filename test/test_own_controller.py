@@ -19,7 +19,7 @@ from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
 from wam_description.signals import ForceCommand, Level, NodeStatus, State
 from wam_description.synchroniser import Inputs
-from wam_description.topics import JOINT_STATE, Topic
+from wam_description.topics import JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
 from wam_description.wiring import Call, Input, Outputs, declaration, reaction
 from wam_sim.replay import replay
 from wam_sim.simulation import Simulation
@@ -109,6 +109,42 @@ def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
     run = Simulation(configured, steps, controllers={"echo": Echo})
     assert run.play() == ""
     assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
+
+
+@pytest.mark.parametrize(
+    ("row", "text"),
+    [
+        (
+            Topic("echo", "sensor_msgs/JointState", "outer", "N m", "joints"),
+            "topic 'echo': type is 'sensor_msgs/JointState'; allowed: 'sensor_msgs/msg/JointState', ",
+        ),
+        (Topic("echo", JOINT_STATE, "200 Hz", "N m", "joints"), "topic 'echo': rate is '200 Hz'; allowed: 'inner', "),
+        (Topic("echo", JOINT_STATE, "outer", "N m"), "topic 'echo': side is ''; allowed: 'motors', 'joints'"),
+        (Topic("echo", WRENCH, "outer", "N", "joints"), "topic 'echo': side is 'joints'; allowed: ''"),
+        (Topic("echo", TABLE, "outer", "N"), "topic 'echo': columns are (); name its columns"),
+    ],
+)
+def test_a_topic_of_its_own_that_cannot_be_is_refused_with_what_is_allowed(
+    row: Topic, text: str, configured: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the declaration, so in a direct run and over topics alike."""
+
+    class Other(Echo):
+        topics = (row,)
+
+    with pytest.raises(TypeError) as refusal:
+        Simulation(configured, [ScenarioStep("wait", 0.1)], controllers={"echo": Other})
+    assert str(refusal.value).startswith(text)
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(Echo, "topics", (row,))
+    with pytest.raises(ParameterError, match="node 'own_nodes:Echo': topic 'echo': "):
+        declared("own_nodes:Echo")
+
+
+def test_the_rows_of_the_nodes_of_the_stack_are_of_types_and_rates_that_exist() -> None:
+    for row in TOPICS:
+        if row.type in OF_OWN_NODES:
+            row.check()
 
 
 def test_lockstep_waits_for_a_topic_only_where_the_configured_nodes_stream_it(configured: Configuration) -> None:
@@ -354,6 +390,56 @@ def test_a_controller_that_returns_nothing_is_named_in_the_simulation_too(config
     fault = run.driver.safety.fault
     assert fault.startswith("command stale"), fault
     assert "silent runs, but did not publish joint_effort_command and joint_velocity_command: let each of" in fault
+
+
+def without(configuration: Configuration, node: str) -> Configuration:
+    """The same nodes but one."""
+    return configuration.with_values({"nodes": [name for name in configuration.shared.nodes if name != node]})
+
+
+def silent_after(node: Any, steps: int) -> Any:
+    """A node of the stack that returns nothing any more after so many steps."""
+
+    class Silent(node):  # type: ignore[misc]
+        count = 0
+
+        @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
+        def step(self, inputs: Inputs) -> Outputs:
+            self.count += 1
+            return super().step(inputs) if self.count <= steps else {}
+
+    return Silent
+
+
+@pytest.mark.parametrize("steps", [0, 50, 300])
+def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
+    steps: int,
+) -> None:
+    """The nodes that wait for it refuse what the others send, and the driver brakes, as over topics."""
+    wam = Configuration.load(packaged("wam"))
+    silent = silent_after(declared("gravity").node, steps)
+    plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]
+    run = Simulation(without(wam, "gravity"), plan, {"my_gravity": silent})
+    failure = run.play()
+    assert "my_gravity runs, but did not publish gravity_effort: let each of its steps return that" in failure
+    assert run.driver.safety.fault in failure
+
+
+def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason() -> None:
+    class Silent:
+        name, parameters = "my_transform", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+        @reaction(Input("motor_states", "position"), outputs=("joint_states",), thinned=True)
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    wam = Configuration.load(packaged("wam"))
+    run = Simulation(without(wam, "transform"), [ScenarioStep("wait", 0.3)], {"my_transform": Silent})
+    text = "the scenario gets no joint_states for .*; my_transform runs, but did not publish joint_states: let each"
+    with pytest.raises(ValueError, match=text):
+        run.play()
 
 
 @pytest.mark.parametrize(

@@ -456,13 +456,37 @@ def test_what_is_on_its_way_at_the_end_is_waited_for(ros: Any, tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("numbers", "total", "lacking"),
-    [([1, 2, 3], 3, 0), ([1, 2, 3], 10, 7), ([5, 6], 9, 3), ([1, 2, 9, 1, 2], 4, 2), ([0, 0], 5, 3), ([7], 3, 2)],
+    [
+        ([1, 2, 3], 3, 0),
+        ([1, 2, 3], 10, 7),
+        ([5, 6], 9, 3),
+        ([1, 2, 9, 1, 2], 4, 2),
+        ([0, 0], 5, 3),
+        ([7], 3, 0),  # a recorder that started later
+        ([7, 8, 11], 9, 0),
+        ([7, 8, 11], 14, 3),
+    ],
 )
 def test_messages_behind_the_last_one_are_counted_by_the_total(numbers: list[int], total: int, lacking: int) -> None:
     numbering = Numbering()
     for number in numbers:
         numbering.add(number)
     assert numbering.lacking(total) == lacking
+
+
+def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:
+    """The stack runs on while the recorder stops: the last total is older than the last messages."""
+    row, name = BY_NAME["motor_states"], "/wam/motor_states"
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {name: row}, "lockstep", {name: qos(row)}, lambda name: "driver", "/wam")
+        data = bytes(serialize_message(state(1, 0.0)))
+        for number in range(6000, 8000):
+            machine.receive(name, data, 0, 0, number)
+            if number in (6500, 7500):
+                machine.announce("driver", name, number - 3)
+        assert machine.lost_at_end() == 0
+        machine.announce("driver", name, 8010)
+        assert machine.lost_at_end() == 11
 
 
 @pytest.mark.parametrize("required", [False, True])

@@ -126,7 +126,7 @@ def test_friction_carries_a_body_on_a_moving_table() -> None:
 
 
 def test_the_force_of_the_arm_on_a_body_is_opposite_to_the_load_on_its_cover() -> None:
-    tip = (0.72, 0.0, 0.36)  # below the outer link at the start pose
+    tip = (0.72, 0.0, 0.355)  # below the outer link at the start pose
     bodies = body("ball", positions=tip, mass=(0.2,), ground_friction=(0.0,))
     plant = plant_of(bodies=bodies)
     plant.data.joint("thing_pose").qvel[2] = 3.0
@@ -242,3 +242,67 @@ def test_a_folded_elbow_is_stopped_by_the_links_that_touch(stiffness: float) -> 
         torques = run.estimate.external_torques
         assert abs(torques[3]) == pytest.approx(size * loads["outer_link"].position, rel=0.05)
         assert np.abs(torques[:3]).max() < 0.3, "N m: nothing else holds the arm"
+
+
+IN_LINK = WAM.covers.names[0]  # a post and a ball are put on its axis
+
+
+def on_the_axis(share: float = 0.5) -> np.ndarray:
+    """Point of the first cover's axis at the start pose, (3,), m, base frame."""
+    length = WAM.covers.length[0]
+    return RigidBody(WAM).point(WAM.joints.start, IN_LINK, (share * length, *WAM.covers.aside(IN_LINK, share * length)))
+
+
+def one_obstacle(shape: str, position: np.ndarray, sizes: tuple[float, ...]) -> Obstacles:
+    return Obstacles(
+        ("post",), (shape,), tuple(position.tolist()), (0.0,) * 3, sizes, (4000.0,), (20.0,), (0.0,), (0.3,)
+    )
+
+
+@pytest.mark.parametrize(
+    ("world", "text"),
+    [
+        (World(one_obstacle("cylinder", on_the_axis(), (0.05, 0.5, 0.0)), NO_SPRINGS), "obstacle 'post' is "),
+        (World(one_obstacle("box", on_the_axis(), (2.0, 2.0, 2.0)), NO_SPRINGS), "obstacle 'post' is "),
+        (World(TABLE, NO_SPRINGS, bodies=body("ball", positions=tuple(on_the_axis().tolist()))), "body 'thing' is "),
+        (World(TABLE, NO_SPRINGS, doors=door(positions=tuple(on_the_axis().tolist()))), "door 'door' is "),
+        (
+            World(
+                one_obstacle("box", on_the_axis(), (0.1, 0.1, 0.1)),
+                NO_SPRINGS,
+                motions=Motions(("post",), (0.3, 0.0, 0.0), (0.5,), (1.0,)),
+            ),
+            "obstacle 'post' is ",
+        ),
+    ],
+)
+def test_what_is_inside_a_link_at_power_up_is_refused_with_link_and_depth(world: World, text: str) -> None:
+    with pytest.raises(ParameterError) as refusal:
+        Plant(WAM, world, no_effects(WAM), STEP)
+    message = str(refusal.value)
+    assert message.startswith("at power-up ")
+    assert text in message
+    assert f" mm inside cover '{IN_LINK}' of {WAM.covers.links[0]}" in message
+    assert "move it away from the arm (world), or start the arm in another pose (arm.joints.start)" in message
+
+
+@pytest.mark.parametrize(("depth", "is_refused"), [(-0.001, False), (0.001, False), (0.004, True)])
+def test_what_only_touches_a_link_at_power_up_is_permitted(depth: float, is_refused: bool) -> None:
+    pose = RigidBody(WAM).cover_pose(WAM.joints.start, IN_LINK)
+    aside = np.cross(pose.rotation[:, 0], (0.0, 1.0, 0.0))
+    centre = on_the_axis() + aside * (WAM.covers.radius[0] + 0.04 - depth)
+    world = World(TABLE, NO_SPRINGS, bodies=body("ball", positions=tuple(centre.tolist())))
+    if is_refused:
+        with pytest.raises(ParameterError, match=r"body 'thing' is 4\.2 mm inside"):
+            Plant(WAM, world, no_effects(WAM), STEP)
+    else:
+        plant = Plant(WAM, world, no_effects(WAM), STEP)
+        assert bool(plant.data.ncon) == (depth > 0.0)
+
+
+def test_a_pusher_is_away_from_its_link_at_power_up_though_it_pushes_from_the_beginning_on() -> None:
+    section = CONFIGURATION.sections["driver"]
+    pushing = {**section, "world.pushers.force": (20.0,), "world.pushers.begin": (0.0,)}
+    plant = Plant(WAM, build_part(World, pushing, "world."), no_effects(WAM), STEP)
+    plant.step([0.0] * 4)
+    assert all(np.linalg.norm(load.force) < 1.0 for load in plant.loads())

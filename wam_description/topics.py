@@ -17,6 +17,10 @@ JOINT_STATE, WRENCH, POINT = (
 )
 TABLE = "sensor_msgs/msg/PointCloud2"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+BOOL, STRING = "std_msgs/msg/Bool", "std_msgs/msg/String"
+OF_OWN_NODES: Final = (JOINT_STATE, WRENCH, POINT, TABLE, TRAJECTORY, BOOL, STRING)  # types that a node may add
+RATES: Final = ("inner", "outer", "display", "latched", "1 Hz")
+SIDES: Final = ("motors", "joints")
 EVERY_NODE: Final = ("status", "/diagnostics")  # published by every node, declared by none
 STATUS: Final = "status"
 
@@ -140,6 +144,23 @@ class Topic(NamedTuple):
     columns: tuple[str, ...] = ()
     needs_joint_sensors: bool = False
 
+    def check(self) -> None:
+        """Refuse a row that a node cannot add: a type, a rate or a side that does not exist.
+
+        Raises
+        ------
+        TypeError
+            names the topic, the value and what is allowed.
+        """
+        sides = SIDES if self.type in (JOINT_STATE, TRAJECTORY) else ("",)
+        for key, allowed in (("type", OF_OWN_NODES), ("rate", RATES), ("side", sides)):
+            if (value := getattr(self, key)) not in allowed:
+                words = ", ".join(f"'{word}'" for word in allowed)
+                raise TypeError(f"topic '{self.name}': {key} is '{value}'; allowed: {words}")
+        if (self.type == TABLE) != bool(self.columns):
+            needed = "name its columns" if self.type == TABLE else f"only a {TABLE} has columns"
+            raise TypeError(f"topic '{self.name}': columns are {self.columns}; {needed}")
+
     @property
     def latched(self) -> bool:
         """True where a late subscriber gets the last message (transient local)."""
@@ -262,7 +283,7 @@ TOPICS: Final = (
         "only where motors are observed; float64 columns: see docs/estimator.md",
         columns=FRICTION_COLUMNS,
     ),
-    Topic("contact/in_contact", "std_msgs/msg/Bool", "latched", "whether something touches the arm"),
+    Topic("contact/in_contact", BOOL, "latched", "whether something touches the arm"),
     Topic(
         "contact/markers",
         "visualization_msgs/msg/MarkerArray",
@@ -292,7 +313,7 @@ TOPICS: Final = (
         "a push: force at and torque about the origin of the cover named by frame_id; it ends with one on another cover, and "
         "`ages.command` after the last one",
     ),
-    Topic("robot_description", "std_msgs/msg/String", "latched", "URDF of the arm"),
+    Topic("robot_description", STRING, "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),
     Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "1 Hz", "counts, timing and refusals of each node"),
     Topic("/clock", "rosgraph_msgs/msg/Clock", "outer", "time of the arm, strictly increasing"),

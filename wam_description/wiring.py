@@ -276,7 +276,7 @@ def declaration(node: type[Declared]) -> Declaration:
     Raises
     ------
     TypeError
-        where the class lacks its name, its parameters or any reaction.
+        where the class lacks its name, its parameters or any reaction, or adds a topic that cannot be.
     """
     methods = {name: getattr(node, name) for kind in reversed(node.__mro__) for name in vars(kind)}  # in their order
     reactions = tuple(found for value in methods.values() if (found := getattr(value, "reaction", None)))
@@ -286,4 +286,6 @@ def declaration(node: type[Declared]) -> Declaration:
         lack = " and ".join(missing) or "no method with @reaction"
         raise TypeError(f"{node.__module__}:{node.__qualname__} is no node: {lack}; see wam_description.wiring")
     extra = tuple(getattr(node, "topics", ()))
+    for topic in extra:
+        topic.check()
     return Declaration(node.name, node, reactions, sources, listens, extra, getattr(node, "ros_node", ""))

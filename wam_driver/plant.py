@@ -29,6 +29,7 @@ from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
 from wam_driver.objects import TrueObjects, moving_obstacles
 from wam_driver.pusher import pushers
+from wam_driver.start_contacts import require_free_start
 from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Mover, Surfaces
 
@@ -69,7 +70,7 @@ class Plant:
     Raises
     ------
     ParameterError
-        if the step is too long for the stiffest mode.
+        if the step is too long for the stiffest mode, or something is inside a link at power-up.
     """
 
     def __init__(
@@ -121,6 +122,7 @@ class Plant:
         shared = self._surfaces.laws, self._friction, self._circuits, self._pushes
         self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
         self._rest()
+        require_free_start(self.model, self.data, arm, world)
         self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
             self.set_pretension(effects.pretension_share)

@@ -20,9 +20,11 @@ from wam_description.defects import point_defect, state_defect, table_defect, wr
 from wam_description.signals import BASE, NodeStatus, PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.status import pairs, parse
 from wam_description.topics import (
+    BOOL,
     JOINT_STATE,
     LARGEST,
     POINT,
+    STRING,
     TABLE,
     TRAJECTORY,
     WRENCH,
@@ -262,8 +264,8 @@ def writer(topic: Topic, shared: Shared) -> Write:
         WRENCH: wrench_stamped,
         POINT: point_stamped,
         TABLE: lambda stamp, value: table(stamp, topic.columns, value),
-        "std_msgs/msg/Bool": lambda stamp, value: Bool(data=bool(value)),
-        "std_msgs/msg/String": lambda stamp, value: String(data=value),
+        BOOL: lambda stamp, value: Bool(data=bool(value)),
+        STRING: lambda stamp, value: String(data=value),
         "visualization_msgs/msg/MarkerArray": contact_markers,
         "rosgraph_msgs/msg/Clock": lambda stamp, value: Clock(clock=header(stamp).stamp),
     }

@@ -70,9 +70,12 @@ class Numbering:
         self._last[self._last.index(nearest)] = number
 
     def lacking(self, total: int) -> int:
-        """Messages that are missing behind the last one, of a publisher that has sent so many."""
+        """Messages that are missing behind the last one, of a publisher that has sent so many.
+
+        A total from before the last message leaves none; those sent before the recorder started are no loss.
+        """
         before = [last for last in self._last if last <= total]
-        return total - max(before) if before else max(0, total - self.received - self.dropped)
+        return total - max(before) if before else max(0, total - self.received - self.dropped - self.missed)
 
 
 class _Channel:

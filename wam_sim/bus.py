@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from wam_description.defects import Check
 from wam_description.interface import Feed, is_packaged
 from wam_description.signals import Point, State, Table, Wrench
-from wam_description.synchroniser import Inlet, Inputs
+from wam_description.synchroniser import Inlet, Inputs, OutOfTime
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs, mask
 
@@ -155,13 +155,19 @@ class _Route:
         self.kept = kept
 
     def publish(self, stamp: int, value: Any) -> None:
-        """Keep the numbers of a value of a stamp, ns, hand it to the takers, and publish what they answer."""
+        """Keep the numbers of a value of a stamp, ns, hand it to the takers, and publish what they answer.
+
+        A taker whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.
+        """
         if self.kept is not None:
             self.kept.add(stamp, value)
         for inlet, work, outlets in self.takers:
-            for inputs in inlet(stamp, value) or ():
-                for name, output in work(inputs).items():
-                    outlets[name](inputs.stamp, output)
+            try:
+                for inputs in inlet(stamp, value) or ():
+                    for name, output in work(inputs).items():
+                        outlets[name](inputs.stamp, output)
+            except OutOfTime:
+                continue
 
 
 Work = Callable[[Any], Outputs]

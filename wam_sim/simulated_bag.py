@@ -17,7 +17,7 @@ from wam_description.configuration import SHARED, Configuration
 from wam_description.interface import Interface, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import pairs
-from wam_description.topics import JOINT_STATE, POINT, STATUS, TABLE, WRENCH, Topic
+from wam_description.topics import BOOL, JOINT_STATE, POINT, STATUS, STRING, TABLE, WRENCH, Topic
 from wam_description.urdf import urdf
 from wam_description.yaml_text import parameter_text
 from wam_sim.simulation import Simulation
@@ -172,8 +172,8 @@ def _values_of(topic: Topic, shared: Shared) -> Values | None:
         WRENCH: lambda stamp, value: (_header(stamp, value.frame), (value.force, value.torque)),
         POINT: lambda stamp, value: (_header(stamp, value.frame), value.position),
         TABLE: table,
-        "std_msgs/msg/Bool": lambda stamp, value: [bool(value)],
-        "std_msgs/msg/String": lambda stamp, value: [value],
+        BOOL: lambda stamp, value: [bool(value)],
+        STRING: lambda stamp, value: [value],
     }
     return by_type.get(topic.type)
 

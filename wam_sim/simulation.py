@@ -62,6 +62,8 @@ class Simulation:
         configuration = configuration.with_values({"nodes": [*entries, SCENARIO], "timing.mode": "lockstep"})
         shared = configuration.shared
         self._timing = shared.timing
+        self._patience = round(shared.timing.timeout * 1e9)  # ns, for which the scenario may get nothing
+        self._looked = 0  # ns, when the scenario was last seen to go on
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
         self.driver.stale_advice = self._cause
         self._interface = Interface(shared, dict(controllers or {}))
@@ -184,11 +186,22 @@ class Simulation:
         self._publish_states(stamp, driver.motor_state)
         if self.nodes[SCENARIO].done:
             return True
+        if stamp - self._looked >= self._patience:
+            self._require_progress(stamp)
         driver.command(*self._currents)
         driver.advance(0.0)
         if (driver.safety.mode, driver.safety.fault) != self._reported:
             self._report()
         return False
+
+    def _require_progress(self, stamp: int) -> None:
+        """Refuse to go on where the scenario does not get what it takes: the run would not end."""
+        self._looked = stamp
+        if awaited := {topic for one in self._synchronisers["scenario"] for topic in one.awaited(stamp)}:
+            raise ValueError(
+                f"the scenario gets no {' and '.join(sorted(awaited))} for the state of {stamp} ns; "
+                f"{self._cause(sorted(awaited))}"
+            )
 
     def _publish_truth(self, stamp: int) -> None:
         load = self.driver.true_contact
@@ -247,15 +260,15 @@ class Simulation:
             self.nodes[request.node].tune(build(declaration.parameter_class, values))
         self._settings[request.node] = values
 
-    def _cause(self) -> str:
-        """The node that is the reason why no command comes, and what to do about it."""
+    def _cause(self, topics: Sequence[str] = ("motor_current_command",)) -> str:
+        """The node that is the reason why topics do not come, the command if none is given, and what to do about it."""
         stamp = self.driver.stamp
         awaited = {
             name: {topic for one in found for topic in one.awaited(stamp)}
             for name, found in self._synchronisers.items()
         }
-        found = self._interface.unanswered(["motor_current_command"], awaited)
-        return unpublished(found) if found else "list a node in 'nodes' that publishes motor_current_command"
+        found = self._interface.unanswered(topics, awaited)
+        return unpublished(found) if found else f"list a node in 'nodes' that publishes {' and '.join(topics)}"
 
     def _report(self) -> None:
         """Report a new mode or fault of the driver to every node that takes status."""

@@ -1,0 +1,39 @@
+"""Whether the world leaves the arm free at power-up."""
+
+from typing import Any
+
+from wam_description.arm import Arm
+from wam_description.contact_pairs import contact_pairs
+from wam_description.parameters import ParameterError
+from wam_description.world import World
+
+DEEPEST = 0.003  # m; of a contact at power-up that counts as touching
+
+
+def require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
+    """Refuse a world in which something is inside the arm at power-up: it would push it out with k_c times the depth.
+
+    Parameters
+    ----------
+    model, data : of MuJoCo, with the contacts of the start pose.
+    arm, world : the covers and what they may touch.
+
+    Raises
+    ------
+    ParameterError
+        names what is inside, the cover and its link, and the depth.
+    """
+    links = dict(zip(arm.covers.names, arm.covers.links, strict=True))
+    pairs = {frozenset((one.first, one.second)): one for one in contact_pairs(arm, world) if one.first in links}
+    depths: dict[str, float] = {}
+    for geoms, distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
+        pair = pairs.get(frozenset(model.geom(geom).name for geom in geoms))
+        if pair is not None and -distance > DEEPEST:
+            inside = f"{pair.what} is {{}} mm inside cover '{pair.first}' of {links[pair.first]}"
+            depths[inside] = max(depths.get(inside, 0.0), -distance)
+    if depths:
+        found = " and ".join(inside.format(f"{1e3 * depth:.3g}") for inside, depth in depths.items())
+        raise ParameterError(
+            f"at power-up {found}; allowed: up to {1e3 * DEEPEST:g} mm; "
+            "move it away from the arm (world), or start the arm in another pose (arm.joints.start)"
+        )
