@@ -55,7 +55,8 @@ class SweepResult(NamedTuple):
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
-    unassessed : steps whose task commands a force or a torque too briefly to be reported as not reached; '' for none.
+    unassessed : steps whose task commands a force, a torque or a motion too briefly to be reported as not reached; ''
+        for none.
     """
 
     failure: str
@@ -189,7 +190,7 @@ def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) 
 def _unassessed(
     configuration: Configuration, reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]
 ) -> str:
-    """Steps whose task commands a force or a torque too briefly to be assessed; '' where none was."""
+    """Steps whose task commands a force, a torque or a motion too briefly to be assessed; '' where none was."""
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
     settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
