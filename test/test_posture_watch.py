@@ -11,9 +11,13 @@ LIMIT, DT, WAY = 1.5, 0.005, 1.2
 LEAST = 1.875 * WAY / (CAUGHT_UP * LIMIT)  # s, in which a minimum-jerk path is caught up with
 
 
+def posture_watch() -> PostureWatch:
+    return PostureWatch(["elbow"], "posture", "joint_speed_limit", "rad/s")
+
+
 def late(posture: Callable[[float], float], seconds: float, has_rate: bool = False, every: int = 1) -> list[str]:
     """What is stated while a posture goes on, streamed every so many periods, and the arm goes to it."""
-    watch, q, found = PostureWatch(["elbow"]), 0.0, []
+    watch, q, found = posture_watch(), 0.0, []
     for k in range(round(seconds / DT)):
         goal = posture(DT * (k - k % every))
         found.append(watch.step([goal], has_rate, [q], LIMIT, DT))
@@ -53,13 +57,13 @@ def test_a_goal_that_is_set_elsewhere_within_a_noisy_stream_is_no_motion() -> No
 
 def test_a_motion_that_goes_on_from_where_the_arm_is_begins_there() -> None:
     """As after a force, which has moved the arm away from its posture."""
-    watch = PostureWatch(["elbow"])
+    watch = posture_watch()
     postures = [0.001 * k for k in range(40)] + [0.5 + 0.001 * k for k in range(40)]
     assert not any(watch.step([one], False, [0.5], LIMIT, DT) for one in postures)
 
 
 def test_a_joint_that_may_not_move_follows_nothing() -> None:
-    watch = PostureWatch(["elbow"])
+    watch = posture_watch()
     found = [watch.step([0.001 * k], False, [0.0], 0.0, DT) for k in range(40)]
     assert "allowed: joint_speed_limit, 0 rad/s" in found[-1]
 

@@ -97,12 +97,12 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     place = TaskCommand(BASE, (TaskAxis(AxisKind.POSITION, 0, value=0.0), press._replace(value=0.0)))
     tasks = [torques, other, None, torques, place]
     times = watched_times((task, i * SECOND, (i + 1) * SECOND) for i, task in enumerate(tasks))
-    assert times == [(0, 2 * SECOND), (3 * SECOND, 4 * SECOND)]
+    assert times == [(0, 2 * SECOND), (3 * SECOND, 4 * SECOND), (4 * SECOND, 5 * SECOND)]
     pressing = [(TaskCommand(BASE, (press,)), 0, SECOND)]
     assert watched_times(pressing) == [(0, SECOND)]
-    assert not watched_times(pressing, of_joints=True)
+    assert not watched_times(pressing, without_forces=True)
     steps = [RecordedStep(str(i), i * SECOND, (i + 1) * SECOND, {}) for i in range(5)]
-    assert [one.name for one in steps if is_too_short(times, one, 1.5)] == ["0", "3"]
+    assert [one.name for one in steps if is_too_short(times, one, 1.5)] == ["0", "3", "4"]
     assert not any(is_too_short(times, one, math.nan) for one in steps)
 
 
@@ -115,7 +115,7 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
             (0.0, 0.0, 0.0, 3.0),
             1.0,
             "",
-            "torque: not assessed: force or torque of a task commanded for no longer than",
+            "torque: not assessed: force, torque or motion of a task commanded for no longer than",
         ),
     ],
 )
@@ -126,6 +126,26 @@ def test_a_sweep_states_each_torque_that_is_not_reached_or_too_short(
     for words, given in ((failure, found.failure), (unassessed, found.unassessed)):
         assert given.startswith(words)
         assert bool(given) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "failure"),
+    [
+        (AxisKind.POSITION, None, ""),
+        (AxisKind.POSITION, 2.43, "motion not reached: position of joint 4: 2.43 rad is commanded, and it is at 2.39"),
+        (
+            AxisKind.VELOCITY,
+            0.2,
+            "motion not reached: velocity of joint 4: 0.2 rad/s are commanded, and it moves with ",
+        ),
+        (AxisKind.VELOCITY, -0.2, ""),
+    ],
+)
+def test_a_sweep_states_each_motion_that_is_not_reached(kind: AxisKind, value: float | None, failure: str) -> None:
+    found = swept(ELBOW, ScenarioStep("motion", 2.1, task=TaskCommand(BASE, (TaskAxis(kind, 3, value=value),))))
+    assert found.failure.startswith(failure)
+    assert bool(found.failure) == bool(failure)
+    assert not found.unassessed
 
 
 def test_a_posture_that_the_force_loop_refuses_is_a_failure_of_a_sweep() -> None:

@@ -91,7 +91,7 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
 def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
     summary = summarize(recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0]))
     (answer,) = (one for one in verdict(summary) if "commands" in one.question)
-    words = "1 not assessed: force or torque of a task commanded for no longer than limits.settling_time, 2 s"
+    words = "1 not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 2 s"
     assert str(answer) == f"commands carried out: NO (1 refused), {words}"
 
 
@@ -108,7 +108,7 @@ def test_a_posture_that_the_arm_does_not_follow_is_not_as_it_should_be(tmp_path:
     """From where a task leaves the arm, which nobody knows before."""
     turned = Configuration.load(packaged("wam")).shared.arm.joints.start
     steps = f"""
-- {{name: release the brakes, seconds: 0.3, request: enable, task: {{axes: [{{position: here, joint: joint3}}]}}}}
+- {{name: release the brakes, seconds: 0.3, request: enable, task: {{axes: [{{free: 5.0, joint: joint3}}]}}}}
 - {{name: turn, seconds: 0.4, posture: {[turned[0] + 0.7, *turned[1:]]}}}
 """
     summary = summarize(recorded(tmp_path, steps))

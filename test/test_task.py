@@ -412,6 +412,78 @@ def test_a_joint_torque_that_nothing_takes_is_reported_in_time() -> None:
     assert world.loop.reaction is ForceReaction.NONE
 
 
+def blocked(task: TaskCommand, seconds: float = 1.5, joint: int = 3, **more: Any) -> ForceLoop:
+    """The loop after a task while one joint does not move."""
+    world = Springs()
+    for k in range(round(seconds / DT)):
+        posture = more["posture"](k * DT) if "posture" in more else None
+        world.step(task, posture=posture)
+        world.q[joint] = POSE[joint]
+    return world.loop
+
+
+@pytest.mark.parametrize(
+    ("axis", "reason"),
+    [
+        (TaskAxis(AxisKind.POSITION, 3, value=1.2), "position of joint 4: 1.2 rad is commanded, and it is at 1 rad"),
+        (
+            TaskAxis(AxisKind.VELOCITY, 3, value=0.2),
+            "velocity of joint 4: 0.2 rad/s are commanded, and it moves with 0 ",
+        ),
+    ],
+)
+def test_a_motion_of_a_task_that_is_blocked_is_reported(axis: TaskAxis, reason: str) -> None:
+    assert blocked(base(axis)).reaction is ForceReaction.NOT_REACHED
+    assert blocked(base(axis)).reason.startswith(reason)
+    assert blocked(base(axis), joint=0).reaction is ForceReaction.NONE
+
+
+@pytest.mark.parametrize("direction", [X, Y, Z])
+def test_a_motion_of_a_point_is_reported_only_if_it_is_not_done(direction: Triple) -> None:
+    slide = TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, direction, -0.05)
+    for axis in (slide, position(float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0)) @ direction) - 0.05, direction)):
+        world = Springs()
+        world.step(base(axis), 300)
+        assert world.loop.reaction is ForceReaction.NONE
+        for _ in range(300):
+            world.step(base(axis))
+            world.q = np.array(POSE)
+        assert world.loop.reaction is ForceReaction.NOT_REACHED
+
+
+def test_a_position_that_moves_faster_than_its_axis_is_not_followed() -> None:
+    found = set()
+    for speed in (0.4, 0.8):
+        world, begin = Springs(), float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0))[1])
+        for k in range(100):
+            world.step(base(position(begin - speed * k * DT, Y)))
+            found.add((speed, world.loop.reaction))
+    assert (0.8, ForceReaction.NOT_FOLLOWED) in found
+    assert {one for speed, one in found if speed == 0.4} == {ForceReaction.NONE}
+
+
+def test_a_motion_that_needs_a_joint_faster_than_it_may_be_is_not_followed() -> None:
+    world = Springs()
+    world.loop.tune(replace(OWN, joint_speed_limit=0.5))
+    world.step(base(TaskAxis(AxisKind.VELOCITY, 0, value=1.0)), 300)
+    assert world.loop.reaction is ForceReaction.NOT_FOLLOWED
+    assert "a joint would be faster than force_loop:joint_speed_limit" in world.loop.reason
+
+
+@pytest.mark.parametrize(("joint", "is_left"), [(0, False), (1, True)])
+def test_a_posture_that_a_task_does_not_leave_to_the_arm_is_reported(joint: int, is_left: bool) -> None:
+    """One that was commanded before the task is where the arm was, and moves nothing."""
+
+    def turning(time: float) -> list[float]:
+        return [POSE[0], POSE[1] + min(0.3 * time, 0.3), *POSE[2:]] if is_left else [POSE[0] + 0.3 * time, *POSE[1:]]
+
+    loop = blocked(base(TaskAxis(AxisKind.POSITION, 0, value=None)), posture=turning)
+    assert (loop.reaction is ForceReaction.NONE) is is_left
+    assert loop.reason.startswith("" if is_left else "posture of joint1: ")
+    elsewhere = [POSE[0] + 0.3, *POSE[1:]]
+    assert blocked(base(TaskAxis(AxisKind.POSITION, 0, value=None)), posture=lambda time: elsewhere).reason == ""
+
+
 TASK = TaskCommand(
     "base",
     (

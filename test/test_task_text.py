@@ -99,6 +99,31 @@ def test_what_a_file_may_not_have_is_refused_with_what_is_allowed(keys: dict, re
         step_of(tmp_path, **keys)
 
 
+@pytest.mark.parametrize(
+    ("axis", "angle", "is_refused"),
+    [
+        ({"position": 0.4}, 0.4, False),
+        ({"position": 0.4}, 0.5, True),
+        ({"position": "here"}, START[0], False),
+        ({"position": "here"}, 0.3, True),
+        ({"velocity": 0.1}, 0.3, True),
+        ({"free": 5.0}, 0.3, True),
+    ],
+)
+def test_a_posture_that_moves_a_joint_of_the_task_is_refused(
+    axis: dict[str, Any], angle: float, is_refused: bool, tmp_path: Path
+) -> None:
+    keys = {"posture": [angle, *START[1:]], "task": {"axes": [{**axis, "joint": "joint1"}]}}
+    path = tmp_path / "scenario.yaml"
+    begin = {"name": "go", "seconds": 2.0, "posture": START}
+    path.write_text(yaml.safe_dump({"steps": [begin, {"name": "do", "seconds": 1.0, **keys}]}))
+    if not is_refused:
+        assert load(path, SHARED)
+        return
+    with pytest.raises(ParameterError, match=r"the posture moves joint1 to .* rad, and has no effect on it next to"):
+        load(path, SHARED)
+
+
 def test_a_step_streams_its_task_and_takes_it_back(tmp_path: Path) -> None:
     steps = [step_of(tmp_path, torque=[0.0] * 4), ScenarioStep("rest", 1.0)]
     scenario = Scenario(steps, SHARED)

@@ -106,7 +106,7 @@ class DemoSummary(NamedTuple):
     namespace : of the arm, '/wam'.
     period : time between two instants of the traces, s.
     tasks : forces that tasks command.
-    torques : begin and end of each time in which a task commands torques of the same joints, ns.
+    torques : begin and end of each time in which a task commands the same joint torques and motions, ns.
     settling_time : of the force loop, s; NaN where it was not recorded.
     contacts : all that were estimated.
     missed : true contacts that were not.
@@ -191,7 +191,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         steps=steps,
         traces=traces,
         tasks=tuple(tasks),
-        torques=tuple(watched_times(tasks_of(run), of_joints=True)),
+        torques=tuple(watched_times(tasks_of(run), without_forces=True)),
         settling_time=_settling_time(run),
         presses=presses,
         touches=touches,

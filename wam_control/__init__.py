@@ -27,7 +27,8 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``motion_limits``                 - limits of the velocities: ends of the joints; gives way above the contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
 ``given_way``                     - how far an arm has given way to what pushes it: one count per command
-``posture_watch``                 - whether a posture moves faster than the arm follows
+``posture_watch``                 - whether a posture or a position moves faster than the arm follows
+``motion_watch``                  - whether a position or a velocity of a task is reached
 ``hybrid_velocity``               - joint velocities of force and posture together
 ``task``                          - a task as data: axes of force, velocity, position, impedance
 ``task_frame``                    - its law: strict priority, posture in what the axes leave; what 4 joints cannot do

@@ -62,7 +62,7 @@ class ForceReaction(IntEnum):
     NOTHING_TOUCHED = 3  # holds: it has gone as far as allowed and nothing was touched
     CONTACT_FORCE = 4  # does not move against the world
     JOINT_END = 5  # a joint is at its end
-    NOT_REACHED = 6  # goes on: the force is not reached within the time for it
+    NOT_REACHED = 6  # goes on: the force or the motion is not reached within the time for it
     POSITION_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
     NOT_EXPLAINED = 8  # goes on: the torques are not those of the commanded force where it is thought to act
     TASK_REFUSED = 9  # holds: the axes of the task cannot be done here
@@ -71,7 +71,7 @@ class ForceReaction(IntEnum):
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
     TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
     SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
-    NOT_FOLLOWED = 15  # goes on: the commanded posture moves faster than the joints may
+    NOT_FOLLOWED = 15  # goes on: the commanded posture or position moves faster than the arm may
 
     @property
     def holds(self) -> bool:

@@ -24,7 +24,7 @@ from wam_control.force_command import CommandAdmission, Commands
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
-from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
+from wam_control.force_measurement import REST, STEADY, ForceMeasurement, LowPass
 from wam_control.given_way import GivenWay
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
@@ -32,7 +32,8 @@ from wam_control.guard_watch import Watch
 from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, BEGIN, MotionLimits, WholeForce
-from wam_control.posture_watch import PostureWatch
+from wam_control.motion_watch import MotionWatch
+from wam_control.posture_watch import BEHIND, PostureWatch
 from wam_control.pressed_pose import has_left
 from wam_control.sensing_advice import OtherForces, Turnable
 from wam_control.stability_guard import GuardAssessment
@@ -48,7 +49,6 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
-REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 FAST = 0.3  # rad/s, above which a payload is not known from the torques of the motion
 RESTED = 3.0 * STEADY  # s at rest, after which it is
 SHORTEST = 1e-12  # m^2, square of a lever
@@ -57,6 +57,7 @@ BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
 FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+TAKEN = "the task leaves the posture too little: command a posture that its axes leave, or end one of them"
 ALIKE = 0.05  # of the torques at rest: what a payload may leave of them, as the masses are not known better
 
 
@@ -139,7 +140,10 @@ class ForceLoop:
         self._axes = ""
         self._torque_before: list[float] = []
         self._rate: Sequence[float] | None = None
-        self._posture_watch = PostureWatch(arm.joints.names)
+        self._posture_watch = PostureWatch(arm.joints.names, "posture", "joint_speed_limit", "rad/s")
+        self._posture_motions = [MotionWatch(f"posture of {name}", "rad", TAKEN) for name in arm.joints.names]
+        self._posture_before: list[float] = []  # (n,) rad, as the task began
+        self._has_posture = False  # whether another one has been commanded since
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
@@ -318,12 +322,31 @@ class ForceLoop:
 
     def _watch_posture(self, commands: Commands, q: Sequence[float], dt: float) -> None:
         """React to a posture that moves on faster than the arm follows."""
-        if self.reaction.holds or "joint_posture_command" in commands.refusals:
+        is_held = self.reaction.holds or "joint_posture_command" in commands.refusals
+        if self._axes != TASK or is_held or not self._posture_before:
+            self._posture_before, self._has_posture = commands.posture, False
+        if is_held:
             self._posture_watch.restart()
             return
         limit = self.parameters.joint_speed_limit
         late = self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
         self._react_too(ForceReaction.NOT_FOLLOWED, late)
+        if self._posture_before is not commands.posture:
+            self._watch_posture_of_task(commands.posture, q, dt)
+
+    def _watch_posture_of_task(self, posture: Sequence[float], q: Sequence[float], dt: float) -> None:
+        """React to a posture that has moved next to a task, and that the task does not leave to the arm."""
+        before = self._posture_before
+        if not self._has_posture:
+            if posture == before or not any(abs(a - b) > BEHIND for a, b in zip(posture, before, strict=True)):
+                return
+            self._has_posture = True
+            for watch in self._posture_motions:
+                watch.restart()
+        own, rate, share = self.parameters, self._rate or [0.0] * self._n, self._tasks.share
+        law = own.posture_gain, own.joint_speed_limit
+        for goal, speed, at, watch in zip(posture, rate, q, self._posture_motions, strict=True):
+            self._react_too(*watch.position(goal, speed, at, 1.0, law, share, own, dt))
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""

@@ -12,6 +12,7 @@ from wam_description.signals import State
 
 Array = NDArray[np.float64]
 STEADY = 0.1  # s, time constant of the torques that are taken as zero
+REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 
 TINY = 1e-12  # 1/kg^2, of a weight that no joint carries
 

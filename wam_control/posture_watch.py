@@ -1,4 +1,4 @@
-"""Whether a commanded posture moves on faster than the arm follows."""
+"""Whether a commanded posture, or the position along an axis, moves on faster than the arm follows."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from typing import Final
 
 CAUGHT_UP: Final = 1.25  # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
 PAUSE: Final = 0.1  # s, after which a posture that changes is another goal, to which the arm goes as fast as it may
-BEHIND: Final = 0.02  # rad from where the posture is as it moves on, from which the arm is late
+BEHIND: Final = 0.02  # rad, of an axis m, from where the posture is as it moves on, from which the arm is late
 ROUNDING: Final = 1e-9  # s, rad
 STILL: Final = [0.0]
 
@@ -18,11 +18,13 @@ class PostureWatch:
 
     Parameters
     ----------
-    names : of the joints.
+    names : of the joints, or of an axis of a task.
+    what : is commanded.
+    limit, unit : name and unit of the largest speed, which `step` is given.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = names
+    def __init__(self, names: Sequence[str], what: str, limit: str, unit: str) -> None:
+        self._names, self._what, self._limit, self._unit = names, what, limit, unit
         self.restart()
 
     def restart(self) -> None:
@@ -37,9 +39,9 @@ class PostureWatch:
 
         Parameters
         ----------
-        posture, q : commanded and present joint angles (n,), rad.
+        posture, q : commanded and present joint angles (n,), rad; of an axis its position (1,), m or rad.
         has_rate : whether velocities are commanded with the posture.
-        limit : largest joint speed, rad/s.
+        limit : largest speed, rad/s or m/s.
         dt : outer period, s.
         """
         before, time, behind = self._before, self._rested + dt, self._behind
@@ -55,9 +57,9 @@ class PostureWatch:
             k = behind.index(max(behind))
             if (speed := abs(posture[k] - before[k]) / time) > limit:  # otherwise it was set elsewhere at once, before
                 self._late = (
-                    f"the commanded posture moves faster than the arm follows, {self._names[k]} with "
-                    f"{speed:.3g} rad/s; allowed: joint_speed_limit, {limit:g} rad/s; the arm goes on and is late: "
-                    "give the motion more time, or raise force_loop:joint_speed_limit"
+                    f"the commanded {self._what} moves faster than the arm follows, {self._names[k]} with "
+                    f"{speed:.3g} {self._unit}; allowed: {self._limit}, {limit:g} {self._unit}; the arm goes on and "
+                    f"is late: give the motion more time, or raise force_loop:{self._limit}"
                 )
         most = (1.0 if has_rate or self._late else CAUGHT_UP) * limit * dt
         pairs = zip(posture, self._follower, q, strict=True)

@@ -10,10 +10,10 @@ import yaml
 
 from wam_control.contact_position import torque_of_position
 from wam_control.motion import GoalMotion, LineMotion, PostureMotion
-from wam_control.posture_watch import CAUGHT_UP
+from wam_control.posture_watch import BEHIND, CAUGHT_UP
 from wam_control.scenario_settings import Setting, require_settings, settings_of
 from wam_control.scenario_values import known, number, numbers
-from wam_control.task import TaskCommand
+from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_text import task_of_text, torque_task
 from wam_description import yaml_text
 from wam_description.arm import Arm, Shared
@@ -336,12 +336,32 @@ def _require_motions(
             motion = motion_of(step, start, shared, followed) if start else None
         except ParameterError as error:
             raise ParameterError(f"{where}, {error}") from None
+        before = start
         if motion is not None:
             start = motion.at(step.seconds).position
         elif step.moves:
             start = step.posture or (step.trajectory.points[-1].position if step.trajectory else ())
+        if step.moves and step.task is not None and start:
+            _require_free(f"{where}, step '{step.name}'", step.task, before, start, shared.arm.joints.names)
         if step.until_force or step.presses:
             start = ()
+
+
+def _require_free(
+    where: str, task: TaskCommand, start: Sequence[float], goal: Sequence[float], names: Sequence[str]
+) -> None:
+    """Refuse a posture (n,), rad, that moves joints which a task takes, as far as it is known from where, rad."""
+    for axis in task.axes:
+        if axis.joint < 0:
+            continue
+        taken = axis.value if axis.kind is AxisKind.POSITION else None
+        if taken is None and start:
+            taken = start[axis.joint]
+        require(
+            taken is None or abs(goal[axis.joint] - taken) <= BEHIND,
+            f"{where}: the posture moves {names[axis.joint]} to {goal[axis.joint]:.4g} rad, and has no effect on it "
+            f"next to the axis '{axis.name}' of the task; leave one of them out",
+        )
 
 
 def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:

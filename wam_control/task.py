@@ -54,6 +54,11 @@ class TaskAxis(NamedTuple):
         return self.kind in (AxisKind.FORCE, AxisKind.IMPEDANCE)
 
     @property
+    def unit(self) -> str:
+        """Of a position along it."""
+        return "rad" if self.joint >= 0 else "m"
+
+    @property
     def name(self) -> str:
         """The axis in words."""
         kind = self.kind.name.lower()
@@ -136,9 +141,14 @@ def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
 
 
 def watched_axes(task: TaskCommand | None) -> tuple[TaskAxis, ...]:
-    """The axes of a task along which it is watched whether what is commanded is reached: forces and joint torques."""
+    """The axes of a task along which it is watched whether what is commanded is reached: all but an impedance."""
     axes = task.axes if task else ()
-    return tuple(axis for axis in axes if axis.kind is AxisKind.FORCE and (axis.joint >= 0 or axis.value))
+    return tuple(
+        axis
+        for axis in axes
+        if axis.kind in (AxisKind.VELOCITY, AxisKind.POSITION)
+        or (axis.kind is AxisKind.FORCE and (axis.joint >= 0 or axis.value))
+    )
 
 
 def is_pressing(table: Table) -> bool:

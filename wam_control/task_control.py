@@ -18,6 +18,8 @@ from wam_control.given_way import GivenWay
 from wam_control.guard_supervision import Supervision
 from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, posture_velocity
+from wam_control.motion_watch import MotionWatch
+from wam_control.posture_watch import PostureWatch
 from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
@@ -93,6 +95,9 @@ class TaskControl:
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
         self._torques: list[TorqueWatch] = []
+        self._motions: list[MotionWatch] = []
+        self._paths: list[PostureWatch] = []
+        self.share = 1.0  # of the velocities that were commanded last, which joint_speed_limit allows
         # by cover and position: m since something is touched or approached there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
@@ -128,7 +133,7 @@ class TaskControl:
         push : what pushes an arm that holds, as far as it is allowed without a task.
         """
         own = self._parameters
-        self._slide(q, dt)
+        moved = self._slide(q, dt)
         has_changed = self._begin(task)
         if has_changed:
             self._begun = list(q)
@@ -140,7 +145,10 @@ class TaskControl:
         found = (
             [(ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")]
             if self._refusal
-            else self._watch(states, forces, torques[0], push.torque_sd, dt, unknown)
+            else [
+                *self._watch(states, forces, torques[0], push.torque_sd, dt, unknown),
+                *self._watch_motions(states, anchors, moved, dt),
+            ]
         )
         reactions = by_seriousness(found)
         holds = any(reaction.holds for reaction in reactions)
@@ -148,6 +156,9 @@ class TaskControl:
             has_changed = True
             if holds:
                 self._held.hold(q)
+                for motion, path in zip(self._motions, self._paths, strict=True):
+                    motion.restart()
+                    path.restart()
             else:
                 self._held.release()
         factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
@@ -158,7 +169,7 @@ class TaskControl:
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
         resolved = self._frame.resolve(states, speeds, held, q)
         held_slowly = resolved.posture if rate else self._followed(states, resolved.posture, q)
-        velocity = _limited(resolved.velocity + held_slowly, own.joint_speed_limit)
+        velocity, self.share = _limited(resolved.velocity + held_slowly, own.joint_speed_limit)
         fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
         if self._held.is_holding:
             allowed = math.fsum(map(_desired, states)) or push.allowed
@@ -189,13 +200,20 @@ class TaskControl:
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
         self._holds = [ForceHold() for _ in task.axes]
         self._torques = [TorqueWatch(axis.name) for axis in task.axes]
+        self._motions = [MotionWatch(axis.name, axis.unit) for axis in task.axes]
+        limits = [self._parameters.task.fastest(axis.joint >= 0)[1] for axis in task.axes]
+        self._paths = [
+            PostureWatch([axis.name], "position", limit, f"{axis.unit}/s")
+            for axis, limit in zip(task.axes, limits, strict=True)
+        ]
         return True
 
-    def _slide(self, q: Sequence[float], dt: float) -> None:
+    def _slide(self, q: Sequence[float], dt: float) -> Array:
         """Count how far the link has slid along what each force presses, which stays where it is.
 
         Where nothing but forces is commanded, the way to the touch counts, too; another motion may lead to what is to
-        be touched.  Other axes, and a touch that is lost for a moment, change nothing of that.
+        be touched.  Other axes, and a touch that is lost for a moment, change nothing of that.  Returns the motion of
+        the joints since the period before (n,), rad.
         """
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -212,6 +230,7 @@ class TaskControl:
             lost = 0.0 if is_pressed else lost + dt
             if lost < LOST:
                 self._slid[at] = slid + self._force_axes.slide(q, *at, moved), lost
+        return moved
 
     @property
     def is_touching(self) -> bool:
@@ -242,9 +261,7 @@ class TaskControl:
                 if is_joint:
                     name, limit, unit = "torque_limit", own.torque_limit, "N m"
             elif axis.kind is AxisKind.VELOCITY:
-                name, limit, unit = "task.speed_limit", own.task.speed_limit, "m/s"
-                if is_joint:
-                    name, limit, unit = "task.joint_speed_limit", own.task.joint_speed_limit, "rad/s"
+                (limit, name), unit = own.task.fastest(is_joint), "rad/s" if is_joint else "m/s"
             else:
                 continue
             if value > limit:
@@ -272,6 +289,29 @@ class TaskControl:
                 error = -float(state.sensed.sense @ unknown[0])
                 case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
                 found += hold.step(case, external, force, self._parameters, dt)
+        return found
+
+    def _watch_motions(
+        self, states: Sequence[AxisState], anchors: Sequence[float], moved: Array, dt: float
+    ) -> list[Found]:
+        """What the positions and velocities report; an arm that holds its position is not to follow them."""
+        if self._held.is_holding:
+            return []
+        own, found = self._parameters, []
+        for state, anchor, motion, path in zip(states, anchors, self._motions, self._paths, strict=True):
+            axis = state.axis
+            if axis.kind not in (AxisKind.VELOCITY, AxisKind.POSITION):
+                continue
+            lever = 1.0 if axis.joint >= 0 else math.hypot(*state.row.tolist())
+            if axis.kind is AxisKind.VELOCITY:
+                way = float(state.row @ moved)
+                found.append(motion.velocity(axis.value or 0.0, way, lever, self.share, own, dt))
+            else:
+                at, (fastest, _) = state.coordinate, own.task.fastest(axis.joint >= 0)
+                law = own.task.largest_rate, fastest
+                if late := path.step([anchor], axis.rate != 0.0, [at], fastest, dt):
+                    found.append((ForceReaction.NOT_FOLLOWED, late))
+                found.append(motion.position(anchor, axis.rate, at, lever, law, self.share, own, dt))
         return found
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
@@ -336,7 +376,7 @@ class TaskControl:
         speed = factor * hold.share * force_speed(state, *laws, force, state.force(before), dt)
         if state.sensed and state.point and (desired := _desired(state)):
             speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
-        fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
+        fastest, _ = self._parameters.task.fastest(is_joint=not state.sensed)
         return min(max(speed, -fastest), fastest)
 
     def _followed(self, states: Sequence[AxisState], posture: Array, q: Sequence[float]) -> Array:
@@ -389,11 +429,12 @@ def _desired(state: AxisState) -> float:
     return (axis.value or 0.0) if axis.joint >= 0 else abs(axis.value or 0.0)
 
 
-def _limited(velocity: Array, limit: float) -> list[float]:
-    """All velocities reduced by one factor, so that no joint is faster than the limit, rad/s."""
+def _limited(velocity: Array, limit: float) -> tuple[list[float], float]:
+    """All velocities reduced by one factor, so that no joint is faster than the limit, rad/s; that factor."""
     fastest = float(np.abs(velocity).max())
-    limited: list[float] = (velocity * (limit / fastest) if fastest > limit else velocity).tolist()
-    return limited
+    share = limit / fastest if fastest > limit else 1.0
+    limited: list[float] = (velocity * share if share < 1.0 else velocity).tolist()
+    return limited, share
 
 
 def _row(state: AxisState, anchor: float, force: float, independence: float, fraction: float) -> AxisRow:

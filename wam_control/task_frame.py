@@ -209,7 +209,7 @@ class TaskFrame:
         """
         axis, own = state.axis, self._parameters
         is_joint = axis.joint >= 0
-        fastest = own.joint_speed_limit if is_joint else own.speed_limit
+        fastest, _ = own.fastest(is_joint)
         if axis.kind is AxisKind.VELOCITY:
             speed = axis.value or 0.0
         elif axis.kind is AxisKind.POSITION:

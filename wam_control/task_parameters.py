@@ -34,3 +34,9 @@ class TaskParameters:
     joint_deadband: float = tunable(
         "torque of a joint impedance below which the joint does not yield", "N m", high=100.0, before=0.1
     )
+
+    def fastest(self, is_joint: bool) -> tuple[float, str]:
+        """Largest speed along an axis, m/s, or of a joint, rad/s, and the name of that parameter."""
+        if is_joint:
+            return self.joint_speed_limit, "task.joint_speed_limit"
+        return self.speed_limit, "task.speed_limit"

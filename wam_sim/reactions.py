@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol, TypeVar
 
 from wam_control.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL
 from wam_control.scenario import ScenarioStep
-from wam_control.task import TaskCommand, watched_axes
+from wam_control.task import AxisKind, TaskAxis, TaskCommand, watched_axes
 
 FAULT = "fault"
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
@@ -111,28 +111,32 @@ def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[Playe
 
 
 def watched_times(
-    tasks: Iterable[tuple[TaskCommand | None, int, int]], of_joints: bool = False
+    tasks: Iterable[tuple[TaskCommand | None, int, int]], without_forces: bool = False
 ) -> list[tuple[int, int]]:
-    """Begin and end of each time in which tasks, given with theirs in ns, command forces along the same axes.
+    """Begin and end of each time in which tasks, given with theirs in ns, command the same axes that are watched.
 
-    With `of_joints` joint torques alone count: how far the force at a link is off, a report has from the simulator.
+    With `without_forces` those of links do not count: how far such a force is off, a report has from the simulator.
     """
     times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
-        axes, since = [axis.name for axis in watched_axes(task) if axis.joint >= 0 or not of_joints], begin
+        axes, since = [axis.name for axis in watched_axes(task) if not (without_forces and _is_of_link(axis))], begin
         if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
         times.append((axes, since, end))
     return [(begin, end) for axes, begin, end in times if axes]
 
 
+def _is_of_link(axis: TaskAxis) -> bool:
+    return axis.kind is AxisKind.FORCE and axis.joint < 0
+
+
 def is_too_short(times: Sequence[tuple[int, int]], step: Played, settling_time: float) -> bool:
-    """Whether the task of a step commands a force that lasts too briefly to be assessed at its end.
+    """Whether the task of a step commands an axis for too brief a time to be assessed at its end.
 
     Parameters
     ----------
-    times : in which forces are commanded, see `watched_times`.
-    settling_time : of the force loop, s, after which a force that is off is reported.
+    times : in which axes are commanded, see `watched_times`.
+    settling_time : of the force loop, s, after which what is off is reported.
     """
     parts = ((begin, min(end, step.end)) for begin, end in times)
     return any(end > max(begin, step.begin) + BRIEF and end - begin <= 1e9 * settling_time for begin, end in parts)
@@ -151,7 +155,7 @@ def unassessed(
 def too_short(settling_time: float) -> str:
     """What `is_too_short` means, in words."""
     limit = f"limits.settling_time, {settling_time:g} s"
-    return f"not assessed: force or torque of a task commanded for no longer than {limit}"
+    return f"not assessed: force, torque or motion of a task commanded for no longer than {limit}"
 
 
 def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:

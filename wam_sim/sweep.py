@@ -184,7 +184,7 @@ def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str
 def _unassessed(
     configuration: Configuration, reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]
 ) -> str:
-    """Steps whose task commands a force or a torque too briefly to be assessed; '' where none was."""
+    """Steps whose task commands a force, a torque or a motion too briefly to be assessed; '' where none was."""
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
     settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
