@@ -92,7 +92,7 @@ def test_topics_in_backticks_exist() -> None:
     for page, text in HANDBOOK.items():
         if page == "parameters.md":
             continue
-        for name in set(re.findall(r"`([\w/]+)`", text)) - BY_NAME.keys() - {"use_joint_sensors"}:
+        for name in set(re.findall(r"`([\w/]+)`", text)) - BY_NAME.keys() - {"use_joint_sensors", "needs_joint_sensors"}:
             meant = difflib.get_close_matches(name, BY_NAME, cutoff=0.85)
             assert not meant, f"{page}: `{name}`, is {meant[0]} meant?"
             assert not looks_like_a_topic.fullmatch(name), f"{page}: there is no topic `{name}`"

@@ -516,7 +516,7 @@ def test_a_way_through_free_space_ends_with_a_reason() -> None:
         ask(loop, World(400.0, force=4.0), down(5.0))
     for _ in range(400):
         world.move(ask(loop, world, down(5.0)).velocity)
-    assert "along the force since it last touched something" in loop.reason
+    assert "along the force since the force last was right, or rose" in loop.reason
 
 
 def test_pressing_is_no_free_travel() -> None:
@@ -526,6 +526,44 @@ def test_pressing_is_no_free_travel() -> None:
         world.move(ask(loop, world, down(9.0)).velocity)
     assert loop.reaction is ForceReaction.NONE
     assert world.force == pytest.approx(9.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("presses", "surface_speed", "back"),
+    [(9.0, 0.0, True), (5.25, 0.0, True), (5.25, 2.5e-3, False), (2.0, 0.0, False)],
+)
+def test_what_presses_against_the_force_or_goes_away_is_followed_no_further_than_the_arm_may_go(
+    presses: float, surface_speed: float, back: bool
+) -> None:
+    """A hand of this force, N, on an arm that presses with 5 N: it was followed without end, in either direction.
+
+    A surface that moves as slowly as is declared is followed.
+    """
+    limits = replace(GIVEN.limits, free_travel=0.02, surface_speed=surface_speed, whole_force=3.0)
+    loop, world = force_loop(ARM, replace(PINNED, limits=limits, posture_gain=0.0)), World(1e-9, force=presses)
+    begin = BODY.point(POSE, "outer_link", (0.28, 0, 0))[2]
+    for _ in range(4000):
+        world.move(ask(loop, world, down(5.0)).velocity)
+    moved = float(BODY.point(world.q, "outer_link", (0.28, 0, 0))[2] - begin)
+    if surface_speed:
+        assert moved > 0.025
+        assert loop.reaction is ForceReaction.NONE
+        return
+    assert (moved > 0.0) is back
+    assert abs(moved) == pytest.approx(0.02, abs=0.01)
+    assert loop.reaction is ForceReaction.NOTHING_TOUCHED
+    assert ("gone back by" if back else "since the force last was right, or rose") in loop.reason
+
+
+def test_a_posture_that_leads_along_a_slope_is_no_push() -> None:
+    """The force is right, and the arm goes back against it, as on a slope that rises."""
+    limits = replace(GIVEN.limits, free_travel=0.01)
+    for is_led in (True, False):
+        loop, world = force_loop(ARM, replace(PINNED, limits=limits, posture_gain=0.0)), World(1e-9, force=5.2)
+        for k in range(2000):
+            posture = [a + 1e-6 * k * is_led for a in POSE]
+            world.move(ask(loop, world, down(5.0), posture=posture).velocity)
+        assert (loop.reaction is ForceReaction.NOTHING_TOUCHED) is not is_led
 
 
 def test_until_something_is_touched_the_speed_is_that_of_a_bounded_impact() -> None:

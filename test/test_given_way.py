@@ -43,6 +43,26 @@ def test_the_way_is_that_of_the_fastest_point() -> None:
     assert given.way > 1.05 * tool_way(POSE, POSE + ELBOW)
 
 
+def test_along_a_direction_its_way_alone_counts_until_it_counts_in_any() -> None:
+    given, along = GivenWay(BODY), np.array([1.0, 0.0, 0.0])
+    ends = BODY.tool_pose(POSE).position, BODY.tool_pose(POSE + ELBOW).position
+    for k in range(61):
+        given.give(along)
+        given.step((POSE + ELBOW * k / 60).tolist(), DT)
+    covers = zip(WAM.covers.names, WAM.covers.length, strict=True)
+    moved = [ends[1] - ends[0]]
+    for name, length in covers:
+        begin, end = (BODY.point(q, name, (length, 0.0, 0.0)) for q in (POSE, POSE + ELBOW))
+        moved.append(end - begin)
+    assert given.way == pytest.approx(max(0.0, *(float(one[0]) for one in moved)), rel=1e-6)
+    assert given.way < 0.95 * max(float(np.linalg.norm(one)) for one in moved)
+    for k in range(2000):
+        given.give(along)
+        given.give()  # another push at the same time
+        given.step((POSE + ELBOW + 0.01 * PUSHED * (-1) ** k).tolist(), DT)
+    assert given.way < max(0.0, *(float(one[0]) for one in moved)) + 0.003, "a push that shakes"
+
+
 def test_a_pause_of_the_push_renews_nothing_and_another_command_does() -> None:
     given, q = GivenWay(BODY), POSE
     for k in range(3):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
-from test_force_lasting import DIRECTION, OUTER, PLACE, POSE
+from test_force_lasting import DIRECTION, OUTER, PLACE, POSE, press
 from test_force_plant import MOTORS
 
 from wam_control.arm_push import ArmPush
@@ -171,3 +171,25 @@ def test_an_arm_that_was_pushed_away_goes_back_no_faster_than_it_may_come_to_a_s
     assert moments[-1].reaction is ForceReaction.OTHER_LINK
     assert max(float(np.linalg.norm(one.tool - moments[0].tool)) for one in moments) < WAY + 0.03
     assert max(one.speed for one in moments if one.time > 1.6) < 0.05
+
+
+@pytest.mark.parametrize("as_task", [False, True])
+@pytest.mark.parametrize(("is_near", "newtons"), [(True, 10.0), (True, 20.0), (False, 14.0)])
+def test_what_pushes_against_the_commanded_force_is_followed_no_further_than_the_arm_may_go(
+    is_near: bool, newtons: float, as_task: bool
+) -> None:
+    """On its way to a surface and on one: the arm went back by 0.35 m and more within 8 s, as long as it was pushed."""
+    near = obstacles(BODY, POSE, [Surface(OUTER, PLACE, DIRECTION, 4000.0, 0.3, False)]) if is_near else FAR
+    given = {"arm.joints.start": list(POSE), "force_loop:guard.posture": list(POSE), **near}
+    given |= {"force_loop:contact_source": "pinned", "force_loop:contact_position": PLACE}
+    hand = Push(OUTER, PLACE, triple(-newtons * (BODY.cover_pose(POSE, OUTER).rotation.T @ DOWN)), 0.0, 9.0)
+    steps = [ScenarioStep("release", RELEASE, request="enable"), press(8.0, 0.4, as_task)]
+    run = Simulation(
+        with_accepted_gain(CONFIGURATION.with_values(given)), [*steps, press(8.0, 9.0, as_task, push=hand)]
+    )
+    places, found = [], set()
+    while not run.step():
+        places.append(float(DOWN @ BODY.point(run.driver.plant.q, OUTER, (PLACE, 0.0, 0.0))))
+        found.add(run.nodes["force_loop"].force_reaction)
+    assert max(places) - min(places) < WAY + 0.02
+    assert ForceReaction.NOTHING_TOUCHED in found

@@ -1,7 +1,9 @@
 """Whether a commanded posture moves on faster than the arm follows; the arm here is never faster than its limit."""
 
+import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from wam_control.motion import GoalMotion, Moving
@@ -39,6 +41,40 @@ def test_a_posture_is_late_if_it_is_faster_than_the_arm_catches_up_with(every: i
     begin = next(k for k, text in enumerate(found) if text)
     assert set(filter(None, found)) == {found[begin]}
     assert found[begin].startswith("the commanded posture moves faster than the arm follows, elbow with ")
+
+
+def streamed(speed: float, interval: float, seconds: float = 6.0, age: float = math.inf, jitter: float = 0.0) -> bool:
+    """Whether a joint is late on a way that is streamed at intervals, s, each command for no longer than its age, s."""
+    random, watch, q, goal, since = np.random.default_rng(0), PostureWatch(["elbow"]), 0.0, 0.0, 0.0
+    due, found = interval, False
+    for k in range(round(seconds / DT)):
+        time = k * DT
+        if time >= due:
+            goal, since, due = speed * time, time, due + interval * (1.0 + jitter * random.uniform(-1.0, 1.0))
+        if time - since < age:
+            found |= bool(watch.step([goal], False, [q], LIMIT, DT))
+            q += min(max(goal - q, -LIMIT * DT), LIMIT * DT)
+        else:
+            found |= bool(watch.wait(DT))
+    return found
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.0, 5.0, 8.0, 20.0, 50.0])
+def test_a_slow_stream_is_judged_by_its_own_interval(rate: float) -> None:
+    """Below 10 Hz each posture was another goal, and nothing was late."""
+    for jitter in (0.0, 0.2):
+        assert not streamed(0.9 * LIMIT, 1.0 / rate, jitter=jitter)
+        assert streamed(1.1 * CAUGHT_UP * LIMIT, 1.0 / rate, jitter=jitter)
+
+
+def test_a_command_that_lapses_before_the_next_one_is_followed_for_its_age() -> None:
+    assert not streamed(0.9 * 0.2 * LIMIT, 1.0, age=0.2)
+    assert streamed(0.9 * LIMIT, 1.0, age=0.2)
+    assert not streamed(0.9 * LIMIT, 0.19, age=0.2)
+
+
+def test_goals_to_and_fro_in_a_rhythm_are_no_motion() -> None:
+    assert not any(late(lambda time: 3.0 * (round(time) % 2), 8.0))
 
 
 def test_with_velocities_the_path_counts_and_not_its_end_alone() -> None:

@@ -49,6 +49,7 @@ SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
 SENSORS = "use joint sensors"
 RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
 UNLOAD = "the arm holds its position: declare what it carries (arm.payload), or end the command and tare in free space"
+STILL = [0.0]  # m/s
 NOT_SLOWED = 0.95  # of the speed along the force
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -123,12 +124,14 @@ class ForceHold:
     ----------
     is_touching : whether the measured force shows that something is touched.
     has_touched : whether it was, since the force is commanded.
+    goes_back : whether the arm goes back against the force in this period, as what it presses pushes on.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
     fed : fraction of the torque of the commanded force that is fed forward.
     """
 
     def __init__(self) -> None:
         self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
+        self._pace = LowPass()
         self._advice = Advice()
         self.reset()
 
@@ -145,7 +148,10 @@ class ForceHold:
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
-        self._is_slow, self._other = False, ""
+        self.goes_back = self._is_led = False
+        self._most = 0.0  # N, that has been measured
+        self._is_slow, self._other, self._gone = False, "", ""
+        self._pace.reset()
         self._advice.reset()
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
@@ -206,9 +212,14 @@ class ForceHold:
         self._is_kept = self.is_touching and whole < COARSE and abs(desired - measured) < band
         return self._is_kept
 
-    def travel(self, distance: float) -> None:
-        """Count a way along the force, m."""
+    def travel(self, distance: float, dt: float, is_led: bool) -> None:
+        """Count a way along the force, m, that the arm has moved in a period of dt, s.
+
+        `is_led`: another motion is commanded besides, which may lead the arm along a slope of what it presses.
+        """
         self._travel += distance
+        self._pace.step([distance / dt], STEADY, dt)
+        self._is_led = is_led
 
     def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
         """Force above the commanded one, N, beyond the uncertainty of the measured one; 0 where it is not.
@@ -268,6 +279,7 @@ class ForceHold:
         dt: float,
         pushed: float | None = None,
         others: Callable[[], OtherForces] | None = None,
+        given_way: float = 0.0,
     ) -> list[Found]:
         """What to do instead of what is commanded, and why; nothing where it is obeyed.
 
@@ -280,6 +292,7 @@ class ForceHold:
         dt : outer period, s.
         pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
         others : the same force in other poses and of other sizes, for the advice where it is refused.
+        given_way : how far the arm has given way to what pushes it, m, where it does not hold.
         """
         axis, point, desired = case.axis, case.point, case.desired
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
@@ -291,8 +304,7 @@ class ForceHold:
         if self.is_touching and not self.has_touched:
             self.has_touched = True
             self._forget_swings()
-        if self.is_touching and self._travel <= parameters.limits.free_travel:
-            self._travel = 0.0
+        self._count(measured, desired, given_way, parameters)
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
         is_strange = self._is_sensed and unexplained > UNEXPLAINED
@@ -440,10 +452,12 @@ class ForceHold:
         """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
+        if self._gone:
+            return ForceReaction.NOTHING_TOUCHED, self._gone
         if is_blind:
             return None
         if self._travel > parameters.limits.free_travel:
-            since = "since it last touched something" if self.has_touched else "and nothing was touched"
+            since = "since the force last was right, or rose" if self.has_touched else "and nothing was touched"
             return ForceReaction.NOTHING_TOUCHED, (
                 f"the arm has moved {self._travel:.3g} m along the force {since}; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
@@ -456,6 +470,23 @@ class ForceHold:
                 f"position, or, {SOFTER}; command no force, then again"
             )
         return None
+
+    def _count(self, measured: float, desired: float, given_way: float, parameters: ForceLoopParameters) -> None:
+        """End the way along the force where that is right or rises, and find the one back against it.
+
+        What presses moves the arm back if it is too large, or the arm goes back all the same.
+        """
+        limits, tolerated = parameters.limits, tolerance(desired, parameters)
+        # where it neither has the force nor takes more of it, it may be gone, or go away
+        if self.is_touching and measured >= min(desired - tolerated, self._most + SETTLE * desired):
+            self._most = max(self._most, measured)
+            if self._travel <= limits.free_travel:
+                self._travel = 0.0
+        slowest = limits.surface_speed + CREEP / limits.settling_time
+        is_carried = not self._is_led and (self._pace.value or STILL)[0] < -slowest
+        self.goes_back = self.is_touching and (measured > desired + tolerated or is_carried)
+        if self.goes_back and given_way > limits.free_travel and not self._gone:
+            self._gone = _gone(given_way, measured, desired, parameters)
 
     def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the arm would be too slow on its way or on the surface, None where it is not or something is touched."""
@@ -671,6 +702,15 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
             "let the surface move more slowly",
         )
     return None
+
+
+def _gone(way: float, measured: float, desired: float, parameters: ForceLoopParameters) -> str:
+    return (
+        f"the arm has gone back by {way:.3g} m against the force of {desired:.3g} N, as what presses it with "
+        f"{measured:.3g} N moves on: it is not at rest, or is no surface; allowed: limits.free_travel, "
+        f"{parameters.limits.free_travel:g} m; the arm holds its position: free it, or, for a surface that moves, "
+        "declare limits.surface_speed; command no force, then again"
+    )
 
 
 def _loaded(force: float, meaning: str, desired: float) -> str:

@@ -317,10 +317,10 @@ class ForceLoop:
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
         self._react_too(ForceReaction.CONTACT_FORCE, limited.contact_force)
         self._react_too(ForceReaction.JOINT_END, limited.joint_end)
-        self._watch_posture(commands, joints.position, dt)
+        self._watch_posture(commands, posture is not None, joints.position, dt)
         return ForceOutput(limited.velocity, *out[1:])
 
-    def _watch_posture(self, commands: Commands, q: Sequence[float], dt: float) -> None:
+    def _watch_posture(self, commands: Commands, is_commanded: bool, q: Sequence[float], dt: float) -> None:
         """React to a posture that moves on faster than the arm follows."""
         is_held = self.reaction.holds or "joint_posture_command" in commands.refusals
         if self._axes != TASK or is_held or not self._posture_before:
@@ -329,7 +329,11 @@ class ForceLoop:
             self._posture_watch.restart()
             return
         limit = self.parameters.joint_speed_limit
-        late = self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
+        late = (
+            self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
+            if is_commanded
+            else self._posture_watch.wait(dt)
+        )
         self._react_too(ForceReaction.NOT_FOLLOWED, late)
         if self._posture_before is not commands.posture:
             self._watch_posture_of_task(commands.posture, q, dt)
@@ -465,7 +469,7 @@ class ForceLoop:
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
         self._react(*self._found(q, force_axis, point, direction, (measured, free), desired, dt, command.frame))
-        self._remember(q, moved, contact, point, force_axis)
+        self._remember(q, moved, contact, point, force_axis, direction, dt)
         if self.reaction.holds:
             measured -= -float(force_axis.sense @ self._unknown[0])
             excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
@@ -491,7 +495,6 @@ class ForceLoop:
         if self._hold.has_touched and self._rate is None:
             held = self._followed(q, point, force_axis, held, desired, scalar.gain[0])
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
-        self._hold.travel(float(force_axis.lever @ velocity) * dt)
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
@@ -545,6 +548,7 @@ class ForceLoop:
             dt,
             pushed=measured[1],
             others=lambda: self._others(q, point, direction, frame),
+            given_way=0.0 if self._held.is_holding else self._given.way,
         )
 
     def _case(
@@ -676,8 +680,21 @@ class ForceLoop:
             return False
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
-    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint, axis: ForceAxis) -> None:
-        """Keep where the arm presses, how far it has slid, its way there, and where it was free."""
+    def _remember(
+        self,
+        q: Sequence[float],
+        moved: Array,
+        contact: Contact,
+        point: ForcePoint,
+        axis: ForceAxis,
+        direction: Array,
+        dt: float,
+    ) -> None:
+        """Keep where the arm presses, how far it has slid, its way there and back, and where it was free."""
+        if not self.reaction.holds and self.parameters.mode != "open_loop":
+            self._hold.travel(float(axis.lever @ moved), dt, self._posture_watch.is_moving)
+            if self._hold.goes_back:
+                self._given.give(-direction)
         self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         if self._hold.is_touching:
             if not self.reaction.holds:

@@ -36,22 +36,36 @@ class GivenWay:
     def restart(self) -> None:
         """Something else is commanded."""
         self.way = self._before = self._lasting = 0.0
-        self._is_pushed = self._gives = False
+        self._gives = self._is_anywhere = False
+        self._kind = False, False  # pushed, and anywhere
+        self._along: Array | None = None
         self._begun: Array = np.zeros((0, 3))
 
-    def give(self) -> None:
-        """The arm is pushed, and gives way, in this period."""
-        self._gives = True
+    def give(self, along: Array | None = None) -> None:
+        """The arm is pushed, and gives way, in this period.
+
+        Parameters
+        ----------
+        along : direction (3,) of the way that counts, where motion across it is commanded; None: any.
+        """
+        self._is_anywhere = along is None or (self._gives and self._is_anywhere)
+        self._gives, self._along = True, along if along is not None else self._along
 
     def step(self, q: Sequence[float], dt: float) -> None:
         """Begin a period of dt, s, with the joints at (n,), rad."""
         self._lasting = LASTING if self._gives else max(self._lasting - dt, 0.0)
         is_pushed, self._gives = self._lasting > 0.0, False
-        if is_pushed != self._is_pushed:
-            self._is_pushed, self._before, self._begun = is_pushed, self.way, self._points(q)
-        if is_pushed or self._before:
-            moved = float(np.linalg.norm(self._points(q) - self._begun, axis=1).max())
-            self.way = self._before + moved if is_pushed else min(self.way, max(self._before - moved, 0.0))
+        kind = (is_pushed, is_pushed and self._is_anywhere)
+        if kind != self._kind:
+            self._kind, self._before, self._begun = kind, self.way, self._points(q)
+        if not (is_pushed or self._before):
+            return
+        moved = self._points(q) - self._begun
+        if is_pushed and self._along is not None and not self._is_anywhere:
+            self.way = max(self._before + float((moved @ self._along).max()), 0.0)
+            return
+        furthest = float(np.linalg.norm(moved, axis=1).max())
+        self.way = self._before + furthest if is_pushed else min(self.way, max(self._before - furthest, 0.0))
 
     def _points(self, q: Sequence[float]) -> Array:
         """Ends of the covers, and the tool (m, 3), m: no point of the arm moves further than the fastest of them."""

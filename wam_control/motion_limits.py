@@ -49,7 +49,8 @@ class LimitParameters:
     )
     settling_time: float = tunable("time after which a force that is still not reached is reported", "s", before=1e9)
     free_travel: float = tunable(
-        "largest way along a commanded force without touching anything; then the arm holds its position",
+        "largest way along a commanded force that is not right, or back against it with what pushes; then the arm "
+        "holds its position",
         "m",
         before=1e9,
     )

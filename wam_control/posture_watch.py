@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from typing import Final
 
 CAUGHT_UP: Final = 1.25  # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
-PAUSE: Final = 0.1  # s, after which a posture that changes is another goal, to which the arm goes as fast as it may
+PAUSE: Final = 0.1  # s, after which a posture that changes is another goal, to which the arm goes as fast as it may,
+RHYTHM: Final = 1.5  # unless it changes at intervals that are alike by this factor
 BEHIND: Final = 0.02  # rad, of an axis m, from where the posture is as it moves on, from which the arm is late
 ROUNDING: Final = 1e-9  # s, rad
 STILL: Final = [0.0]
@@ -32,7 +33,21 @@ class PostureWatch:
         self._before: list[float] = []
         self._follower: list[float] = []
         self._behind = STILL
-        self._rested, self._late = math.inf, ""
+        self._interval, self._late = math.inf, ""  # s, between the last two changes
+        self._rested, self._held = 0.0, 0.0  # s, since the last one, and of that commanded
+        self._is_goal = True
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the commanded posture moves."""
+        return not self._is_goal and self._rested <= max(PAUSE, RHYTHM * self._interval) + ROUNDING
+
+    def wait(self, dt: float) -> str:
+        """Why the arm is late, while no posture is commanded for a period of dt, s, as before."""
+        self._rested += dt
+        if not self.is_moving:
+            self._late = ""
+        return self._late
 
     def step(self, posture: Sequence[float], has_rate: bool, q: Sequence[float], limit: float, dt: float) -> str:
         """Why the arm is late, '' where it is not.
@@ -44,23 +59,15 @@ class PostureWatch:
         limit : largest speed, rad/s or m/s.
         dt : outer period, s.
         """
-        before, time, behind = self._before, self._rested + dt, self._behind
-        self._before, self._rested = list(posture), time
-        if has_moved := self._before != before:
-            self._rested = 0.0
-            if time > PAUSE + ROUNDING:
-                self._follower, behind = list(posture), STILL
+        before, self._before = self._before, list(posture)
+        self._rested, self._held = self._rested + dt, self._held + dt
+        if not before:
+            self._follower = self._before
+        elif self._before != before:
+            self._change(before, limit)
         if self._follower == self._before:
             self._behind, self._late = STILL, ""
             return ""
-        if has_moved and max(behind) > BEHIND and not self._late:
-            k = behind.index(max(behind))
-            if (speed := abs(posture[k] - before[k]) / time) > limit:  # otherwise it was set elsewhere at once, before
-                self._late = (
-                    f"the commanded {self._what} moves faster than the arm follows, {self._names[k]} with "
-                    f"{speed:.3g} {self._unit}; allowed: {self._limit}, {limit:g} {self._unit}; the arm goes on and "
-                    f"is late: give the motion more time, or raise force_loop:{self._limit}"
-                )
         most = (1.0 if has_rate or self._late else CAUGHT_UP) * limit * dt
         pairs = zip(posture, self._follower, q, strict=True)
         self._follower = [_nearer(goal, at + min(max(goal - at, -most), most), arm) for goal, at, arm in pairs]
@@ -68,6 +75,32 @@ class PostureWatch:
         if max(self._behind) <= ROUNDING:
             self._late = ""
         return self._late
+
+    def _change(self, before: list[float], limit: float) -> None:
+        """Take another posture, which goes on with a motion or is another goal."""
+        time, held = self._rested, self._held
+        is_soon = time <= PAUSE + ROUNDING
+        goes_on = is_soon or self._interval <= RHYTHM * time <= RHYTHM * RHYTHM * self._interval
+        if is_soon and self._is_goal:  # a motion begins, there
+            self._follower, self._behind = before, STILL
+        if not goes_on:
+            self._late = ""
+        elif max(self._behind) > BEHIND and not self._late:
+            k = self._behind.index(max(self._behind))
+            way = self._before[k] - before[k]
+            moves_on = way * (before[k] - self._follower[k]) > 0.0  # and was not set elsewhere at once, before
+            if moves_on and (speed := abs(way) / held) > limit:
+                advice = (
+                    f"give the motion more time, or raise force_loop:{self._limit}"
+                    if held > time - ROUNDING
+                    else "a command lasts ages.command: stream it at shorter intervals than that"
+                )
+                self._late = (
+                    f"the commanded {self._what} moves faster than the arm follows, {self._names[k]} with "
+                    f"{speed:.3g} {self._unit}; allowed: {self._limit}, {limit:g} {self._unit}; the arm goes on and "
+                    f"is late: {advice}"
+                )
+        self._interval, self._is_goal, self._rested, self._held = time, not goes_on, 0.0, 0.0
 
 
 def _nearer(goal: float, follower: float, arm: float) -> float:

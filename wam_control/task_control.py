@@ -146,7 +146,7 @@ class TaskControl:
             [(ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")]
             if self._refusal
             else [
-                *self._watch(states, forces, torques[0], push.torque_sd, dt, unknown),
+                *self._watch(states, forces, torques[0], push.torque_sd, moved, dt, unknown),
                 *self._watch_motions(states, anchors, moved, dt),
             ]
         )
@@ -180,8 +180,6 @@ class TaskControl:
             reactions = {reaction: reason + self._held.push for reaction, reason in reactions.items()}
             fed = np.zeros(len(q)) if is_yielding else None
         effort = [0.0] * len(q) if fed is None else self._feed_forward.step(fed, velocity, own, dt)
-        for state, hold in zip(states, self._holds, strict=True):
-            hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
         is_pressing = self.is_touching and all(state.point and state.axis.kind is AxisKind.FORCE for state in states)
@@ -274,11 +272,13 @@ class TaskControl:
         forces: Sequence[float],
         external: Array,
         external_sd: Array,
+        moved: Array,
         dt: float,
         unknown: tuple[Array, str],
     ) -> list[Found]:
-        """What the force axes report."""
+        """What the force axes report; `moved` by the joints since the period before (n,), rad."""
         found: list[Found] = []
+        is_led = any(state.axis.kind is not AxisKind.FORCE for state in states)
         for state, force, hold, torque in zip(states, forces, self._holds, self._torques, strict=True):
             desired = _desired(state)
             if (joint := state.axis.joint) >= 0:
@@ -288,7 +288,13 @@ class TaskControl:
             elif state.sensed and state.point and desired:
                 error = -float(state.sensed.sense @ unknown[0])
                 case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
-                found += hold.step(case, external, force, self._parameters, dt)
+                is_holding = self._held.is_holding
+                if not is_holding:
+                    hold.travel(float(state.row @ moved), dt, is_led)
+                given_way = 0.0 if is_holding else self._given.way
+                found += hold.step(case, external, force, self._parameters, dt, given_way=given_way)
+                if hold.goes_back and not is_holding:
+                    self._given.give(-state.direction)
         return found
 
     def _watch_motions(
