@@ -24,6 +24,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
+from test_bag import QOS
 
 from wam_analysis.findings.analysis import analyse
 from wam_bag import bag_file, safe_yaml
@@ -40,6 +41,7 @@ from wam_bag.bag import (
     raw,
     read,
 )
+from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents, mode_of
 from wam_bag.cut import Cut, cut
 from wam_bag.errors import BROKEN
@@ -745,3 +747,20 @@ def test_broken_bags_are_refused_and_none_gives_a_wrong_value_unseen(tmp_path: P
     assert verdicts.count("refused") == len(WAYS)
     assert "differs" in verdicts, "without checksums some damage is not seen: values are compared"
     assert "same" in verdicts
+
+
+def test_a_topic_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path) -> None:
+    split_bag(bag := tmp_path / "bag")
+    found = read(bag)
+    with pytest.raises(KeyError, match=f"no topic '/nosuch'; its topics: {', '.join(found.topics)}"):
+        found.topics["/nosuch"]
+    assert "/nosuch" not in found.topics
+
+
+@pytest.mark.parametrize("topics", [[], ["/wam/motor_states", "/wam/joint_states"]])
+def test_a_bag_without_a_message_is_not_analysed_but_called_empty(topics: list[str], tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for name in topics:
+            bag.add_topic(name, "sensor_msgs/msg/JointState", QOS)
+    with pytest.raises(BagError, match="bag is empty: it has no message; record again while the nodes publish"):
+        analyse(tmp_path / "bag", lambda doing: None)

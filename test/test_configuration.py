@@ -127,6 +127,9 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
+        ("bsae: wam", r"has the key 'bsae'; did you mean 'base'\?"),
+        ("bsae: wam\n/**: {ros__parameters: {}}", r"has the key 'bsae'; did you mean 'base'\?"),
+        ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
         ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
         (
@@ -144,6 +147,21 @@ def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: 
     path.write_text(text)
     with pytest.raises(ParameterError, match=rf"odd\.yaml.*{message}"):
         Configuration.load(path)
+
+
+def test_a_replaced_value_is_not_blamed_on_the_file() -> None:
+    loaded = Configuration.load(packaged("wam"))
+    with pytest.raises(
+        ParameterError, match=r"^an option or a replaced value in place of that in .*wam\.yaml, section"
+    ):
+        loaded.with_values({"timing.real_time_factor": -3.0}).shared  # noqa: B018 - it is built here
+
+
+def test_a_value_of_the_file_is_blamed_on_it(tmp_path: Path) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text("base: wam\n/**: {ros__parameters: {timing: {real_time_factor: -3.0}}}\n")
+    with pytest.raises(ParameterError, match=rf"^{path}, section"):
+        Configuration.load(path).with_values({"timing.timeout": 3.0}).shared  # noqa: B018 - it is built here
 
 
 def test_missing_file_is_refused_by_name(tmp_path: Path) -> None:

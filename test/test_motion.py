@@ -121,6 +121,14 @@ def test_a_line_out_of_reach_or_through_the_arm_is_refused_with_the_place(goal: 
         LineMotion(START, goal, ARM, BODY, LIMITS)
 
 
+@pytest.mark.parametrize("goal", [(600.0, 0.0, 0.0), (60.0, -90.0, 0.0)])
+def test_a_goal_far_out_of_reach_is_refused_as_that(goal: tuple[float, float, float]) -> None:
+    with pytest.raises(
+        ParameterError, match=r"m off; allowed: positions within the reach of the arm; give another goal"
+    ):
+        LineMotion(START, goal, ARM, BODY, LIMITS)
+
+
 def test_a_streamed_trajectory_goes_on_and_one_that_ends_leaves_the_arm_where_it_is() -> None:
     player = TrajectoryPlayer(ARM, LIMITS)
     there = path(PathPoint((0.3, -1.0, 0.0, 0.5)))

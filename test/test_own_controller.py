@@ -193,6 +193,30 @@ def test_a_module_that_raises_at_its_import_is_named(tmp_path: Path, monkeypatch
         declared("broken_module:Any")
 
 
+def test_a_reaction_without_outputs_is_named_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The faulty one, though another class of the module is configured; also where a check of an input refuses."""
+    lines = "from wam_description.wiring import Input, reaction\nclass Other:\n    "
+    for name, faulty in (
+        ("no_outputs", '@reaction(Input("joint_states"))'),
+        ("odd", '@reaction(Input("q", "p"), outputs=())'),
+    ):
+        (tmp_path / f"{name}.py").write_text(f"{lines}{faulty}\n    def step(self, inputs): ...\nclass Mine: ...\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        with pytest.raises(ParameterError, match=rf"node '{name}:Mine' cannot be imported: TypeError: .*{name}\.py:3"):
+            declared(f"{name}:Mine")
+
+
+def test_an_output_of_a_reaction_that_declares_none_is_refused_with_what_to_write() -> None:
+    class Forgot(Echo):
+        @reaction(Input("gravity_effort", "effort"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"echo": None}
+
+    text = r"its reactions declare nothing; write outputs=\('echo',\) in @reaction"
+    with pytest.raises(ValueError, match=text):
+        declaration(Forgot).require_declared({"echo": None})
+
+
 def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(configured: Configuration) -> None:
     node: Any = declared("impedance:Impedance").node
     loop = node(configured.shared, configured.node("impedance", node.parameters))

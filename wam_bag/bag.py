@@ -43,6 +43,13 @@ __all__ = [
 ]  # fmt: skip
 
 
+class _Topics(dict[str, Columns]):
+    """Columns by topic; a topic that is not there is answered with those that are."""
+
+    def __missing__(self, topic: str) -> Columns:
+        raise KeyError(f"the bag has no topic '{topic}'; its topics: {', '.join(self) or 'none'}")
+
+
 class Bag(NamedTuple):
     """A bag in memory: columns and type by topic, attachments and metadata records by name.
 
@@ -167,7 +174,7 @@ def read(
             merge(metadata, mcap.metadata())
     if not may_lack:
         _check_has(path, topics, counts)
-    columns = {topic: found.columns(f"{path}, topic {topic}") for topic, found in sorted(collectors.items())}
+    columns = _Topics({t: found.columns(f"{path}, topic {t}") for t, found in sorted(collectors.items())})
     types = {topic: found.type for topic, found in collectors.items()}
     return Bag(Path(path), columns, types, attachments, metadata, dict(counts))
 

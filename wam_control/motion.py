@@ -23,6 +23,7 @@ NODES = 200  # of a line, between which the joint angles are interpolated
 FASTEST = 1.875  # speed in the middle of a minimum-jerk path, of its mean
 STEEPEST = 15.0  # rad/m, of a joint on a line
 EXACT = 1e-10  # m, of the nodes of a line
+REACHED = 1e-6  # m, between a node and the line; what is further from it is out of reach
 ROUNDING = 1e-9
 THERE = 0.02  # rad, between the arm and the first point of a trajectory, if that is at 0 s
 
@@ -245,6 +246,7 @@ class LineMotion:
             distance = self._length * k / NODES
             if k:
                 self._angles.append(self._node(body, begin + along * distance))
+                self._require_reached(body, begin + along * distance, distance)
             self._slopes.append(self._slope(arm, body, along, distance))
         steepest = np.abs(self._slopes).max(axis=0)
         speed = min(limits.speed, *(np.array(limits.joint_speed) / np.maximum(steepest, ROUNDING)).tolist())
@@ -278,6 +280,15 @@ class LineMotion:
                 break
             q = q + np.linalg.pinv(body.tool_jacobian(q)) @ error
         return q
+
+    def _require_reached(self, body: RigidBody, target: Array, distance: float) -> None:
+        """Refuse a line that leaves the positions which the tool can reach."""
+        missed = float(np.linalg.norm(target - body.tool_pose(self._angles[-1]).position))
+        require(
+            missed < REACHED,
+            f"at {distance:.3g} m of the line of {self._length:.3g} m the tip is {missed:.3g} m off; allowed: "
+            "positions within the reach of the arm; give another goal, m in the base frame",
+        )
 
     def _slope(self, arm: Arm, body: RigidBody, along: Array, distance: float) -> Array:
         """Joint velocity per speed of the tool (n,), rad/m, at the last node."""

@@ -172,8 +172,17 @@ class Configuration(NamedTuple):
         try:
             return build(cls, self.sections[section])
         except ParameterError as error:
-            where = SHARED if section == SHARED else f"/**/{section}"
-            raise ParameterError(f"{self.path}, section '{where}': {error}") from error
+            where = f"{self.path}, section '{SHARED if section == SHARED else f'/**/{section}'}'"
+            given = "an option or a replaced value in place of that in " if self._file_is_right(section, cls) else ""
+            raise ParameterError(f"{given}{where}: {error}") from error
+
+    def _file_is_right(self, section: str, cls: type[Any]) -> bool:
+        """Whether the file itself has usable parameters, so that what was replaced is at fault."""
+        try:
+            build(cls, Configuration.load(self.path).sections[section])
+        except (ParameterError, KeyError):
+            return False
+        return True
 
 
 def option_values(texts: Iterable[str]) -> dict[str, Any]:
@@ -282,9 +291,11 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     """Flat sections of a parameter file; `whole` where it must have the shared one, as its last."""
     if isinstance(tree, dict) and SCENARIO_KEY in tree:
         raise ParameterError(
-            f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path.stem}', "
-            "or give its name to the parameter scenario:script"
+            f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path}', "
+            "or give that to the parameter scenario:script"
         )
+    if isinstance(tree, dict) and (near := [key for key in tree if difflib.get_close_matches(str(key), [BASE])]):
+        raise ParameterError(f"{path} has the key '{near[0]}'; did you mean '{BASE}'?")
     if not isinstance(tree, dict) or (whole and SHARED not in tree):
         raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
     if whole and list(tree)[-1] != SHARED:

@@ -36,15 +36,17 @@ def declared(entry: str) -> Declaration:
             f"no node is named '{entry}'; nodes: {', '.join(NODES)}; name one of your own as my_package.module:Class"
         )
     try:
-        return declaration(getattr(importlib.import_module(module), name))
-    except TypeError as error:
-        raise ParameterError(f"node '{entry}': {error}") from error
+        found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
         raise ParameterError(
             f"node '{entry}' cannot be imported: {error}; check that '{module}' is installed or on PYTHONPATH"
         ) from error
     except Exception as error:
         raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
+    try:
+        return declaration(found)
+    except TypeError as error:
+        raise ParameterError(f"node '{entry}': {error}") from error
 
 
 def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:

@@ -209,9 +209,8 @@ class Declaration(NamedTuple):
         """
         for topic in outputs:
             if topic not in self.outputs and topic not in EVERY_NODE:
-                raise ValueError(
-                    f"node '{self.name}' returned the topic '{topic}'; its reactions declare {', '.join(self.outputs)}"
-                )
+                declared = ", ".join(self.outputs) or f"nothing; write outputs=('{topic}',) in @reaction"
+                raise ValueError(f"node '{self.name}' returned the topic '{topic}'; its reactions declare {declared}")
 
     @property
     def taken(self) -> tuple[Input, ...]:
@@ -225,9 +224,9 @@ class Declaration(NamedTuple):
 
 
 def raised(error: Exception) -> str:
-    """An exception in one line, with the last line of code that it passed through."""
+    """An exception in one line, with the last line of code that it passed through, apart from the checks here."""
     text = f"{type(error).__name__}: {' '.join(str(error).split())}"
-    frames = traceback.extract_tb(error.__traceback__)
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename != __file__]
     return f"{text}, at {frames[-1].filename}:{frames[-1].lineno}" if frames else text
 
 

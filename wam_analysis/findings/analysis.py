@@ -78,7 +78,7 @@ def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVE
     Raises
     ------
     BagError
-        if the bag cannot be read.
+        if the bag cannot be read, or is empty.
     ValueError
         if it has not what is given.
     """
@@ -102,7 +102,7 @@ def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a bag is of this stack: by what its recorder left in it, or by its topics."""
+    """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
     if needs_rosbags(path):
         return False
     try:
@@ -111,6 +111,8 @@ def _is_own(path: Path) -> bool:
         if path.is_file() and path.suffix == ".mcap" and is_of_other_encoding(path):
             return False
         raise
+    if not any(topic.messages for topic in found.topics.values()):
+        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True
     spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN.items()
