@@ -87,12 +87,15 @@ def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None
         assert named <= topics | services | {f"/wam/{node}" for node in NODES} | ACTIONS, page
 
 
+NO_TOPICS = {"use_joint_sensors", "needs_joint_sensors"}  # which look like some
+
+
 def test_topics_in_backticks_exist() -> None:
     looks_like_a_topic = re.compile(r"(sim|contact)/\w+|\w+_(command|states|sensors|effort|currents|torques)")
     for page, text in HANDBOOK.items():
         if page == "parameters.md":
             continue
-        for name in set(re.findall(r"`([\w/]+)`", text)) - BY_NAME.keys() - {"use_joint_sensors", "needs_joint_sensors"}:
+        for name in set(re.findall(r"`([\w/]+)`", text)) - BY_NAME.keys() - NO_TOPICS:
             meant = difflib.get_close_matches(name, BY_NAME, cutoff=0.85)
             assert not meant, f"{page}: `{name}`, is {meant[0]} meant?"
             assert not looks_like_a_topic.fullmatch(name), f"{page}: there is no topic `{name}`"

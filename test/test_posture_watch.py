@@ -45,7 +45,7 @@ def test_a_posture_is_late_if_it_is_faster_than_the_arm_catches_up_with(every: i
 
 def streamed(speed: float, interval: float, seconds: float = 6.0, age: float = math.inf, jitter: float = 0.0) -> bool:
     """Whether a joint is late on a way that is streamed at intervals, s, each command for no longer than its age, s."""
-    random, watch, q, goal, since = np.random.default_rng(0), PostureWatch(["elbow"]), 0.0, 0.0, 0.0
+    random, watch, q, goal, since = np.random.default_rng(0), posture_watch(), 0.0, 0.0, 0.0
     due, found = interval, False
     for k in range(round(seconds / DT)):
         time = k * DT

@@ -70,6 +70,12 @@ def test_what_is_reported_at_the_same_time_has_times_of_its_own() -> None:
     ]
 
 
+def test_what_holds_for_another_reason_is_another_reaction() -> None:
+    fast, loaded, also = "the arm moved faster than 0.3 rad/s", "it measures -2.9 N: tare", "it measures -3.1 N: tare"
+    found = lasting([(0, {"not_sensed": fast}), (2, {"not_sensed": loaded}), (4, {"not_sensed": also})], 9)
+    assert found == [RecordedReaction(0, 2, "not_sensed", fast), RecordedReaction(2, 9, "not_sensed", loaded)]
+
+
 def test_a_command_is_not_met_that_is_refused_or_in_the_end_not_reached() -> None:
     step = RecordedStep("press", 0, 4 * SECOND, {})
     late = RecordedReaction(2 * SECOND, 4 * SECOND, "not_reached", "late")

@@ -176,6 +176,11 @@ class ForceLoop:
         return self._supervision.report
 
     @property
+    def is_stopping(self) -> bool:
+        """Whether the arm still comes to rest from a motion in which the force began; then its reason is another."""
+        return self._is_fast
+
+    @property
     def is_advised(self) -> bool:
         """Whether the reason of a refused force states what would help: it is looked for in several periods."""
         return self._hold.is_advised

@@ -1,6 +1,7 @@
 """Node `force_loop`: the outer loop, forces and postures in, joint velocities and torques out."""
 
 import math
+from typing import Any
 
 from wam_control.contact_table import contact_of
 from wam_control.force_hold import ForceReaction
@@ -36,9 +37,7 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: (
-            tuple[Report, tuple[ForceReaction, ...], bool, tuple[str, ...], str, bool, tuple[str, ...]] | None
-        ) = None
+        self._reported: tuple[Any, ...] | None = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -140,13 +139,13 @@ class ForceLoopNode:
         report, reactions = self._loop.report, self._loop.reactions
         refused = self.refusals
         refused.pop("contact/hypotheses", None)
-        advised, other = self._loop.is_advised, self._refusal or self._player.refusal
+        why = self._loop.is_advised, self._loop.is_stopping, self._refusal or self._player.refusal
         commanded: tuple[str, ...] = ()
         if self._loop.reason or refused:  # which is that of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             commanded = tuple(map(brief, values))
-        present = report, tuple(reactions), self._loop.is_pushed, tuple(refused), other, advised, commanded
+        present = report, tuple(reactions), self._loop.is_pushed, tuple(refused), why, commanded
         if present == self._reported:
             return {}
         self._reported = present

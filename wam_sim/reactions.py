@@ -1,5 +1,6 @@
 """What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -8,6 +9,7 @@ from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, watched_axes
 
 FAULT = "fault"
+NUMBERS = re.compile(r"[-+\d.]+")
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
 OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
@@ -171,13 +173,25 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
 
 
 def lasting(found: Iterable[tuple[int, Mapping[str, str]]], end: int) -> list[RecordedReaction]:
-    """Reactions from their reasons by name each time they change, ns; one that only changes its numbers goes on."""
+    """Reactions from their reasons by name each time they change, ns; one that only changes its numbers goes on.
+
+    What holds the arm for another reason is another one.
+    """
     over: list[RecordedReaction] = []
     present: dict[str, RecordedReaction] = {}
     for stamp, reasons in found:
-        over += [present.pop(name)._replace(end=stamp) for name in [*present] if name not in reasons]
+        over += [
+            present.pop(name)._replace(end=stamp)
+            for name, one in [*present.items()]
+            if name not in reasons or (one.holds and _words(one.reason) != _words(reasons[name]))
+        ]
         for name, reason in reasons.items():
             one = present.setdefault(name, RecordedReaction(stamp, end, name, reason))
             if reason.startswith(one.reason):
                 present[name] = one._replace(reason=reason)  # with what would help, which is found later
     return [one for one in (*over, *present.values()) if one.end > one.begin]
+
+
+def _words(reason: str) -> str:
+    """What a reason is about, without numbers and advice."""
+    return NUMBERS.sub("", reason.partition(";")[0].partition(":")[0])
