@@ -14,6 +14,7 @@
 - plant: the arm in MuJoCo, stepped with motor torques
 - compiled_steps: its steps in C, where the package is built with WAM_COMPILE
 - step_size: which step fits the plant's stiffest mode
+- start_contacts: that nothing is inside a link at power-up
 - friction: laws of dry friction and their parameters
 - dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
