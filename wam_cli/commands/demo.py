@@ -173,4 +173,5 @@ def _next(mode: str, bag: Path | None) -> list[str]:
     commands = [f"wam analyse {bag}"] if bag else []
     if mode == "realtime":
         commands.append("wam demo    # without --realtime: lockstep waits for a busy machine")
-    return commands or ["end what else runs in this ROS domain, or set another ROS_DOMAIN_ID; then wam demo"]
+    other = "if something else runs in this ROS domain, end it, or set another ROS_DOMAIN_ID"
+    return commands or [f"correct what is named above; {other}; then wam demo"]
