@@ -44,7 +44,7 @@ class RecordedReaction(NamedTuple):
         return TOO_MUCH if self.name == CONTACT_FORCE else UNREACHED
 
 
-class Played(Protocol):
+class StepSpan(Protocol):
     """A step of a scenario that was played, recorded or not."""
 
     @property
@@ -60,7 +60,7 @@ class Played(Protocol):
         """When it ended, ns."""
 
 
-Step = TypeVar("Step", bound=Played)
+Step = TypeVar("Step", bound=StepSpan)
 
 
 class PlayedStep(NamedTuple):
@@ -82,12 +82,12 @@ def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple
     return tuple(one for one in parts if one.end - one.begin > BRIEF or (one.begin < one.end == end))
 
 
-def steady_begin(step: Played) -> int:
+def steady_begin(step: StepSpan) -> int:
     """When what is taken as the steady state of a step begins, ns."""
     return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
 
 
-def unmet(reactions: Sequence[RecordedReaction], step: Played) -> list[RecordedReaction]:
+def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[RecordedReaction]:
     """Why what a step commands is not met, nothing where it is.
 
     Refused in its steady state, with more force than allowed in all of it, not reached at its end, a posture too fast.
@@ -132,7 +132,7 @@ def _is_of_link(axis: TaskAxis) -> bool:
     return axis.kind is AxisKind.FORCE and axis.joint < 0
 
 
-def is_too_short(times: Sequence[tuple[int, int]], step: Played, settling_time: float) -> bool:
+def is_too_short(times: Sequence[tuple[int, int]], step: StepSpan, settling_time: float) -> bool:
     """Whether the task of a step commands an axis for too brief a time to be assessed at its end.
 
     Parameters
