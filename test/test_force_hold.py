@@ -1139,3 +1139,19 @@ def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded(p
     assert math.hypot(*out.measured) < 4.0
     assert speeds[0] > 0.0
     assert (speeds[1] < 0.0) if pushed > 5.0 else speeds[1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "free_travel", "forces"), [(400.0, 0.05, (5, 30, 5, 30)), (4000.0, 0.01, (50, 5))]
+)
+def test_an_arm_that_unloads_itself_is_not_pushed(
+    stiffness: float, free_travel: float, forces: tuple[float, ...]
+) -> None:
+    """A command that falls moves the arm back by more than free_travel, and on again with the next one."""
+    limits = replace(GIVEN.limits, free_travel=free_travel, whole_force=20.0)
+    loop, world = force_loop(ARM, replace(PINNED, limits=limits, posture_gain=0.0)), World(stiffness, force=1.0)
+    for force in forces:
+        for _ in range(round(6.0 / DT)):
+            world.move(ask(loop, world, down(force)).velocity)
+            assert loop.reaction is not ForceReaction.NOTHING_TOUCHED
+        assert world.force == pytest.approx(force, rel=0.05)

@@ -89,7 +89,9 @@ def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
     for seconds in ("0.4", "1.0"):
         file.write_text(STEPS.replace("0.4", seconds))
         found.append(outcome(runs(file, (0.004,))[0]))
-    assert [one.unassessed for one in found] == ["20 N in link: commanded for less than 1 s", ""]
+    file.write_text(STEPS.replace("force: {frame", "chirp: {newtons: 2.0, from: 1.0, to: 3.0}, force: {frame"))
+    found.append(outcome(runs(file, (0.004,))[0]))
+    assert [one.unassessed for one in found] == ["20 N in link: commanded for less than 1 s", "", ""]
     assert not any(one.failure for one in found)
 
 

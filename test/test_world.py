@@ -9,6 +9,7 @@ import pytest
 from arms import CONFIGURATION, WAM
 
 from wam_control.scenario import ScenarioStep
+from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.movable import Doors, FreeBodies, Motions, principal_inertia
@@ -306,3 +307,9 @@ def test_a_pusher_is_away_from_its_link_at_power_up_though_it_pushes_from_the_be
     plant = Plant(WAM, build_part(World, pushing, "world."), no_effects(WAM), STEP)
     plant.step([0.0] * 4)
     assert all(np.linalg.norm(load.force) < 1.0 for load in plant.loads())
+
+
+def test_an_arm_may_start_folded() -> None:
+    configuration = Configuration.load(packaged("barrett-wam7")).with_values({"driver:world.folding.stiffness": 5e3})
+    section, arm = configuration.sections["driver"], configuration.shared.arm
+    assert Plant(arm, build_part(World, section, "world."), no_effects(arm), STEP).data.ncon

@@ -149,6 +149,8 @@ class ForceHold:
             self._has_settled
         ) = self._has_begun = False
         self.goes_back = self._is_led = False
+        self._wanted = self._unloading = 0.0  # N, commanded before; s, for which the arm may still unload itself
+        self._least = math.inf  # N, that has been measured meanwhile
         self._most = 0.0  # N, that has been measured
         self._is_slow, self._other, self._gone = False, "", ""
         self._pace.reset()
@@ -304,7 +306,7 @@ class ForceHold:
         if self.is_touching and not self.has_touched:
             self.has_touched = True
             self._forget_swings()
-        self._count(measured, desired, given_way, parameters)
+        self._count(measured, desired, given_way, parameters, dt)
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
         is_strange = self._is_sensed and unexplained > UNEXPLAINED
@@ -471,22 +473,38 @@ class ForceHold:
             )
         return None
 
-    def _count(self, measured: float, desired: float, given_way: float, parameters: ForceLoopParameters) -> None:
+    def _count(
+        self, measured: float, desired: float, given_way: float, parameters: ForceLoopParameters, dt: float
+    ) -> None:
         """End the way along the force where that is right or rises, and find the one back against it.
 
-        What presses moves the arm back if it is too large, or the arm goes back all the same.
+        What presses moves the arm back if it is too large, or the arm goes back all the same, and not because less is
+        commanded than before.
         """
         limits, tolerated = parameters.limits, tolerance(desired, parameters)
+        is_unloading = self._unloads(measured, desired, limits.settling_time, dt)
         # where it neither has the force nor takes more of it, it may be gone, or go away
-        if self.is_touching and measured >= min(desired - tolerated, self._most + SETTLE * desired):
+        if self.is_touching and (self._is_led or measured >= min(desired - tolerated, self._most + SETTLE * desired)):
             self._most = max(self._most, measured)
             if self._travel <= limits.free_travel:
                 self._travel = 0.0
         slowest = limits.surface_speed + CREEP / limits.settling_time
-        is_carried = not self._is_led and (self._pace.value or STILL)[0] < -slowest
-        self.goes_back = self.is_touching and (measured > desired + tolerated or is_carried)
+        is_pushed = measured > desired + tolerated or (self._pace.value or STILL)[0] < -slowest
+        self.goes_back = self.is_touching and is_pushed and not (self._is_led or is_unloading)
         if self.goes_back and given_way > limits.free_travel and not self._gone:
             self._gone = _gone(given_way, measured, desired, parameters)
+
+    def _unloads(self, measured: float, desired: float, lasting: float, dt: float) -> bool:
+        """Whether less is commanded than before, N, and the force still falls, or did until `lasting`, s, ago."""
+        self._unloading = max(self._unloading - dt, 0.0)
+        if desired < self._wanted:
+            self._unloading, self._least = lasting, math.inf
+        if self._unloading and measured < self._least - SETTLE * desired:
+            self._unloading, self._least = lasting, measured
+        self._wanted = desired
+        if self._unloading:
+            self._most = min(self._most, measured)
+        return self._unloading > 0.0
 
     def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the arm would be too slow on its way or on the surface, None where it is not or something is touched."""

@@ -3,7 +3,7 @@
 from typing import Any
 
 from wam_description.arm import Arm
-from wam_description.contact_pairs import contact_pairs
+from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.parameters import ParameterError
 from wam_description.world import World
 
@@ -27,7 +27,12 @@ def require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
         names what is inside, the cover and its link, and the depth.
     """
     links = dict(zip(arm.covers.names, arm.covers.links, strict=True))
-    pairs = {frozenset((one.first, one.second)): one for one in contact_pairs(arm, world) if one.first in links}
+    own = {folded(name) for name in links}  # a folded arm is no mistake
+    pairs = {
+        frozenset((one.first, one.second)): one
+        for one in contact_pairs(arm, world)
+        if one.first in links and one.second not in own
+    }
     depths: dict[str, float] = {}
     for geoms, distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
         pair = pairs.get(frozenset(model.geom(geom).name for geom in geoms))

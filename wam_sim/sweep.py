@@ -145,7 +145,7 @@ def outcome(point: SweepPoint) -> SweepResult:
     found = [failure, *unmet_in_words(reactions, postures)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
     brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
-    return measured._replace(unassessed="; ".join(brief))
+    return measured._replace(unassessed="; ".join(dict.fromkeys(brief)))
 
 
 def _measured(
@@ -166,14 +166,14 @@ def _measured(
         if refusal := _refusal(reactions, settled[0].stamp, settled[-1].stamp):
             refusals.append(f"{command} refused: {refusal}")
             continue
-        if held[-1].stamp - held[0].stamp + BRIEF < 1e9 * STEADY:
+        if BRIEF < held[-1].stamp - held[0].stamp < 1e9 * STEADY - BRIEF:  # no sample of a chirp
             brief.append(f"{command}: commanded for less than {STEADY:g} s")
         errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
     failure = "; ".join(filter(None, dict.fromkeys((*failures, *refusals))))
     largest = max(map(abs, errors), default=math.nan)
-    return SweepResult(failure, run.driver.stamp * 1e-9, rms, largest, peak, "; ".join(brief))
+    return SweepResult(failure, run.driver.stamp * 1e-9, rms, largest, peak, "; ".join(dict.fromkeys(brief)))
 
 
 def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str:
