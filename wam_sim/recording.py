@@ -10,6 +10,7 @@ from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, Wre
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_control.reaction_status import stated
+from wam_control.scenario import FORCE_LOOP
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, DONE, parse
@@ -126,9 +127,9 @@ class RecordedRun(NamedTuple):
         """What the force loop and the driver did up to an end, ns, instead of what was commanded; in order of time."""
         of = {
             name: [(stamp, status) for stamp, status in self.stamped_statuses() if status.node == name]
-            for name in ("force_loop", "driver")
+            for name in (FORCE_LOOP, "driver")
         }
-        loop = lasting(((stamp, stated(status)) for stamp, status in of["force_loop"]), end)
+        loop = lasting(((stamp, stated(status)) for stamp, status in of[FORCE_LOOP]), end)
         faults = ((stamp, {FAULT: status.fault} if status.fault else {}) for stamp, status in of["driver"])
         return tuple(sorted((*loop, *lasting(faults, end))))
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from wam_control.contact_estimator import ContactEstimate
 from wam_control.reaction_status import stated
-from wam_control.scenario import Scenario, ScenarioStep
+from wam_control.scenario import FORCE_LOOP, Scenario, ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
@@ -26,7 +26,7 @@ from wam_driver.safety import Mode
 from wam_sim.bus import Bus, Rows, of_node
 from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
 
-FORCE_LOOP, SCENARIO = "force_loop", "scenario"
+SCENARIO = "scenario"
 
 
 def _warn(node: str, status: NodeStatus) -> None:
@@ -197,7 +197,7 @@ class Simulation:
     def _require_progress(self, stamp: int) -> None:
         """Refuse to go on where the scenario does not get what it takes: the run would not end."""
         self._looked = stamp
-        if awaited := {topic for one in self._synchronisers["scenario"] for topic in one.awaited(stamp)}:
+        if awaited := {topic for one in self._synchronisers[SCENARIO] for topic in one.awaited(stamp)}:
             raise ValueError(
                 f"the scenario gets no {' and '.join(sorted(awaited))} for the state of {stamp} ns; "
                 f"{self._cause(sorted(awaited))}"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.scenario import NO_FORCE, ScenarioStep, require_playable
+from wam_control.scenario import FORCE_LOOP, NO_FORCE, ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -28,7 +28,7 @@ from wam_sim.reactions import (
     unmet_in_words,
     watched_times,
 )
-from wam_sim.simulation import FORCE_LOOP, Simulation
+from wam_sim.simulation import Simulation
 
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
