@@ -68,11 +68,6 @@ class DemoReport(NamedTuple):
     unmet: tuple[VerdictAnswer, ...]
 
 
-def not_as_it_should_be(answers: Sequence[object]) -> str:
-    """The answers that are NO, in a sentence."""
-    return f"not as it should be: {'; '.join(map(str, answers))}"
-
-
 def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
     """Evaluate a recorded demonstration, and draw it.
 
@@ -188,9 +183,9 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     outcomes: Counter[str] = Counter()
     for step in summary.steps:
         found = {one.outcome for one in unmet(summary.reactions, step)}
-        outcomes.update(
-            found - {REFUSAL} if steady_begin(step) in forces else found
-        )  # that of a force has its own answer
+        if steady_begin(step) in forces:
+            found -= {REFUSAL}  # that of a force has its own answer
+        outcomes.update(found)
     counts = [f"{outcomes[one]} {one}" for one in OUTCOMES if outcomes[one]]
     brief = len(unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_time))
     if not counts and not brief:

@@ -125,13 +125,11 @@ class RecordedRun(NamedTuple):
 
     def reactions(self, end: int) -> tuple[RecordedReaction, ...]:
         """What the force loop and the driver did up to an end, ns, instead of what was commanded; in order of time."""
-        of = {
-            name: [(stamp, status) for stamp, status in self.stamped_statuses() if status.node == name]
-            for name in (FORCE_LOOP, "driver")
-        }
-        loop = lasting(((stamp, stated(status)) for stamp, status in of[FORCE_LOOP]), end)
-        faults = ((stamp, {FAULT: status.fault} if status.fault else {}) for stamp, status in of["driver"])
-        return tuple(sorted((*loop, *lasting(faults, end))))
+        found = self.stamped_statuses()
+        loop = [(stamp, stated(status)) for stamp, status in found if status.node == FORCE_LOOP]
+        driver = [(stamp, status.fault) for stamp, status in found if status.node == "driver"]
+        faults = [(stamp, {FAULT: fault} if fault else {}) for stamp, fault in driver]
+        return tuple(sorted((*lasting(loop, end), *lasting(faults, end))))
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""

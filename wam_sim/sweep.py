@@ -139,10 +139,8 @@ def outcome(point: SweepPoint) -> SweepResult:
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
     reactions, played = run.reactions, run.played
-    postures = [
-        one for one in played if one.step.force == NO_FORCE
-    ]  # a force is measured, and a refused one named there
-    found = [failure, *unmet_in_words(reactions, postures)]
+    others = [one for one in played if one.step.force == NO_FORCE]  # a force is measured, and named there if refused
+    found = [failure, *unmet_in_words(reactions, others)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
     brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
     return measured._replace(unassessed="; ".join(dict.fromkeys(brief)))

@@ -42,6 +42,13 @@ def namespace(text: str) -> str:
     return inner
 
 
+def exit_code_of(unmet: Sequence[object]) -> int:
+    """Print the answers of a report that are NO, if there are any; the exit code."""
+    if unmet:
+        print(f"\nnot as it should be: {'; '.join(map(str, unmet))}")
+    return int(bool(unmet))
+
+
 @contextmanager
 def of_installation(package: str) -> Iterator[None]:
     """Imports of a package that only an installation of ROS has; states this where it is missing.

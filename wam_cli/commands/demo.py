@@ -11,6 +11,7 @@ from wam_bag.bag import read
 from wam_bag.errors import BagError
 from wam_cli.commands import (
     configuration_of,
+    exit_code_of,
     new_bag,
     take_configuration,
     take_page,
@@ -83,11 +84,7 @@ def run(given: argparse.Namespace) -> int:
         return 1
     print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
     print(f"         wam analyse {bag}    # measured and compared with theory")
-    if stated.unmet:
-        from wam_analysis.demo_report import not_as_it_should_be  # it is there already
-
-        print(f"\n{not_as_it_should_be(stated.unmet)}")
-    return 1 if stated.unmet else 0
+    return exit_code_of(stated.unmet)
 
 
 def report_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:

@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from wam_analysis.demo_report import not_as_it_should_be, report
-from wam_cli.commands import take_arm, writable_picture
+from wam_analysis.demo_report import report
+from wam_cli.commands import exit_code_of, take_arm, writable_picture
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,6 +20,4 @@ def run(given: argparse.Namespace) -> int:
         writable_picture("--picture", given.picture)
     made = report(given.bag, given.picture, given.namespace or "")
     print(made.text)
-    if made.unmet:
-        print(f"\n{not_as_it_should_be(made.unmet)}")
-    return 1 if made.unmet else 0
+    return exit_code_of(made.unmet)
