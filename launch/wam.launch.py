@@ -44,7 +44,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     ),
     "processes": (
         "false",
-        "a process for each node; grouped: one each for inner loop, outer loop, recorder; false: one, but in realtime",
+        "one for each node; grouped: for inner loop, outer loop, recorder; false: one, but grouped in realtime",
         [*SWITCH, GROUPED],
     ),
     "scenario": ("", "scenario that is played: name of an installed one, or path of a YAML file; empty: none", None),
@@ -91,7 +91,7 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = ["up", "--config", str(parameters), "--namespace", namespace, "--log-level", given["log_level"]]
         return [program(command, ends), *viewers]
-    processes = GROUPED if given["processes"] == GROUPED else EACH
+    processes = EACH if given["processes"] == "true" else GROUPED
     nodes = [
         Node(
             package="wam_stack",

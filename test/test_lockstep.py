@@ -153,11 +153,11 @@ def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: 
 
 def test_what_works_every_inner_period_shares_a_process_and_so_does_the_rest_without_the_recorder() -> None:
     nodes = [*Configuration.load(packaged("wam")).shared.nodes, "scenario", "recorder"]
-    inner = ["driver", "transform", "velocity_loop", "gravity"]
-    assert process_groups(nodes, GROUPED) == [inner, ["force_loop", "contact_estimator", "scenario"], ["recorder"]]
+    outer = ["transform", "gravity", "force_loop", "contact_estimator", "scenario"]
+    assert process_groups(nodes, GROUPED) == [["driver", "velocity_loop"], outer, ["recorder"]]
     assert process_groups(nodes, ONE) == [nodes]
     assert process_groups(nodes, EACH) == [[node] for node in nodes]
-    own = "wam_control.gravity_node:GravityNode"
+    own = "wam_control.velocity_loop_node:VelocityLoopNode"
     assert process_groups(["driver", own], GROUPED) == [["driver", own]], "what counts is the name of the node"
 
 

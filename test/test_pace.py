@@ -220,6 +220,27 @@ def test_diagnostics_hold_nothing_of_the_wall_clock_where_there_is_no_pace() -> 
     assert set(Bench("lockstep").lockstep().facts()) == {"real-time factor", "behind [ms]", "slips"}
 
 
+def test_of_a_computer_that_is_too_slow_for_realtime_the_late_periods_are_named_until_they_are_rare() -> None:
+    bench = Bench("realtime")
+    realtime = bench.realtime()
+
+    def play(ticks: int, every: int) -> None:
+        for i in range(ticks):
+            bench.clock.time += 0.002 if i % every == 0 else 0.001
+            realtime.tick()
+
+    assert realtime.lateness == ""
+    play(2000, every=20)  # 100 of 2100
+    assert realtime.lateness == ""
+    play(1500, every=2)
+    assert realtime.lateness == (
+        "33 % of the newest periods were late: this computer is too busy or too slow for realtime; end other programs, "
+        "or use lockstep"
+    )
+    play(2000, every=20)
+    assert realtime.lateness == ""
+
+
 @pytest.mark.parametrize("is_enabled", [True, False], ids=["enabled", "braked"])
 def test_a_driver_that_was_frozen_in_realtime_brakes_and_does_not_catch_up(is_enabled: bool) -> None:
     bench = Bench("realtime")

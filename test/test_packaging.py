@@ -278,11 +278,13 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     assert all(node.ros_arguments == ["--log-level", "info"] for node in nodes)
     assert all(yaml.safe_load(Path(*node.parameters).read_text()) == config for node in nodes)
     assert len(start({**CHOSEN, "record": "false"})) == len(nodes) - 1
-    assert len(start({**CHOSEN, "mode": "realtime", "processes": "false"})) == len(nodes)
-    inner, outer, recorder = start({**CHOSEN, "processes": "grouped"})
-    assert (inner.executable, inner.arguments) == ("node", ["driver", "transform", "velocity_loop", "gravity"])
-    assert (outer.executable, outer.arguments) == ("node", ["force_loop", "contact_estimator"])
-    assert (recorder.executable, recorder.arguments) == ("recorder", [])
+    assert len(start({**CHOSEN, "mode": "realtime"})) == len(nodes)
+    for grouped in ({"processes": "grouped"}, {"mode": "realtime", "processes": "false"}):
+        inner, outer, recorder = start({**CHOSEN, **grouped})
+        assert (inner.executable, inner.arguments) == ("node", ["driver", "velocity_loop"])
+        others = ["transform", "gravity", "force_loop", "contact_estimator"]
+        assert (outer.executable, outer.arguments) == ("node", others)
+        assert (recorder.executable, recorder.arguments) == ("recorder", [])
 
 
 def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):

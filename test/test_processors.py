@@ -10,7 +10,7 @@ import pytest
 from conftest import LONG
 
 from wam_description.configuration import Configuration, packaged
-from wam_description.nodes import EACH
+from wam_description.nodes import EACH, GROUPED
 from wam_ros import processors
 from wam_ros.bring_up import Processes
 from wam_ros.priority import fifo_is_granted
@@ -92,17 +92,39 @@ def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> Non
 REALTIME = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES})
 
 
-def places(monkeypatch: pytest.MonkeyPatch, permitted: set[int], granted: bool) -> dict[str, str]:
-    """Processors of each process in realtime, where the system permits these, and grants SCHED_FIFO or not."""
+def places(
+    monkeypatch: pytest.MonkeyPatch,
+    permitted: set[int],
+    granted: bool = True,
+    how: str = EACH,
+    configured: Configuration = REALTIME,
+) -> dict[str, str]:
+    """Processors of each process, where the system permits these, and grants SCHED_FIFO or not."""
     monkeypatch.setattr(processors.os, "sched_getaffinity", lambda _: permitted)
     monkeypatch.setattr(processors, "fifo_is_granted", lambda fifo: granted and fifo > 0)
-    return {" ".join(group): place.get(PROCESSORS, "") for group, place in placed_groups(REALTIME.shared, EACH)}
+    return {" ".join(group): place.get(PROCESSORS, "") for group, place in placed_groups(configured.shared, how)}
 
 
-def test_in_realtime_the_driver_has_a_processor_and_all_others_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
-    driver, *others = places(monkeypatch, {0, 1, 2}, granted=True).values()
+@pytest.mark.parametrize(("how", "count"), [(EACH, 2), (GROUPED, 1)])
+def test_in_realtime_the_driver_s_process_has_a_processor_and_all_others_the_rest(
+    how: str, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver, *others = places(monkeypatch, {0, 1, 2}, how=how).values()
     assert driver in {"0", "1", "2"}
-    assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * 2
+    assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * count
+
+
+def test_in_lockstep_what_exchanges_most_messages_shares_the_driver_s_processor(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    entries = ["driver", "transform", "velocity_loop", "gravity", "force_loop", "recorder"]
+    configured = REALTIME.with_values({"timing.mode": "lockstep", "nodes": entries})
+    of = places(monkeypatch, {0, 1}, how=EACH, configured=configured)
+    assert len({of[name] for name in ("driver", "transform", "velocity_loop", "gravity")}) == 1
+    assert len({of["force_loop"], of["recorder"], of["driver"]}) == 2
+    inner, *others = places(monkeypatch, {0, 1}, how=GROUPED, configured=configured).values()
+    assert others == [others[0]] * 2
+    assert {inner, others[0]} == {"0 batch", "1 batch"}
 
 
 @pytest.mark.parametrize(("permitted", "granted"), [({0, 1, 2, 3}, False), ({0, 1}, True)])
@@ -117,14 +139,11 @@ def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_i
     is_apart = len(permitted) >= FEWEST and fifo_is_granted(REALTIME.shared.timing.fifo_priority)
     with Processes(REALTIME) as processes:
         end = time.monotonic() + LONG
-        estimator, expected = processes._processes["contact_estimator"].pid, OWN
-        if niceness_is_granted():
-            expected = REALTIME.shared.timing.niceness
-        while (
-            any(is_apart == (permitted in {where for _, where in of}) for of in placed(processes).values())
-            or os.getpriority(os.PRIO_PROCESS, estimator) != expected
-        ):
-            assert time.monotonic() < end, "some threads are elsewhere, or have another niceness"
+        expected = expected_priorities()
+        while any(
+            is_apart == (permitted in {where for _, where in of}) for of in placed(processes).values()
+        ) or expected != {name: priority(processes._processes[name].pid) for name in ENTRIES}:
+            assert time.monotonic() < end, "some threads are elsewhere, or have another priority"
             time.sleep(0.02)
         found = placed(processes)
         assert is_apart == (PROCESSORS.encode() in environment_of(processes, "driver"))
@@ -137,9 +156,20 @@ def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_i
     assert os.sched_getscheduler(0) not in {os.SCHED_FIFO, os.SCHED_BATCH}, "to look does not change it"
 
 
-def niceness_is_granted() -> bool:
-    program = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {REALTIME.shared.timing.niceness})"
-    return subprocess.run([sys.executable, "-c", program], stderr=subprocess.DEVNULL, check=False).returncode == 0
+def priority(process: int) -> tuple[int, int]:
+    """Priority of SCHED_FIFO, 0 without it, and niceness of a process."""
+    return os.sched_getparam(process).sched_priority, os.getpriority(os.PRIO_PROCESS, process)
+
+
+def expected_priorities() -> dict[str, tuple[int, int]]:
+    """By node: SCHED_FIFO where it is granted, of the outer nodes one less; else niceness, where that is."""
+    timing = REALTIME.shared.timing
+    if fifo_is_granted(timing.fifo_priority):
+        outer = (timing.fifo_priority - 1, OWN)
+        return {"driver": (timing.fifo_priority, OWN), "velocity_loop": (timing.fifo_priority, OWN), ENTRIES[2]: outer}
+    program = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {timing.niceness})"
+    is_granted = not subprocess.run([sys.executable, "-c", program], stderr=subprocess.DEVNULL, check=False).returncode
+    return dict.fromkeys(ENTRIES, (0, timing.niceness if is_granted else OWN))
 
 
 def environment_of(processes: Processes, name: str) -> bytes:

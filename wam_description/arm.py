@@ -246,8 +246,8 @@ class Timing:
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "niceness of the nodes and of their sessions in realtime, if the system grants it; of driver and velocity_loop "
-        "where it does not grant timing.fifo_priority; 0: as other programs",
+        "niceness of the nodes but the recorder, and of their sessions, in realtime, where the system grants this and "
+        "not timing.fifo_priority; 0: as other programs",
         low=-20,
         high=0,
     )
@@ -265,8 +265,8 @@ class Timing:
         high=1000,
     )
     fifo_priority: int = parameter(
-        "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; 0: not requested; "
-        "interrupts have 50",
+        "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; that of the other nodes "
+        "but the recorder is one less; 0: not requested; interrupts have 50",
         low=0,
         high=49,
         before=0,

@@ -13,13 +13,11 @@ NODES: Final = {
     "recorder": "wam_ros.recorder_interface:RecorderInterface",
 }
 ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each group, for each node
-# What works in every inner period is together: its messages do not leave the process.  The outer loop has a period for
-# its answer, and the recorder has time.  All others, also nodes of your own, are of the outer group.
+# What works in every inner period is together: its messages do not leave the process.  All others, also nodes of your
+# own, are of the outer group, which has a period for its answer; the recorder has time.
 INNER, OUTER = "inner", "outer"
 GROUPS: Final = {
     "driver": INNER,
-    "transform": INNER,
     "velocity_loop": INNER,
-    "gravity": INNER,
     "recorder": "recorder",
 }

@@ -69,6 +69,8 @@ class DriverNode(TolerantNode):
             )
         else:
             self.time = Realtime(self.driver, shared.timing, own.watchdog, self._publish, time.perf_counter)
+            advice = self.driver.stale_advice
+            self.driver.stale_advice = lambda: self._lateness or advice()
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
@@ -133,7 +135,12 @@ class DriverNode(TolerantNode):
         """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
         if status.level is Level.ERROR and status.fault:
-            self._fault(f"{status.node}: {status.fault}")
+            self._fault("; ".join(filter(None, (f"{status.node}: {status.fault}", self._lateness))))
+
+    @property
+    def _lateness(self) -> str:
+        """That the computer is not fast enough for realtime; '' where it is, and in lockstep."""
+        return self.time.lateness if isinstance(self.time, Realtime) else ""
 
     def _take_problem(self, reason: str) -> None:
         if reason and self.driver.safety.mode is Mode.ENABLED:

@@ -9,6 +9,9 @@ from wam_description.signals import Answer
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
 
+TOO_LATE = 0.05  # part of the periods; more of them late, and the reason of a fault names the computer, too
+WINDOW = 2000  # newest periods, of which late ones are counted
+
 
 class Realtime:
     """Advances the driver by the periods that are due, at most by the time that the watchdog allows.
@@ -34,6 +37,8 @@ class Realtime:
         self._latencies: list[float] = []
         self._published: deque[tuple[int, float]] = deque(maxlen=100)
         self._done = self._missed = 0
+        self._recent: deque[int] = deque()  # periods that were due at each tick in the window; all but one were late
+        self._recent_done = 0
         self.is_paused = False
         self.command_came = -math.inf
 
@@ -67,6 +72,7 @@ class Realtime:
         if self.is_paused:
             return
         self._missed += due - 1
+        self._note(due)
         age = now - self._progress
         most = max(1, round(self._watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
@@ -78,6 +84,24 @@ class Realtime:
             self._driver.advance(age)
             if left == 0 or self._driver.is_outer:
                 self._send()
+
+    def _note(self, due: int) -> None:
+        """Keep how many periods were due at the ticks in the window."""
+        self._recent.append(due)
+        self._recent_done += due
+        while self._recent_done > WINDOW and len(self._recent) > 1:
+            self._recent_done -= self._recent.popleft()
+
+    @property
+    def lateness(self) -> str:
+        """How many of the newest periods were late and what to do about it, '' where few were."""
+        count, late = self._recent_done, self._recent_done - len(self._recent)
+        if late <= TOO_LATE * count:
+            return ""
+        return (
+            f"{100.0 * late / count:.0f} % of the newest periods were late: this computer is too busy or too slow for "
+            "realtime; end other programs, or use lockstep"
+        )
 
     def _send(self) -> None:
         self._published.append((self._driver.stamp, self._now()))

@@ -295,11 +295,11 @@ class Ports:
 
         Parameters
         ----------
-        is_first : whether it works in each inner period, and is to be ahead of all usual programs.
+        is_first : whether it works in each inner period, and is to be ahead of the other nodes.
         """
         timing = self.shared.timing
         if timing.mode == "realtime":
-            granted = set_priority(timing.fifo_priority if is_first else 0, timing.niceness)
+            granted = set_priority(max(timing.fifo_priority - (not is_first), 0), timing.niceness)
             self.facts[PRIORITY] = granted
             if is_first:
                 self.node.get_logger().info(f"{PRIORITY}: {granted}")

@@ -6,10 +6,8 @@ message to the next reader.  In lockstep, where the nodes wait for each other an
 Here the inner loop has a processor, all others have the rest, and who reads waits until who writes has finished
 (SCHED_BATCH, which needs no right).  benchmarks/speed.py shows the gain; the bits are the same.
 
-In realtime the driver is ahead of all usual programs (SCHED_FIFO) and works for most of a period.  A node that it
-interrupts stays on that processor, and the kernel, which seldom looks for another one where all are busy in short
-pieces, left it there for up to 50 ms: the arm braked.  Here the driver has a processor to itself, and all others the
-rest.  benchmarks/real_time.py shows it.
+In realtime the driver works for most of a period.  Where three processors are permitted, its process has one to itself,
+and all others the rest.  benchmarks/real_time.py shows it.
 """
 
 import os
@@ -23,12 +21,14 @@ from typing import Final
 
 from wam_description.arm import Shared
 from wam_description.interface import declared, process_groups
-from wam_description.nodes import GROUPS, INNER
 from wam_ros.priority import fifo_is_granted, for_all_threads
 
 PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number, and a policy
 WAITING: Final = "batch"  # policy SCHED_BATCH
-FEWEST: Final = 3  # processors, of which the driver may have one to itself
+FEWEST: Final = 3  # processors, of which the driver may have one to itself in realtime
+FIRST: Final = "driver"
+# share the driver's processor in lockstep where each node has a process: most of the messages are theirs
+CLOSEST: Final = {"transform", "velocity_loop", "gravity"}
 TIMES: Final = Path("/proc/stat")
 LOOK: Final = 0.05  # s, in which the idlest processor is found
 IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting for a disk
@@ -49,13 +49,14 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
     groups = process_groups(shared.nodes, processes)
     permitted = os.sched_getaffinity(0)
     if shared.timing.mode == "lockstep":
-        apart, policy = {name for name, group in GROUPS.items() if group == INNER}, [WAITING]
+        closest, policy = CLOSEST, [WAITING]
     elif len(permitted) >= FEWEST and fifo_is_granted(shared.timing.fifo_priority):
-        apart, policy = {"driver"}, []
+        closest, policy = set(), []
     else:
         return [(group, {}) for group in groups]
     idlest, rest = (" ".join([*map(str, part), *policy]) for part in divided(idle_parts(permitted)))
-    is_apart = (any(declared(entry).name in apart for entry in group) for group in groups)
+    names = ({declared(entry).name for entry in group} for group in groups)
+    is_apart = (FIRST in group or group <= closest for group in names)
     return [(group, {PROCESSORS: idlest if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
 
 

@@ -140,13 +140,12 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         const=EACH,
         choices=(EACH, GROUPED),
         help="a process for each node, or grouped: for the inner loop, the outer loop and the recorder; default: all "
-        "in one process",
+        "in one process; grouped in realtime",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="do not wait for commands, as a real driver; a process for each node, or as --processes sets; default: "
-        "timing.mode, lockstep",
+        help="do not wait for commands, as a real driver; default: timing.mode, lockstep",
     )
     parser.add_argument(
         "--real-time-factor",
@@ -176,7 +175,7 @@ def timed(configuration: Configuration, given: argparse.Namespace) -> Configurat
 
 def processes_of(configuration: Configuration, given: argparse.Namespace) -> str:
     """How the nodes are distributed to processes: ONE, GROUPED or EACH, of `wam_description.nodes`."""
-    return given.processes or (EACH if configuration.shared.timing.mode == "realtime" else ONE)
+    return given.processes or (GROUPED if configuration.shared.timing.mode == "realtime" else ONE)
 
 
 def take_port(parser: argparse.ArgumentParser) -> None:
