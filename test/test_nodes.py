@@ -21,7 +21,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State, Wrench
+from wam_description.signals import Level, NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
@@ -316,6 +316,23 @@ def test_without_commands_the_current_is_zero_within_50_ms(live: Hand) -> None:
     assert live.driver.currents == [0.0] * 4
     assert "command stale" in live.driver.safety.fault
     assert "check that velocity_loop runs" in live.driver.safety.fault
+
+
+@pytest.mark.parametrize("is_reported", [False, True], ids=["stale", "of another node"])
+def test_where_many_periods_are_late_a_fault_names_the_computer(is_reported: bool, live: Hand) -> None:
+    live.enable()
+    for _ in range(100):
+        live._clock.advance()
+        live.wait_periods(2)
+    live.is_answering = False
+    if is_reported:
+        stopped = NodeStatus(Level.ERROR, "force_loop has stopped", "velocity_loop", fault="force_loop has stopped")
+        live._status.publish(diagnostic_status(stopped, "wam"))
+    live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="a fault")
+    begin = "velocity_loop: force_loop has stopped; " if is_reported else "command stale: "
+    assert live.driver.safety.fault.startswith(begin)
+    assert "% of the newest periods were late: this computer is too busy or too slow" in live.driver.safety.fault
+    assert "check that velocity_loop runs" not in live.driver.safety.fault
 
 
 def test_a_command_that_answers_an_old_state_again_and_again_is_stale_too(live: Hand) -> None:
