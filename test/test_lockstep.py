@@ -157,8 +157,19 @@ def test_what_works_every_inner_period_shares_a_process_and_so_does_the_rest_wit
     assert process_groups(nodes, GROUPED) == [["driver", "velocity_loop"], outer, ["recorder"]]
     assert process_groups(nodes, ONE) == [nodes]
     assert process_groups(nodes, EACH) == [[node] for node in nodes]
-    own = "wam_control.velocity_loop_node:VelocityLoopNode"
-    assert process_groups(["driver", own], GROUPED) == [["driver", own]], "what counts is the name of the node"
+    own = "wam_control.position_loop:PositionLoopNode"
+    assert process_groups(["driver", own], GROUPED) == [["driver", own]], "what counts is that it is an inner loop"
+
+
+def test_a_node_of_another_name_has_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own_nodes.py").write_text(
+        "from wam_control.gravity_node import GravityNode\n"
+        "class Slow(GravityNode):\n    name = 'slow'\n"
+        "class Another(GravityNode):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    slow, another = "own_nodes:Slow", "own_nodes:Another"
+    assert process_groups(["force_loop", slow, another], GROUPED) == [["force_loop", another], [slow]]
 
 
 @pytest.mark.slow

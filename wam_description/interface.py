@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
 from wam_description.defects import Check, output_check
-from wam_description.nodes import EACH, GROUPED, GROUPS, NODES, ONE, OUTER
+from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
@@ -59,8 +59,10 @@ def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:
     """
     groups: dict[str, list[str]] = {}
     for entry in entries:
-        name = declared(entry).name
-        groups.setdefault({ONE: "", GROUPED: GROUPS.get(name, OUTER), EACH: name}[processes], []).append(entry)
+        found = declared(entry)
+        name = found.name
+        group = INNER if getattr(found.node, "high_priority", False) else GROUPS.get(name, name)
+        groups.setdefault({ONE: "", GROUPED: group, EACH: name}[processes], []).append(entry)
     return list(groups.values())
 
 

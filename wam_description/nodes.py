@@ -13,11 +13,8 @@ NODES: Final = {
     "recorder": "wam_ros.recorder_interface:RecorderInterface",
 }
 ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each group, for each node
-# What works in every inner period is together: its messages do not leave the process.  All others, also nodes of your
-# own, are of the outer group, which has a period for its answer; the recorder has time.
+# What works in every inner period, driver and inner loop, is together: its messages do not leave the process.  The
+# others of the table are of the outer group, which has a period for its answer; the recorder has time.  A node of
+# another name, as of your own, has a process of its own: a long step would hold up the force loop.
 INNER, OUTER = "inner", "outer"
-GROUPS: Final = {
-    "driver": INNER,
-    "velocity_loop": INNER,
-    "recorder": "recorder",
-}
+GROUPS: Final = {**dict.fromkeys(NODES, OUTER), "driver": INNER, "recorder": "recorder"}
