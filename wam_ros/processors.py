@@ -26,7 +26,6 @@ from wam_ros.priority import fifo_is_granted, for_all_threads
 PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number, and a policy
 WAITING: Final = "batch"  # policy SCHED_BATCH
 FEWEST: Final = 3  # processors, of which the driver may have one to itself in realtime
-FIRST: Final = "driver"
 # share the driver's processor in lockstep where each node has a process: most of the messages are theirs
 CLOSEST: Final = {"transform", "velocity_loop", "gravity"}
 TIMES: Final = Path("/proc/stat")
@@ -56,7 +55,7 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
         return [(group, {}) for group in groups]
     idlest, rest = (" ".join([*map(str, part), *policy]) for part in divided(idle_parts(permitted)))
     names = ({declared(entry).name for entry in group} for group in groups)
-    is_apart = (FIRST in group or group <= closest for group in names)
+    is_apart = ("driver" in group or group <= closest for group in names)
     return [(group, {PROCESSORS: idlest if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
 
 
