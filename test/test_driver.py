@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -552,8 +553,8 @@ def test_wrong_number_of_values_is_refused_with_a_name(prefix: str, field: Field
         group, _, name = field.name.rpartition(".")
         said = group.rpartition(".")[2] + "." + ("" if runs_over else name + "'")
         assert said in str(refusal.value)
-        assert "values; " in str(refusal.value)
-        assert " need " in str(refusal.value)
+        assert re.search(" values?; ", str(refusal.value))
+        assert re.search(" needs? ", str(refusal.value))
 
 
 @pytest.mark.parametrize(
@@ -612,7 +613,7 @@ def test_a_spring_beyond_the_end_of_its_link_is_refused() -> None:
 
 def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:
     hardware = driver()
-    with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 values; 4 names need 4"):
+    with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 value; 4 names need 4"):
         hardware.set_added_friction([0.1])
 
 

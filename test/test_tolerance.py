@@ -163,7 +163,7 @@ def test_a_callback_that_raises_is_a_bounded_fault_until_all_goes_well_again(ros
         ros.wait(lambda k=k: node.calls == k)
     (said,) = node.faults
     assert "unexpected ValueError: \\x1b[31mtoo clumsy xxx" in said
-    assert "at a message on status" in said
+    assert "after a message on status" in said
     assert len(said) < 600
     node.is_wrong = False
     ros.wait(lambda: len(node.faults) == 2)

@@ -39,6 +39,12 @@ class DriverParameters:
     sensors: SensorParameters
     seed: int = parameter("seed of the random numbers of all noise", low=0, high=2**53)
     watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
+    late_periods: float = parameter(
+        "part of the newest 2000 periods that may be late when the brakes are released, in realtime",
+        low=0.0,
+        high=1.0,
+        before=1.0,
+    )
     brake_torque: float = parameter(
         "torque at which the brake of a rotor slips, so that it stops a moving arm without breaking a cable",
         "N m",
@@ -223,6 +229,8 @@ class Driver:
         ]
         if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
             self._trip(f"{excess}; {self._advice}")
+        elif sunk := self.plant.sunk():
+            self._trip(sunk)
 
     @property
     def _advice(self) -> str:

@@ -68,9 +68,11 @@ class DriverNode(TolerantNode):
                 time.perf_counter,
             )
         else:
-            self.time = Realtime(self.driver, shared.timing, own.watchdog, self._publish, time.perf_counter)
+            self.time = Realtime(
+                self.driver, shared.timing, own.watchdog, own.late_periods, self._publish, time.perf_counter
+            )
             advice = self.driver.stale_advice
-            self.driver.stale_advice = lambda: self._lateness or advice()
+            self.driver.stale_advice = lambda: self.time.lateness or advice()
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
@@ -90,6 +92,7 @@ class DriverNode(TolerantNode):
                 self.create_timer(shared.timing.period / factor, self.time.go_on, clock=steady)
         else:
             self._started = True
+            ports.waits = lambda: bool(ports.absent) or self.time.settles()
             self._announce()  # in lockstep the first status goes to all peers
             self.create_timer(shared.timing.period, self.time.tick, clock=steady)
             self.create_timer(STATUS_PERIOD, ports.repeat_status, clock=steady)
@@ -135,12 +138,7 @@ class DriverNode(TolerantNode):
         """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
         if status.level is Level.ERROR and status.fault:
-            self._fault("; ".join(filter(None, (f"{status.node}: {status.fault}", self._lateness))))
-
-    @property
-    def _lateness(self) -> str:
-        """That the computer is not fast enough for realtime; '' where it is, and in lockstep."""
-        return self.time.lateness if isinstance(self.time, Realtime) else ""
+            self._fault("; ".join(filter(None, (f"{status.node}: {status.fault}", self.time.lateness))))
 
     def _take_problem(self, reason: str) -> None:
         if reason and self.driver.safety.mode is Mode.ENABLED:

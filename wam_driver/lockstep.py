@@ -153,6 +153,12 @@ class Lockstep:
         """Whether the start is awaited for longer than the time-out."""
         return not self._started and self._waited >= self._timing.timeout
 
+    lateness = ""  # nothing is late in lockstep
+
+    def settles(self) -> bool:
+        """Whether the start is to wait for the computer: in lockstep the arm itself does."""
+        return False
+
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         if self._started and self._patience < self._timing.timeout:

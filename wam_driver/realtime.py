@@ -9,8 +9,9 @@ from wam_description.signals import Answer
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
 
-TOO_LATE = 0.05  # part of the periods; more of them late, and the reason of a fault names the computer, too
-WINDOW = 2000  # newest periods, of which late ones are counted
+WINDOW = 2000  # newest periods, of which late ones are counted; stated at the parameter `late_periods`
+SETTLING = 1.0  # s since all nodes are connected, for which the arm waits: their start does not count
+LONGEST_SETTLING = 10.0  # s, for which it waits until few periods are late
 
 
 class Realtime:
@@ -21,6 +22,8 @@ class Realtime:
     driver : to be advanced.
     timing : periods.
     watchdog : age of the last command that is a fault, s.
+    late_periods : part of the newest periods that may be late; with more the brakes stay on, and the reason of a fault
+        names the computer, too.
     publish : called after a period, to publish the new state.
     now : steady clock, s.
 
@@ -30,15 +33,22 @@ class Realtime:
     """
 
     def __init__(
-        self, driver: Driver, timing: Timing, watchdog: float, publish: Callable[[], None], now: Callable[[], float]
+        self,
+        driver: Driver,
+        timing: Timing,
+        watchdog: float,
+        late_periods: float,
+        publish: Callable[[], None],
+        now: Callable[[], float],
     ) -> None:
-        self._driver, self._timing, self._watchdog = driver, timing, watchdog
+        self._driver, self._timing, self._watchdog, self._late_periods = driver, timing, watchdog, late_periods
         self._publish, self._now = publish, now
         self._latencies: list[float] = []
         self._published: deque[tuple[int, float]] = deque(maxlen=100)
         self._done = self._missed = 0
         self._recent: deque[int] = deque()  # periods that were due at each tick in the window; all but one were late
         self._recent_done = 0
+        self._connected = math.inf  # since when all nodes are, on that clock
         self.is_paused = False
         self.command_came = -math.inf
 
@@ -92,15 +102,28 @@ class Realtime:
         while self._recent_done > WINDOW and len(self._recent) > 1:
             self._recent_done -= self._recent.popleft()
 
+    def settles(self) -> bool:
+        """Whether the arm waits for few late periods; called again and again once all nodes are connected."""
+        now = self._now()
+        if self._connected == math.inf:
+            self._connected = now
+            self._recent.clear()
+            self._recent_done = 0
+        waited = now - self._connected
+        if self._late_periods == 1.0 or waited >= LONGEST_SETTLING:
+            return False
+        return waited < SETTLING or bool(self.lateness)
+
     @property
     def lateness(self) -> str:
         """How many of the newest periods were late and what to do about it, '' where few were."""
         count, late = self._recent_done, self._recent_done - len(self._recent)
-        if late <= TOO_LATE * count:
+        if late <= self._late_periods * count:
             return ""
+        part, allowed = 100.0 * late / count, 100.0 * self._late_periods
         return (
-            f"{100.0 * late / count:.0f} % of the newest periods were late: this computer is too busy or too slow for "
-            "realtime; end other programs, or use lockstep"
+            f"{part:.0f} % of the newest periods were late, allowed {allowed:.3g} %: "
+            "this computer is too busy or too slow for realtime; end other programs, or use lockstep"
         )
 
     def _send(self) -> None:
@@ -113,7 +136,7 @@ class Realtime:
         self._progress = now
         if now - self.command_came > self._watchdog:
             return "no motor_current_command comes in; start velocity_loop and its peers, then enable"
-        return ""
+        return self.lateness if now - self._connected >= SETTLING else ""
 
     def pause(self, on: bool) -> None:
         """Stop the time, or let it go on."""

@@ -17,7 +17,7 @@ from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.parameters import listed
 from wam_description.signals import Level, NodeStatus
-from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance
+from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
 from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
@@ -73,6 +73,8 @@ class Ports:
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
     session : of the driver that this node follows, 0 before it is known.
     claims : who publishes what this node works on.
+    takes_problem : called with a new problem, where the node itself has to brake.
+    waits : whether the node waits for something else before it is ready.
     """
 
     def __init__(self, node: TolerantNode, declaration: Declaration, shared: Shared, interface: Interface) -> None:
@@ -88,12 +90,15 @@ class Ports:
         self._changed_after, self._change_number = -1, 0
         self._changed: dict[str, str] = {}
         self._status = self._plain = WAITING
-        self.takes_problem: Callable[[str], None] | None = None  # where the node itself has to brake
+        self.takes_problem: Callable[[str], None] | None = None
+        self.waits: Callable[[], bool] = lambda: False
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
         self._refused: Counter[str] = Counter()  # by kind
         self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
+        self._unusable: dict[str, str] = {}  # why messages are refused, by topic, as the status has it
+        self._unusable_since: dict[str, str] = {}  # the same, since the last report
         is_lockstep = shared.timing.mode == "lockstep"
         self._bus = BUSES.get(node.context) if is_lockstep else None  # in realtime a late node needs the newest only
         self._subscriptions: dict[str, Subscription] = {}
@@ -178,6 +183,8 @@ class Ports:
                 take(message)
             except Refused as reason:
                 self.refuse(topic, str(reason), reason.kind)
+                if not (reason.kind or self.problems.get(topic)):
+                    self._show_unusable(topic, str(reason))
 
         row = self.interface.topics[topic]
         profile = qos(row)
@@ -209,6 +216,19 @@ class Ports:
             more = f" ({others} more were refused before)" if others else ""
             self._logged[kind] = now, self._refused[kind]
             self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
+
+    def _show_unusable(self, topic: str, reason: str) -> None:
+        """State in the status that messages of a topic are refused, up to a report before which none was."""
+        self._unusable_since[topic] = reason
+        if topic not in self._unusable:
+            self._unusable[topic] = reason
+            self.publish_status(self._plain)
+
+    def _look_for_usable(self) -> None:
+        """Once a second: leave out of the status what has not been refused since the last time."""
+        if self._unusable:
+            self._unusable, self._unusable_since = self._unusable_since, {}
+            self.publish_status(self._plain)
 
     def repeat_status(self) -> None:
         """Publish the present status once more, as a message may be lost on a loaded machine."""
@@ -267,6 +287,7 @@ class Ports:
     def publish_status(self, status: NodeStatus) -> None:
         """Publish the status of the node as it is, where it has changed."""
         self._plain = status
+        status = with_refused(status, self._unusable)
         problem = self.problem if self.takes_problem is None else ""
         if problem:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
@@ -358,6 +379,8 @@ class Ports:
         for name, publisher in self._publishers.items():
             if publisher.get_subscription_count() < len(interface.subscribers(name)):
                 return
+        if self.waits():
+            return
         self._readiness.cancel()
         self.set_status(self._wanted or READY)
 
@@ -372,6 +395,7 @@ class Ports:
         self._next_report = stamp - stamp % SECOND + SECOND
         self._last_report = stamp
         self._report()
+        self._look_for_usable()
 
     def _report(self, **more: str) -> None:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""

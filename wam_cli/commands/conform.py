@@ -81,11 +81,12 @@ def run(given: argparse.Namespace) -> int:
 
 
 def driver_alone(configuration: Configuration) -> Configuration:
-    """A configuration with its driver and a velocity loop only, in realtime."""
+    """A configuration with its driver and a velocity loop only, in realtime on any computer: the driver is tested."""
     drivers = [entry for entry in configuration.shared.nodes if declared(entry).name == "driver"]
     if not drivers:
         raise ValueError("no entry of the parameter 'nodes' is a driver; list one, as 'driver' or 'my_module:MyDriver'")
-    return configuration.with_values({"nodes": [drivers[0], "velocity_loop"], "timing.mode": "realtime"})
+    bold = {"driver:late_periods": 1.0} if "late_periods" in configuration.sections.get("driver", {}) else {}
+    return configuration.with_values({"nodes": [drivers[0], "velocity_loop"], "timing.mode": "realtime", **bold})
 
 
 @contextmanager
