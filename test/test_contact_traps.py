@@ -90,7 +90,7 @@ def resting(newtons: float, seconds: float = 0.5, **values: object) -> tuple[Con
         "driver:world.obstacles.positions": [5.0] * 3,
         **values,
     }
-    push = Push("outer_link", 0.28, (0.0, 0.8 * newtons, 0.6 * newtons), 0.0, 2.0)
+    push = Push("outer_link", 0.28, (0.0, 0.8 * newtons, 0.6 * newtons), 0.0, seconds)
     steps = [
         ScenarioStep("release", 0.05, request="enable"),
         ScenarioStep("settle", 0.45),

@@ -188,7 +188,7 @@ def test_plane_and_cylinder_compile() -> None:
         ({"shapes": ()}, "shapes"),
         ({"positions": (0.0, 0.0)}, "positions"),
         ({"rotations": (0.0,) * 6}, "rotations"),
-        ({"sizes": (0.1, 0.0, 0.1)}, "block: obstacles.sizes"),
+        ({"sizes": (0.1, 0.0, 0.1)}, "block: world.obstacles.sizes"),
         ({"sizes": (0.1, -0.2, 0.1)}, "sizes"),
         ({"stiffness": (0.0,)}, "stiffness"),
         ({"damping": (-1.0,)}, "damping"),

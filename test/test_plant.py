@@ -460,6 +460,36 @@ def test_contact_on_one_cover_out_of_several_obstacles_has_the_stiffness_of_its_
         assert np.linalg.norm(load.force) == pytest.approx(5e3 * depth, rel=1e-4)
 
 
+def at(plant: Plant, q: tuple[float, ...]) -> Plant:
+    """Put the joints at the angles q, rad, and look for contacts there."""
+    for name, angle in zip(WAM.joints.names, q, strict=True):
+        plant.data.qpos[plant.model.joint(name).qposadr[0]] = angle
+    mujoco.mj_kinematics(plant.model, plant.data)
+    mujoco.mj_comPos(plant.model, plant.data)
+    mujoco.mj_collision(plant.model, plant.data)
+    return plant
+
+
+@pytest.mark.parametrize(("shoulder", "sunk"), [(-1.98, False), (-2.0, False), (-2.01, True), (-2.05, True)])
+def test_a_tube_whose_axis_is_in_an_edge_is_sunk(shoulder: float, sunk: bool) -> None:
+    """At the edge of the box, 0.026 m deep, MuJoCo's normal turns from across the tube to the face beneath the edge."""
+    edge = box((0.628, 0.0, -0.468), (0.1, 0.2, 0.1), 4000.0)
+    plant = at(ideal_plant(WAM, edge, 5e-4), (0.0, shoulder, 0.0, 1.45))
+    (contact,) = (plant.data.contact[i] for i in range(plant.data.ncon))
+    axis = plant.data.geom("outer_link").xmat.reshape(3, 3)[:, 2]
+    assert (abs(float(contact.frame[:3] @ axis)) > 0.5) is sunk
+    assert ("mm deep in an edge" in plant.sunk()) is sunk
+
+
+@pytest.mark.parametrize("depth", [0.01, 0.05, 0.09])
+def test_the_end_of_a_tube_may_be_deep_in_what_is_soft(depth: float) -> None:
+    q = (0.0, -1.8, 0.0, 1.0)
+    low = (cover_frame(q, "outer_link") @ [TIP, 0.0, 0.0, 1.0])[2] - RADIUS
+    plant = at(ideal_plant(WAM, box((0.0, 0.0, low + depth - 0.5), (2.0, 2.0, 0.5), 100.0), 5e-4), q)
+    assert plant.data.contact.dist.min() == pytest.approx(-depth, abs=1e-6)
+    assert plant.sunk() == ""
+
+
 # pushes
 
 

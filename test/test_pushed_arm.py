@@ -80,3 +80,16 @@ def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() ->
     assert "gives way by limits.free_travel" in reason
     peak, _, _ = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 1e6})
     assert peak > 100.0
+
+
+def test_the_force_with_which_the_brakes_stop_the_arm_is_no_push() -> None:
+    start = CONFIGURATION.shared.arm.joints.start
+    steps = [
+        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("turn", 0.5, posture=(start[0], start[1] - 0.4, start[2], start[3] + 0.5)),
+        ScenarioStep("back", 0.4, posture=(*start[:3], start[3] + 0.2)),
+        ScenarioStep("brake", 0.2, request="disable"),
+    ]
+    run = Simulation(CONFIGURATION, steps)
+    assert not run.play()
+    assert not run.reactions

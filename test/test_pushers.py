@@ -117,8 +117,8 @@ def test_a_hand_that_turns_round_the_link_twists_it() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"end": 0.06}, "hand: pushers.end is 0.06 s"),
-        ({"sizes": (0.0, 0.0, 0.0)}, "hand: pushers.sizes of a sphere"),
+        ({"end": 0.06}, "hand: world.pushers.end is 0.06 s"),
+        ({"sizes": (0.0, 0.0, 0.0)}, "hand: world.pushers.sizes of a sphere"),
         ({"names": ""}, "give each pusher a name"),
     ],
 )

@@ -10,7 +10,7 @@ from arms import CONFIGURATION, WAM
 from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, line_axes, unit
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import ForceCommand
+from wam_description.signals import ForceCommand, PathPoint, PosturePath
 from wam_experiments.force_benchmark.surfaces import Surface
 from wam_experiments.force_benchmark.tasks import RELEASE, Task, configured, triple
 from wam_experiments.force_benchmark.trial import TaskWatch, with_accepted_gain
@@ -139,3 +139,16 @@ def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: f
     played = Played(Task(q, surface, newtons), alone, 1.0, *later)
     assert played.forces[3000:, 0].max() < 1.2 * newtons
     assert played.forces[3000:, 0].min() > 0.8 * newtons
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("shoulder", "fault"), [(-1.99, ""), (-2.02, "mm deep in an edge")])
+def test_a_motion_that_drives_a_tube_into_an_edge_ends_with_a_fault(shoulder: float, fault: str) -> None:
+    """At -2.005 rad the edge is at the axis of the tube; deeper, the force turned by 80 degrees in silence."""
+    steps = [
+        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("above", 2.0, posture=(0.0, -1.8, 0.0, 1.45)),
+        ScenarioStep("into", 2.0, trajectory=PosturePath((PathPoint((0.0, shoulder, 0.0, 1.45)),))),
+    ]
+    assert fault in (found := Simulation(CONFIGURATION, steps).play())
+    assert bool(found) is bool(fault)

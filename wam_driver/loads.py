@@ -17,6 +17,8 @@ from wam_description.contact_pairs import folded
 from wam_description.signals import Load
 from wam_description.world import Springs
 
+LEAN = 0.3  # cosine between a contact's normal and a tube, above which it is none of the tube's side
+
 
 class SpringOnCover(NamedTuple):
     """A spring whose lever is on a link that carries a cover."""
@@ -134,6 +136,28 @@ class CoverLoads:
             parts[cover].append(part)
         loads = (_sum(cover, on_cover) for cover, on_cover in parts.items())
         return [load for load in loads if load is not None]
+
+    def sunk(self) -> str:
+        """Which cover is too deep in what it touches for a contact force, and what to do; '' where none is.
+
+        Where the axis of a tube passes through an edge, MuJoCo takes the face that is nearest to the axis: the force
+        jumps to one along the tube, and deeper in there is none.  What touches the side of a tube pushes across it.
+        """
+        data, sizes = self._data, self._model.geom_size
+        for i in range(data.ncon):
+            for geom, sign in zip(data.contact.geom[i].tolist(), (1.0, -1.0), strict=True):
+                depth, (radius, half, _) = -float(data.contact.dist[i]), sizes[geom].tolist()
+                if geom not in self._cover_of_geom or depth <= radius:
+                    continue
+                normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
+                nearest = data.contact.pos[i] - sign * (radius - 0.5 * depth) * normal  # point of the axis
+                if abs(normal @ axis) > LEAN and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half:
+                    return (
+                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in an edge, where the direction of "
+                        f"the contact force is unknown; allowed: {radius * 1e3:.3g} mm, the radius of the tube; "
+                        "press less, or on a stiffer surface"
+                    )
+        return ""
 
     def _contacts(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data

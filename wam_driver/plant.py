@@ -375,6 +375,10 @@ class Plant:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         return self._loads.measure()
 
+    def sunk(self) -> str:
+        """Which cover is too deep in what it touches for a contact force, and what to do; '' where none is."""
+        return self._loads.sunk() if self.data.ncon else ""
+
     def objects(self) -> list[ObjectState]:
         """The true state of every free body, door and moving obstacle, in the order of `World.objects`."""
         return self._objects.measure()
