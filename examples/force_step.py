@@ -21,6 +21,7 @@ BELOW = [0.0, -2.1, 0.0, 1.45]
 DETECTED = 1.5  # N
 PERIOD = 0.005  # s, of joint_states
 PATIENCE = 10.0  # s, without joint_states
+COMMANDS = {"joint_posture_command", "force_command"}
 
 
 class ForceStep(Node):
@@ -51,7 +52,7 @@ class ForceStep(Node):
     def take_status(self, message: DiagnosticStatus) -> None:
         facts = {item.key: item.value for item in message.values}
         if message.name == "force_loop":  # where it does not obey a command, its message is the reason
-            self.refusal = message.message if "force_command" in facts.get("refused", "").split(", ") else ""
+            self.refusal = message.message if COMMANDS.intersection(facts.get("refused", "").split(", ")) else ""
         if message.name != "driver":
             return
         if facts.get("mode") == "enabled":
@@ -115,7 +116,9 @@ class ForceStep(Node):
             self.wanted = [a + (b - a) * i / count for a, b in zip(start, goal, strict=True)]
             yield
             if goal is BELOW and self.touch >= DETECTED:
-                return
+                break
+        if self.refusal:
+            sys.exit(f"a command was refused: {self.refusal}")
 
 
 def main() -> None:

@@ -1067,6 +1067,23 @@ def test_what_the_estimator_states_of_its_torques_counts_in_what_is_reported(
     assert loop.reaction is reaction
 
 
+def test_where_a_position_is_assumed_the_force_is_known_no_better_than_the_torques() -> None:
+    """14.2 N were true of 12, known to 0.72 N by the configured errors of the torques, to 2 N by the stated ones."""
+    limits = replace(QUIET.limits, settling_time=0.3)
+    own = replace(QUIET, feedback="contact_estimate", contact_source="estimated", limits=limits)
+    loop, known = force_loop(ARM, replace(own, sensing=replace(FULL, friction=0.3))), []
+    touch = Contact("outer_link", 0.28, (0.0, 20.0, 0.0), 0.05, 1.0)
+    external = (-20.0 * lever(POSE)).tolist()
+    for sd in (1e-3, 1.0):
+        for _ in range(100):
+            ask(loop, World(1e-9), down(20.0), external=external, external_sd=[sd] * 4, contact=touch)
+        assert loop.reaction is ForceReaction.POSITION_ASSUMED
+        known.append(float(re.findall(r"known to ([\d.]+) N", loop.reason)[0]))
+    assert known[1] > math.hypot(known[0], 1.0 / float(np.linalg.norm(lever(POSE)))), (
+        "no sum of torques is more certain"
+    )
+
+
 def test_from_the_motors_a_link_that_would_be_pressed_too_hard_before_it_is_detected_is_a_reason_to_hold() -> None:
     """At an estimated position: another link, touched at a quarter of its length, has to be detected at that force."""
     elsewhere = 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.25 * ARM.covers.length[0])

@@ -86,11 +86,11 @@ def test_a_small_force_from_the_motors_does_not_creep_while_it_is_held() -> None
 @pytest.mark.parametrize("as_task", [False, True])
 def test_an_arm_that_holds_presses_no_harder_than_commanded(as_task: bool) -> None:
     """A hand at the side of the inner link makes it hold; less is commanded then, and 12 N stayed of 3."""
-    hand = Push("inner_link", 0.4, triple(BODY.cover_pose(POSE, "inner_link").rotation.T @ (0.0, 12.0, 0.0)), 0.0, 9.0)
+    hand = Push("inner_link", 0.4, triple(BODY.cover_pose(POSE, "inner_link").rotation.T @ (0.0, 12.0, 0.0)), 0.0, 0.6)
     steps = [
         press(12.0, 1.0, as_task),
         press(12.0, 0.6, as_task, push=hand),
-        press(3.0, 1.5, as_task, push=hand),
+        press(3.0, 1.5, as_task, push=hand._replace(end=1.5)),
     ]
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": "estimated"})
     assert set(reactions[1600:]) == {ForceReaction.SECOND_CONTACT}
@@ -103,7 +103,7 @@ def test_an_arm_that_holds_presses_no_harder_than_commanded(as_task: bool) -> No
 def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float, source: str) -> None:
     """Along the force and 8 cm and more from it: the surface got 3.2 to 12.8 N of 8, and nothing was said."""
     local = BODY.cover_pose(POSE, OUTER).rotation.T @ (newtons * np.array(DIRECTION))
-    steps = [press(8.0, 1.8), press(8.0, 0.8, push=Push(OUTER, place, triple(local), 0.0, 9.0))]
+    steps = [press(8.0, 1.8), press(8.0, 0.8, push=Push(OUTER, place, triple(local), 0.0, 0.8))]
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": source})
     assert reactions[1799] is ForceReaction.NONE
     assert abs(forces[-100:].mean() - 8.0) > 0.8

@@ -1,6 +1,7 @@
 """The outer loop on a world that is computed here: the arm follows its velocity command, springs push back."""
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.motion import GoalMotion
 from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.torque_watch import TorqueWatch
 from wam_description.arm import Arm
@@ -446,6 +448,68 @@ def test_a_posture_that_moves_faster_than_the_arm_follows_is_reported(speed: flo
     assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in loop.reason) is is_late
 
 
+def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported() -> None:
+    limits = replace(OWN.limits, settling_time=0.5)
+    loop, world = force_loop(ARM, replace(OWN, limits=limits, force_rate_limit=2.0)), World(400.0)
+    found, way = [], "; the set point is {} N on its way to the command, 4 N, at force_rate_limit, 2 N/s: raise that"
+    for _ in range(round(4.0 / DT)):
+        world.move(ask(loop, world, down(4.0)).velocity)
+        found.append(loop.reactions)
+    late = [ForceReaction.NOT_REACHED in one for one in found]
+    assert late.index(True) == pytest.approx(0.5 / DT, abs=2)
+    assert found[late.index(True)][ForceReaction.NOT_REACHED].startswith(way.format("1")[2:])
+    assert not any(late[round(2.0 / DT) :]), "the set point is the command"
+    loop.step(world.joints, world.sensors, NO_CONTACT, None, ForceCommand("base", down(60.0)), None, None, DT)
+    assert all("on its way to the command, 60 N" in why for why in loop.reactions.values())
+    turning = replace(OWN, mode="joint_torque", limits=limits, torque_rate_limit=1.0)
+    loop = force_loop(ARM, turning)
+    for _ in range(round(0.6 / DT)):
+        loop.step(world.joints, world.sensors, NO_CONTACT, None, None, None, [0.0, -2.0, 0.0, 0.0], DT)
+    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in loop.reactions[ForceReaction.NOT_REACHED]
+
+
+@pytest.mark.parametrize(
+    ("gain", "way", "is_free", "is_short"),
+    [(8.0, 0.9, True, False), (4.0, 0.9, True, False), (0.5, 0.9, True, True), (0.0, 0.9, True, True),
+     (8.0, 0.9, False, True), (0.0, 0.04, True, False)],
+)  # fmt: skip
+def test_a_posture_that_is_not_reached_is_reported(gain: float, way: float, is_free: bool, is_short: bool) -> None:
+    loop, world = force_loop(ARM, replace(OWN, posture_gain=gain)), World(1e-9)
+    motion = GoalMotion(POSE, [POSE[0], POSE[1] + way, *POSE[2:]], 1.0)
+    for k in range(round(1.0 / DT) + 1):
+        velocity = ask(loop, world, None, posture=motion.at(k * DT).position).velocity
+        if is_free:
+            world.move(velocity)
+    assert (loop.reaction is ForceReaction.NOT_REACHED) is is_short
+    if is_short:
+        name, advice = ARM.joints.names[1], f"raise force_loop:posture_gain, {gain:g} 1/s"
+        assert re.match(rf"{name} is \S+ rad away from the commanded posture; allowed: \S+ rad, 0.05 rad", loop.reason)
+        assert advice in loop.reason
+    ask(loop, world, down(6.0), posture=motion.at(2.0).position)
+    assert "posture" not in loop.reason, "a force moves the arm away from it"
+
+
+def test_under_the_brakes_neither_a_posture_nor_a_force_is_late() -> None:
+    limits = replace(OWN.limits, settling_time=0.1)
+    loop, world = force_loop(ARM, replace(OWN, limits=limits, force_rate_limit=1.0)), World(1e-9)
+    goal = [POSE[0], POSE[1] + 1.0, *POSE[2:]]
+    braked = world.joints._replace(effort=[0.0] * 4)
+    for _ in range(round(0.5 / DT)):
+        loop.step(braked, world.sensors, NO_CONTACT, None, ForceCommand("base", down(6.0)), goal, None, DT)
+        assert ForceReaction.NOT_REACHED not in loop.reactions
+    for _ in range(5):
+        ask(loop, world, None, posture=goal)
+        assert loop.reaction is ForceReaction.NONE
+
+
+def test_a_posture_that_is_set_at_once_is_reached_as_fast_as_the_arm_may_go() -> None:
+    loop, world, goal = force_loop(ARM, OWN), World(1e-9), [POSE[0], POSE[1] + 1.2, *POSE[2:]]
+    for _ in range(round(2.0 / DT)):
+        world.move(ask(loop, world, None, posture=goal).velocity)
+        assert loop.reaction is ForceReaction.NONE
+    assert world.q == pytest.approx(goal, abs=1e-3)
+
+
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:
     loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
     assert ask(loop, World(1e-9), None).velocity == [0.0] * 4
@@ -673,3 +737,18 @@ def test_feedback_of_sensors_that_are_not_mounted_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"arm\.joint_sensors is false; use 'contact_estimate'"):
         force_loop(bare, OWN)
     force_loop(bare, replace(OWN, feedback="contact_estimate"))
+
+
+def test_feedback_of_springs_that_nobody_knows_is_refused() -> None:
+    deaf = r"feedback is 'joint_position' but spring_stiffness is 0 at each joint, .* or use 'joint_sensors'"
+    with pytest.raises(ParameterError, match=deaf):
+        force_loop(ARM, replace(OWN, feedback="joint_position"))
+    loop = force_loop(ARM, OWN)
+    with pytest.raises(ParameterError, match=deaf):
+        loop.tune(replace(OWN, feedback="joint_position"))
+    assert loop.parameters == OWN
+    known = replace(OWN, feedback="joint_position", spring_stiffness=(0.0, 1464.0, 0.0, 0.0))
+    loop.tune(known)
+    with pytest.raises(ParameterError, match=deaf):
+        loop.tune(replace(known, spring_stiffness=OWN.spring_stiffness))
+    assert loop.parameters == known

@@ -12,13 +12,15 @@ from test_nodes import ARM, WAM, Listener, start
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State, Wrench
+from wam_description.signals import ZERO, State, Wrench
 from wam_description.topics import BY_NAME
 from wam_ros.header import stamp_of
 from wam_ros.messages import joint_state, message_type, wrench_stamped
 from wam_ros.qos import qos
 
 MS = 1_000_000
+NAMES = list(ARM.joints.names)
+WALL = 1_700_000_000_000_000_000  # ns, a wall clock
 CARRYING = RigidBody(ARM).gravity_torque([0.0, -1.8, 0.0, 1.45]).tolist()  # N m: nothing touches
 
 
@@ -167,3 +169,42 @@ def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_pat
     ros.wait(lambda: stamp_of(heard[-1]) == feeder.stamp)
     obeyed = [stamp_of(message) for message in heard if any(message.effort)]
     assert sent + 150 * MS < max(obeyed) <= sent + 200 * MS
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "reason"),
+    [
+        ("force_command", lambda stamp: wrench_stamped(stamp, Wrench("outer", ZERO, ZERO)), "frame_id is 'outer'"),
+        ("force_command", lambda stamp: wrench_stamped(WALL, Wrench("base", ZERO, ZERO)), "ahead of the newest state"),
+        ("joint_posture_command", lambda stamp: joint_state(stamp, NAMES, State([0.0] * 3, [], [])), "has 3 values"),
+        ("joint_posture_command", lambda stamp: joint_state(stamp, [], State([0.0] * 4, [], [])), "is missing"),
+    ],
+    ids=["frame", "stamp", "positions", "names"],
+)
+def test_the_status_names_a_malformed_command_until_none_comes_any_more(
+    topic: str, message: Callable[[int], Any], reason: str, ros: Any, tmp_path: Path
+) -> None:
+    feeder = Feeder(ros, tmp_path)
+    sender = feeder.node.create_publisher(message_type(BY_NAME[topic]), topic, qos(BY_NAME[topic]))
+    ros.wait(sender.get_subscription_count)
+    feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
+
+    def feed_until(condition: Callable[[], bool], is_wrong: bool) -> None:
+        for _ in range(500):  # 2.5 s of the arm's time
+            if is_wrong:
+                sender.publish(message(feeder.stamp))
+            feeder.feed(None)
+            if condition():
+                return
+        raise AssertionError(feeder.facts())
+
+    feed_until(lambda: "refused" in feeder.facts()[1], is_wrong=True)
+    reported, facts = feeder.facts()
+    assert (reported.level, facts["refused"], reason in reported.message) == (DiagnosticStatus.WARN, topic, True)
+    count = len(feeder.heard.seen["status"])
+    for _ in range(50):
+        sender.publish(message(feeder.stamp))
+        feeder.feed(None)
+    assert len(feeder.heard.seen["status"]) <= count + 1, "one status a second at most"
+    feed_until(lambda: "refused" not in feeder.facts()[1], is_wrong=False)
+    assert feeder.facts()[0].level == DiagnosticStatus.OK

@@ -90,3 +90,9 @@ def test_it_fails_with_the_reason_where_its_force_is_refused(stub: Stub) -> None
     reason = "the force is measured with a standard deviation of 3 N; bend the arm"
     stub.report("force_loop", Level.WARN, reason, refused="force_command", reaction="not_sensed")
     assert stub.ended() == (1, f"5 N were refused: {reason}\n")
+
+
+def test_it_fails_with_the_reason_where_its_commands_are_malformed(stub: Stub) -> None:
+    reason = "frame_id is 'outer'; allowed: base, outer_link"
+    stub.report("force_loop", Level.WARN, reason, refused="force_command")
+    assert stub.ended() == (1, f"a command was refused: {reason}\n")

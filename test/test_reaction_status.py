@@ -10,7 +10,7 @@ from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import BASE, Level, NodeStatus
-from wam_sim.reactions import RecordedReaction, is_too_short, lasting, unmet, watched_times
+from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
 from wam_sim.recording import RecordedStep
 from wam_sim.sweep import SweepPoint, outcome
 
@@ -110,6 +110,12 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     steps = [RecordedStep(str(i), i * SECOND, (i + 1) * SECOND, {}) for i in range(5)]
     assert [one.name for one in steps if is_too_short(times, one, 1.5)] == ["0", "3", "4"]
     assert not any(is_too_short(times, one, math.nan) for one in steps)
+    settling = [(0, 2.0), (3 * SECOND, 60.0), (5 * SECOND, 1.0)]
+    spans = [(1, 2), (1, 4), (5, 6)]
+    during = [steps[0]._replace(begin=begin * SECOND, end=end * SECOND) for begin, end in spans]
+    found = [settling_time_in(settling, one) for one in during]
+    assert found == [2.0, 60.0, 1.0]
+    assert math.isnan(settling_time_in([], steps[0]))
 
 
 @pytest.mark.parametrize(

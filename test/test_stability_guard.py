@@ -234,7 +234,7 @@ def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_o
 
 
 def test_servo_gains_of_a_wrong_number_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"'servo.integral_gain' has 1 values; 4 names need 4"):
+    with pytest.raises(ParameterError, match=r"'servo.integral_gain' has 1 value; 4 names need 4"):
         Loop(OWN).retune_servo(Servo(SERVO.proportional_gain, (0.8,)))
 
 

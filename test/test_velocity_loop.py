@@ -178,8 +178,8 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
 @pytest.mark.parametrize(
     ("proportional", "integral", "text"),
     [
-        ((0.01,), (0.1, 0.1), "'servo.integral_gain' has 2 values; 1 names need 1"),
-        ((0.01, 0.01), (0.1, 0.1), "'servo.proportional_gain' has 2 values; 1 names need 1"),
+        ((0.01,), (0.1, 0.1), "'servo.integral_gain' has 2 values; 1 name needs 1"),
+        ((0.01, 0.01), (0.1, 0.1), "'servo.proportional_gain' has 2 values; 1 name needs 1"),
     ],
 )
 def test_gains_of_a_wrong_number_are_refused(

@@ -26,12 +26,16 @@ class Commands(NamedTuple):
     torque : commanded joint torques of the arm on the world (n,), N m; None where there are none.
     posture : joint angles to hold (n,), rad.
     refusals : why a command of this period is not taken, by topic.
+    rising : how far force or torque are on the way to their command, limited in rate; '' where they are there.
+    risen : for how long, s.
     """
 
     force: ForceCommand | None
     torque: Sequence[float] | None
     posture: list[float]
     refusals: dict[str, str]
+    rising: str = ""
+    risen: float = 0.0
 
 
 class CommandAdmission:
@@ -53,7 +57,7 @@ class CommandAdmission:
     def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
         self._joints, self._covers, self._command_age = joints, covers, command_age
         self._last = f"the last good command remains in force for {command_age:g} s"
-        self._force_age = self._torque_age = 0.0
+        self._force_age = self._torque_age = self._risen = 0.0
         self.posture: list[float] = []
         self._present = NO_FORCE
         self._present_torque: Sequence[float] = [0.0] * len(joints.names)
@@ -65,6 +69,7 @@ class CommandAdmission:
         """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
         self._force = self._torque = None
         self._is_moved = self._has_lapsed = self._is_ignored = False
+        self._risen = 0.0
         self._rising_force(None, 0.0)
         self._rising_torque(None, 0.0)
         self.posture = list(q)
@@ -114,11 +119,25 @@ class CommandAdmission:
         elif has_ended or self._is_moved:
             self.posture = list(q)
         self._is_moved = posture is not None and not self._has_lapsed
-        return Commands(
-            self._rising_force(self._force, parameters.force_rate_limit * dt),
-            self._rising_torque(self._torque, parameters.torque_rate_limit * dt),
-            self.posture,
-            refusals,
+        risen_force = self._rising_force(self._force, parameters.force_rate_limit * dt)
+        risen_torque = self._rising_torque(self._torque, parameters.torque_rate_limit * dt)
+        rising = self._rising(parameters)
+        self._risen = self._risen + dt if rising else 0.0
+        return Commands(risen_force, risen_torque, self.posture, refusals, rising, self._risen)
+
+    def _rising(self, parameters: ForceLoopParameters) -> str:
+        """How far force or torque are on the way to their command, '' where they are there."""
+        force, torque = self._force, self._torque
+        is_of_torque = parameters.mode == "joint_torque"
+        if force is not None and not is_of_torque and self._present.force != force.force:
+            present, wanted, name, unit = _size(self._present), _size(force), "force_rate_limit", "N"
+        elif torque is not None and is_of_torque and list(self._present_torque) != list(torque):
+            present, wanted, name, unit = _largest(self._present_torque), _largest(torque), "torque_rate_limit", "N m"
+        else:
+            return ""
+        return (
+            f"the set point is {present:.3g} {unit} on its way to the command, {wanted:.3g} {unit}, at {name}, "
+            f"{getattr(parameters, name):g} {unit}/s: raise that, or command it for longer"
         )
 
     def _add_without_effect(

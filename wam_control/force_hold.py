@@ -353,7 +353,7 @@ class ForceHold:
         found = [(ForceReaction.CYCLE, _cycle(self._turns, desired, parameters))] if is_cycling else []
         found += [(ForceReaction.NOT_REACHED, missed)] if missed else []
         found += [(ForceReaction.NOT_EXPLAINED, turned)] if turned else []
-        return found or [self._doubted(axis, point, force_sd, desired, unexplained, parameters)]
+        return found or [self._doubted(case, force_sd, unexplained, parameters)]
 
     def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the force is not measured well enough, None where it is.
@@ -542,17 +542,9 @@ class ForceHold:
             )
         return None
 
-    def _doubted(
-        self,
-        axis: ForceAxis,
-        point: ForcePoint,
-        force_sd: float,
-        desired: float,
-        unexplained: float,
-        parameters: ForceLoopParameters,
-    ) -> Found:
+    def _doubted(self, case: ForceCase, force_sd: float, unexplained: float, parameters: ForceLoopParameters) -> Found:
         """Why the measured force may not be the true one, where that lasts."""
-        lasting = parameters.limits.settling_time
+        point, desired, lasting = case.point, case.desired, parameters.limits.settling_time
         if self._strange > lasting:
             return ForceReaction.NOT_EXPLAINED, (
                 f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
@@ -560,7 +552,9 @@ class ForceHold:
                 "link, or is not the only one; pin it where it acts, or free the arm"
             )
         if self._assumed > lasting:
-            return ForceReaction.POSITION_ASSUMED, _position_assumed(axis, point)
+            return ForceReaction.POSITION_ASSUMED, _position_assumed(
+                point, math.hypot(case.axis.free_sd, case.torque_error)
+            )
         if self._uncertain > lasting:
             return ForceReaction.UNCERTAIN, (
                 f"the force is known to +-{brief(force_sd)} N, {force_sd / desired:.0%} of the commanded "
@@ -747,9 +741,9 @@ def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) ->
     )
 
 
-def _position_assumed(axis: ForceAxis, point: ForcePoint) -> str:
+def _position_assumed(point: ForcePoint, force_sd: float) -> str:
     known = (
-        f"where it is known from the torques alone, so that the force is known to {brief(axis.free_sd)} N"
+        f"where it is known from the torques alone, so that the force is known to {brief(force_sd)} N"
         if point.is_identified
         else "it is not known where"
     )

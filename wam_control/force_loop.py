@@ -33,7 +33,7 @@ from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, BEGIN, MotionLimits, WholeForce
 from wam_control.motion_watch import MotionWatch
-from wam_control.posture_watch import BEHIND, PostureWatch
+from wam_control.posture_watch import BEHIND, PostureWatch, ShortfallWatch
 from wam_control.pressed_pose import has_left
 from wam_control.sensing_advice import OtherForces, Turnable
 from wam_control.stability_guard import GuardAssessment
@@ -141,6 +141,7 @@ class ForceLoop:
         self._torque_before: list[float] = []
         self._rate: Sequence[float] | None = None
         self._posture_watch = PostureWatch(arm.joints.names, "posture", "joint_speed_limit", "rad/s")
+        self._posture_shortfall = ShortfallWatch(arm.joints.names)
         self._posture_motions = [MotionWatch(f"posture of {name}", "rad", TAKEN) for name in arm.joints.names]
         self._posture_before: list[float] = []  # (n,) rad, as the task began
         self._has_posture = False  # whether another one has been commanded since
@@ -285,7 +286,8 @@ class ForceLoop:
         """
         own = self.parameters
         self._external_sd = external_sd if own.is_estimated else None
-        if not self._joints or not any(joints.effort):
+        is_braked = not any(joints.effort)
+        if not self._joints or is_braked:
             self._reset(joints.position)
         self._joints = tuple(joints.position)
         if (contact if own.is_estimated else sensors) is None:
@@ -320,14 +322,32 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         push = self._push_on_arm(joints.position, contact, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        self._react_too(ForceReaction.CONTACT_FORCE, limited.contact_force)
+        if is_braked:
+            self._limits.forget()  # the force with which brakes stop the arm is none of the world
+        else:
+            self._react_too(ForceReaction.CONTACT_FORCE, limited.contact_force)
         self._react_too(ForceReaction.JOINT_END, limited.joint_end)
+        self._watch_rise(commands)
         self._watch_posture(commands, posture is not None, joints.position, dt)
         return ForceOutput(limited.velocity, *out[1:])
 
+    def _watch_rise(self, commands: Commands) -> None:
+        """State that the set point is not the command yet, in each reason of a reaction and, if that lasts, as one."""
+        if not commands.rising or self._axes in ("", TASK):
+            return
+        self.reactions = {one: f"{why}; {commands.rising}" for one, why in self.reactions.items()}
+        if commands.risen > self.parameters.limits.settling_time:
+            self._react((ForceReaction.NOT_REACHED, commands.rising), *self.reactions.items())
+
     def _watch_posture(self, commands: Commands, is_commanded: bool, q: Sequence[float], dt: float) -> None:
-        """React to a posture that moves on faster than the arm follows."""
+        """React to a posture that moves on faster than the arm follows, or is not reached where it is all there is."""
         is_held = self.reaction.holds or "joint_posture_command" in commands.refusals
+        own, is_pushed = self.parameters, ForceReaction.CONTACT_FORCE in self.reactions
+        if is_held or is_pushed or self._axes or not is_commanded or own.mode != "hybrid":
+            self._posture_shortfall.restart()
+        else:
+            short = self._posture_shortfall.step(commands.posture, q, own.posture_gain, own.joint_speed_limit, dt)
+            self._react_too(ForceReaction.NOT_REACHED, short)
         if self._axes != TASK or is_held or not self._posture_before:
             self._posture_before, self._has_posture = commands.posture, False
         if is_held:
@@ -397,6 +417,7 @@ class ForceLoop:
         self._admission.restart(q)
         self._given.restart()
         self._posture_watch.restart()
+        self._posture_shortfall.restart()
         self._transfer.reset()
         self._filter.reset()
         self._begin("")

@@ -158,6 +158,12 @@ class ForceLoopParameters:
         )
         springs = {"spring_stiffness": self.spring_stiffness, "spring_rest": self.spring_rest}
         lengths("force_loop", arm.joints.names, springs)
+        require(
+            self.feedback != "joint_position" or any(self.spring_stiffness),
+            "feedback is 'joint_position' but spring_stiffness is 0 at each joint, so that no force is measured; give "
+            "the stiffness, N m/rad, of the known spring that the arm presses, or use 'joint_sensors' or "
+            "'contact_estimate'",
+        )
 
 
 def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:

@@ -233,6 +233,12 @@ class LineMotion:
     def __init__(
         self, start: Sequence[float], goal: Triple, arm: Arm, body: RigidBody, limits: MotionParameters
     ) -> None:
+        away = math.hypot(*goal)
+        require(
+            away <= body.reach,
+            f"the goal of the tip is {away:.3g} m from the origin of the base frame; allowed: up to "
+            f"{body.reach:.3g} m, the reach of the arm; give a goal nearer to the base",
+        )
         begin = body.tool_pose(start).position
         self._length = float(np.linalg.norm(np.array(goal) - begin))
         self._angles = [np.array(start, float)]

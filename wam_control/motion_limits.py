@@ -158,6 +158,10 @@ class MotionLimits:
             self._reported = max(self._reported - dt, 0.0)
         return Limited(stopped, end, self._reason if self._reported else "")
 
+    def forget(self) -> None:
+        """Report nothing any more of what has pushed."""
+        self._pushed = self._reported = 0.0
+
     def _against_the_world(
         self, velocity: list[float], q: Sequence[float], push: ArmPush, whole: WholeForce | None
     ) -> tuple[list[float], str]:

@@ -1,4 +1,4 @@
-"""Whether a commanded posture, or the position along an axis, moves on faster than the arm follows."""
+"""Whether a commanded posture, or the position along an axis, moves on faster than the arm follows, or gets there."""
 
 import math
 from collections.abc import Sequence
@@ -9,6 +9,9 @@ PAUSE: Final = 0.1  # s, after which a posture that changes is another goal, to 
 RHYTHM: Final = 1.5  # unless it changes at intervals that are alike by this factor
 BEHIND: Final = 0.02  # rad, of an axis m, from where the posture is as it moves on, from which the arm is late
 ROUNDING: Final = 1e-9  # s, rad
+PACE: Final = 5.0  # 1/s, velocity per posture error of an arm that arrives in time
+SHORT, LATE = 0.05, 0.1  # rad, s, by which an arm may be behind that one
+SHORT_FOR: Final = 0.1  # s, after which it is reported
 STILL: Final = [0.0]
 
 
@@ -101,6 +104,58 @@ class PostureWatch:
                     f"is late: {advice}"
                 )
         self._interval, self._is_goal, self._rested, self._held = time, not goes_on, 0.0, 0.0
+
+
+class ShortfallWatch:
+    """Compares how far the arm is from a commanded posture with an arm of `PACE`, which goes no faster than it may.
+
+    It may be further away by `SHORT`, and by the way of that arm in `LATE`.
+
+    Parameters
+    ----------
+    names : of the joints.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
+        self.restart()
+
+    def restart(self) -> None:
+        """No posture is commanded, or the arm does something else."""
+        self._follower: list[float] = []
+        self._lasts, self._report = 0.0, ""  # s
+
+    def step(self, posture: Sequence[float], q: Sequence[float], gain: float, limit: float, dt: float) -> str:
+        """Why the posture is not reached, '' where it is.
+
+        Parameters
+        ----------
+        posture, q : commanded and present joint angles (n,), rad.
+        gain : velocity per posture error of the arm, `posture_gain`, 1/s.
+        limit : largest speed, rad/s.
+        dt : outer period, s.
+        """
+        at = self._follower or list(q)
+        speeds = [
+            min(max(min(PACE, 1.0 / dt) * (goal - a), -limit), limit) for goal, a in zip(posture, at, strict=True)
+        ]
+        self._follower = [a + speed * dt for a, speed in zip(at, speeds, strict=True)]
+        allowed = [
+            abs(goal - a) + SHORT + LATE * abs(speed)
+            for goal, a, speed in zip(posture, self._follower, speeds, strict=True)
+        ]
+        short = [abs(goal - angle) for goal, angle in zip(posture, q, strict=True)]
+        k = max(range(len(short)), key=lambda joint: short[joint] - allowed[joint])
+        self._lasts = self._lasts + dt if short[k] > allowed[k] else 0.0
+        if not self._lasts:
+            self._report = ""
+        elif self._lasts > SHORT_FOR and not self._report:
+            self._report = (
+                f"{self._names[k]} is {short[k]:.3g} rad away from the commanded posture; allowed: {allowed[k]:.3g} "
+                f"rad, {SHORT:g} rad at rest; raise force_loop:posture_gain, {gain:g} 1/s, if it is too low for this "
+                "motion, or give the motion more time; or something is in the way: free the arm"
+            )
+        return self._report
 
 
 def _nearer(goal: float, follower: float, arm: float) -> float:

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 
 from wam_control.force_hold import ForceReaction
 from wam_description.signals import NodeStatus
-from wam_description.status import REFUSED
+from wam_description.status import REACTION, REFUSED
 
-REACTION = "reaction"  # fact: the most serious one; where the message is more or less than its reason, each is a fact
 REFUSAL = "refused"  # in place of a reaction: a command is not taken, as it is beyond a limit or has no effect
 NONE, CONTACT_FORCE, NOT_REACHED, NOT_FOLLOWED = (
     one.name.lower()
