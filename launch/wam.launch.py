@@ -126,8 +126,8 @@ def chosen(given: dict[str, str]) -> Configuration:
     if given["bag"]:
         bag = Path(given["bag"]).resolve()
         values |= {"recorder:directory": str(bag.parent), "recorder:name": bag.name}
-    values |= {"nodes": [*configuration.shared.nodes, *more]} if more else {}
-    return configuration.with_values(values) if values else configuration
+    configuration = configuration.with_values(values) if values else configuration
+    return configuration.with_nodes(*more) if more else configuration
 
 
 def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:

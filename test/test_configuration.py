@@ -372,3 +372,9 @@ def test_an_int_above_every_float_is_refused() -> None:
 )
 def test_other_numbers_of_yaml_are_read(text: str, value: int) -> None:
     assert option_values([f"a={text}"]) == {"a": value}
+
+
+def test_a_node_that_is_listed_already_is_not_added_again() -> None:
+    listed = Configuration.load(packaged("wam")).with_nodes("scenario", "recorder")
+    assert listed.shared.nodes[-2:] == ("scenario", "recorder")
+    assert listed.with_nodes("recorder", "scenario").shared.nodes == listed.shared.nodes

@@ -111,6 +111,24 @@ def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
     assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
 
 
+class Misspelt:
+    """Publishes on a topic that is in no table."""
+
+    name, parameters = "misspelt", Nothing
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("joint_states", "position"), outputs=("joint_posture_comand",))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {}
+
+
+def test_a_misspelt_topic_is_refused_with_the_one_that_is_meant(configured: Configuration) -> None:
+    text = r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class"
+    with pytest.raises(ParameterError, match=text):
+        Interface(configured.shared, {"misspelt": Misspelt})
+
+
 @pytest.mark.parametrize(
     ("row", "text"),
     [

@@ -28,7 +28,7 @@ from wam_control.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_CONTACT, Contact, State
+from wam_description.signals import NO_CONTACT, ZERO, Contact, State
 from wam_description.synchroniser import Inputs
 from wam_sim.simulation import Simulation
 
@@ -478,6 +478,7 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
         ({"force_loop": {"force_gain": 0.01}}, "set, force_loop: parameter 'force_gain' is 0.01; it must be a list of"),
         ({"force_loop": {"feedback": "guess"}}, "'feedback' is 'guess'; allowed: one of joint_sensors, "),
         ({"force_loop": {"posture_gian": 1.0}}, "no parameter 'posture_gian' that may change while it runs; did you "),
+        ({"force_loop": {"posture_gian": 1.0}}, r"did you mean 'posture_gain'\?$"),
         ({"driver": {"seed": 3}}, "set, driver: it has no parameter 'seed' that may change while it runs; it has: eff"),
     ):
         with pytest.raises(ParameterError, match=f"{tmp_path}/one.yaml, step 1: .*{reason}"):
@@ -568,9 +569,70 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
 
     def left(seconds: float, limit: float) -> float:
         steps = [ScenarioStep("pose", 4.0, pose, request="enable"), ScenarioStep("quick", seconds, goal)]
-        run = Simulation(CONFIGURATION.with_values({"force_loop:joint_speed_limit": limit}), steps)
+        free = {"driver:world.obstacles.positions": [5.0] * 3, "force_loop:joint_speed_limit": limit}
+        run = Simulation(CONFIGURATION.with_values(free), steps)
         assert not run.play()
         return abs(run.rows["sim/joint_states"][-1].values[3] - goal[3])
 
     assert left(least, 1.5) == pytest.approx(left(least, 3.9), abs=0.01)
     assert left(short, 1.5) > left(short, 3.9) + 0.1
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        (ScenarioStep("go", -1.0), "seconds is -1; it must be above 0"),
+        (ScenarioStep("go", 0.0, tuple(GOAL)), "seconds is 0; it must be above 0"),
+        (ScenarioStep("go", math.nan), "seconds is nan; it must be a finite number"),
+        (ScenarioStep("", 1.0), "name is ''; it must be a text"),
+        (ScenarioStep("go", 1.0, tuple(GOAL[:3])), "posture is .*; it must be a list of 4 numbers"),
+        (ScenarioStep("go", 1.0, (0.0, -9.0, 0.0, 0.0)), "posture of joint2 is -9 rad; allowed: -2.35619 to"),
+        (ScenarioStep("go", 1.0, until_force=-1.0), "until_force is -1; it must be 0"),
+        (ScenarioStep("go", 1.0, request="Enable"), "request is 'Enable'; allowed: enable, disable"),
+        (ScenarioStep("go", 1.0, force=ForceCommand("hand", ZERO)), "frame is 'hand'; allowed: base, inner_link"),
+        (ScenarioStep("go", 1.0, force=ForceCommand("base", (0.0, math.nan, 0.0))), "newtons is nan; it must be a f"),
+        (ScenarioStep("go", 1.0, chirp=Chirp(1.0, 0.1, 2.0)), "chirp needs a force above 0 N"),
+        (ScenarioStep("go", 1.0, tuple(GOAL), tip=(0.5, 0.0, 0.0)), "posture and tip are given; give one of them"),
+        (ScenarioStep("go", 1.0, tip=(0.5, math.inf, 0.0)), "tip is inf; it must be a finite number"),
+        (ScenarioStep("go", 1.0, push=Push("base", 0.1, ZERO, 0.0, 1.0)), "cover is 'base'; allowed: inner_link"),
+        (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
+        (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.5)), "begin 0 s and end 1.5 s; allowed"),
+        (
+            ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, (0.0, 600.0, 0.0), 0.0, 1.0)),
+            "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
+        ),
+    ],
+)
+def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, text: str) -> None:
+    with pytest.raises(ParameterError, match=f"^step 2: .*{text}"):
+        Scenario([ScenarioStep("fine", 1.0), step], SHARED)
+    with pytest.raises(ParameterError, match=text):
+        Simulation(CONFIGURATION, [ScenarioStep("fine", 1.0), step])
+
+
+@pytest.mark.parametrize(
+    ("more", "chirp", "text"),
+    [
+        (
+            {},
+            0.0,
+            "step 'press': 70 N is commanded; allowed: up to force_limit, 60 N; command less, or raise force_loop:",
+        ),
+        ({}, 20.0, "90 N is commanded; allowed"),
+        ({"set": {"force_loop": {"force_limit": 69.0}}}, 0.0, "70 N is commanded; allowed: up to force_limit, 69 N"),
+        ({"set": {"force_loop": {"force_limit": 70.0}}}, 0.0, ""),
+    ],
+)
+def test_a_force_above_the_limit_is_refused_before_the_start(
+    more: dict[str, Any], chirp: float, text: str, tmp_path: Path
+) -> None:
+    press = {"name": "press", "seconds": 1.0, "force": {"frame": "base", "newtons": [0.0, 0.0, -70.0]}}
+    if chirp:
+        press["chirp"] = {"newtons": chirp, "from": 0.1, "to": 1.0}
+    path = str(write(tmp_path, {"steps": [{"name": "set", "seconds": 1.0, **more}, press]}))
+    configuration = CONFIGURATION.with_values({"force_loop:force_limit": 60.0})
+    if not text:
+        assert load_for(configuration, path)
+        return
+    with pytest.raises(ParameterError, match=text):
+        load_for(configuration, path)

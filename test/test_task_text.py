@@ -146,7 +146,8 @@ def test_a_motion_is_commanded_with_its_velocity_and_ends_at_its_goal(tmp_path: 
 @pytest.mark.parametrize(
     ("step", "reason"),
     [
-        (ScenarioStep("far", 9.0, tip=(2.0, 0.0, 0.0)), "step 'far': at .* of the line"),
+        (ScenarioStep("far", 9.0, tip=(2.0, 0.0, 0.0)), "step 'far': the goal of the tip is 2 m from the origin"),
+        (ScenarioStep("through", 9.0, tip=(0.0, 0.0, 0.0)), "step 'through': at .* of the line"),
         (ScenarioStep("short", 0.1, trajectory=PosturePath((PathPoint((0.5, -1.0, 0.0, 0.0)),))), "seconds is 0.1"),
     ],
 )

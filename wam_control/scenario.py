@@ -48,7 +48,7 @@ REQUESTS = ("", "enable", "disable")
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
-FORCE_LOOP, FOLLOWED = "force_loop", "joint_speed_limit"
+FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
 Motion = GoalMotion | PostureMotion | LineMotion
 
 
@@ -157,10 +157,24 @@ class Scenario:
 
     Postures are reached along minimum-jerk paths.  If a step waits for a contact and none is
     detected, the scenario fails: it requests the brakes and ends.
+
+    Parameters
+    ----------
+    steps : at least one.
+    shared : of the arm, for motions that have limits; the values of the steps are checked against it as those of a
+        file are.
+
+    Raises
+    ------
+    ParameterError
+        names the step and the value that is not allowed.
     """
 
     def __init__(self, steps: Sequence[ScenarioStep], shared: Shared | None = None) -> None:
         require(len(steps) > 0, "the scenario has no steps")
+        if shared is not None:
+            for i, step in enumerate(steps):
+                _require_step(f"step {i + 1}", step, shared)
         self._steps, self._shared = list(steps), shared
         self._motion: Motion | None = None
         self._rate: tuple[float, ...] = ()
@@ -427,7 +441,7 @@ def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
 
 
 def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: Configuration) -> None:
-    """Refuse steps whose settings or motions do not fit a configuration; its simulated arm begins at its start.
+    """Refuse steps whose settings, forces or motions do not fit a configuration; its simulated arm begins at its start.
 
     Raises
     ------
@@ -438,7 +452,23 @@ def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: C
     shared = configuration.shared
     start = shared.arm.joints.start if "driver" in shared.nodes else ()
     loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in shared.nodes else {}
+    _require_forces(where, steps, float(loop.get(LARGEST_FORCE, math.inf)))
     _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))
+
+
+def _require_forces(where: str, steps: Sequence[ScenarioStep], limit: float) -> None:
+    """Refuse forces that the force loop would refuse in each pose; `limit` is its largest force, N, at the start."""
+    for step in steps:
+        for setting in step.settings:
+            if (setting.node, setting.name) == (FORCE_LOOP, LARGEST_FORCE):
+                assert isinstance(setting.value, (int, float))
+                limit = setting.value
+        largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
+        require(
+            largest <= limit,
+            f"{where}, step '{step.name}': {largest:.4g} N is commanded; allowed: up to {LARGEST_FORCE}, {limit:g} N; "
+            f"command less, or raise {FORCE_LOOP}:{LARGEST_FORCE}",
+        )
 
 
 def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
@@ -446,40 +476,71 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
     known(where, body, tuple(STEP_KEYS), ("name", "seconds"))
-    name = body["name"]
-    require(isinstance(name, str) and name != "", f"{where}: name is {name!r}; it must be a text (quote it)")
-    request = body.get("request", "")
-    require(request in REQUESTS, f"{where}: request is {request!r}; allowed: enable, disable")
     seconds = number(where, "seconds", body["seconds"])
-    require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
-    until_force = number(where, "until_force", body.get("until_force", 0.0))
-    require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact expected) or above")
     force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
-    require("chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
-    chosen = [key for key in FORCES if key in body]
-    require(len(chosen) <= 1, f"{where}: {' and '.join(chosen)} are given; give one of them")
-    moves = [key for key in MOTIONS if key in body]
-    require(len(moves) <= 1, f"{where}: {' and '.join(moves)} are given; give one of them")
-    task = _task(where, body, arm)
-    require(
-        not moves or task is None or len(task.axes) < len(arm.joints.names),
-        f"{where}: {' and '.join((*moves, *chosen))} are given; the {' '.join(chosen)} leaves no joint free to move; "
-        "give one of them, or a task with fewer axes",
-    )
-    return ScenarioStep(
-        name=name,
+    for keys in (FORCES, MOTIONS):
+        _require_one(where, [key for key in keys if key in body])
+    step = ScenarioStep(
+        name=body["name"],
         seconds=seconds,
-        posture=_posture(where, body["posture"], arm) if "posture" in body else (),
-        until_force=until_force,
+        posture=numbers(where, "posture", body["posture"], len(arm.joints.names)) if "posture" in body else (),
+        until_force=number(where, "until_force", body.get("until_force", 0.0)),
         force=force,
-        push=_push(where, body["push"], shared, seconds) if "push" in body else None,
-        request=request,
+        push=_push(where, body["push"], arm, seconds) if "push" in body else None,
+        request=body.get("request", ""),
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
         settings=tuple(settings_of(where, body["set"], shared)) if "set" in body else (),
-        task=task,
+        task=_task(where, body, arm),
         trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
         tip=_tip(where, body["tip"]) if "tip" in body else None,
     )
+    _require_step(where, step, shared)
+    return step
+
+
+def _require_one(where: str, keys: Sequence[str]) -> None:
+    require(len(keys) <= 1, f"{where}: {' and '.join(keys)} are given; give one of them")
+
+
+def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
+    """Refuse a step whose values cannot be, whether it is from a file or made in Python."""
+    arm = shared.arm
+    require(
+        isinstance(step.name, str) and step.name != "", f"{where}: name is {step.name!r}; it must be a text (quote it)"
+    )
+    require(step.request in REQUESTS, f"{where}: request is {step.request!r}; allowed: enable, disable")
+    seconds = number(where, "seconds", step.seconds)
+    require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
+    until = number(where, "until_force", step.until_force)
+    require(until >= 0.0, f"{where}: until_force is {until:g}; it must be 0 (no contact expected) or above")
+    _frame(where, step.force.frame, arm)
+    for key, values in (("newtons", step.force.force), ("torque", step.force.torque)):
+        numbers(where, key, values, 3)
+    if step.chirp is not None:
+        _require_chirp(where, step.chirp)
+        require(any(step.force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+    moves = [key for key, given in zip(MOTIONS, (step.posture, step.trajectory, step.tip), strict=True) if given]
+    forces = ["force"] * (step.force != NO_FORCE)
+    if step.task is not None:
+        are_torques = all(axis.kind is AxisKind.FORCE and axis.joint >= 0 for axis in step.task.axes)
+        forces.append("torque" if are_torques else "task")
+    _require_one(where, moves)
+    _require_one(where, forces)
+    require(
+        not moves or step.task is None or len(step.task.axes) < len(arm.joints.names),
+        f"{where}: {' and '.join((*moves, *forces))} are given; the {' '.join(forces)} leaves no joint free to move; "
+        "give one of them, or a task with fewer axes",
+    )
+    if step.posture:
+        _require_posture(where, step.posture, arm)
+    if step.trajectory is not None:
+        for point in step.trajectory.points:
+            _require_posture(where, point.position, arm)
+            number(where, "times", point.time)
+    if step.tip is not None:
+        _tip(where, step.tip)
+    if step.push is not None:
+        _require_push(where, step.push, shared, seconds)
 
 
 def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
@@ -488,7 +549,8 @@ def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
     require(isinstance(postures, list) and len(postures) > 0, f"{where}: postures is {postures!r}; give a list of them")
     times = numbers(where, "times", body["times"], len(postures)) if "times" in body else (0.0,) * len(postures)
     points = zip(postures, times, strict=True)
-    return PosturePath(tuple(PathPoint(_posture(where, one, arm), (), time) for one, time in points))
+    count = len(arm.joints.names)
+    return PosturePath(tuple(PathPoint(numbers(where, "posture", one, count), (), time) for one, time in points))
 
 
 def _tip(where: str, body: Any) -> Triple:
@@ -502,19 +564,22 @@ def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
     return task_of_text(where, body["task"], arm) if "task" in body else None
 
 
-def _posture(where: str, body: Any, arm: Arm) -> tuple[float, ...]:
+def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
     joints = arm.joints
-    posture = numbers(where, "posture", body, len(joints.names))
+    posture = numbers(where, "posture", given, len(joints.names))
     for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
         require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
-    return posture
+
+
+def _frame(where: str, frame: Any, arm: Arm) -> str:
+    frames = (BASE, *arm.covers.names)
+    require(frame in frames, f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
+    return str(frame)
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     known(where + ", force", body, ("frame", "newtons", "contact_position"), ("frame", "newtons"))
-    frames = ("base", *arm.covers.names)
-    frame = body["frame"]
-    require(frame in frames, f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
+    frame = _frame(where, body["frame"], arm)
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
     if "contact_position" not in body:
         return ForceCommand(frame, (x, y, z))
@@ -534,33 +599,43 @@ def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
 def _chirp(where: str, body: Any) -> Chirp:
     keys = ("newtons", "from", "to")
     known(where + ", chirp", body, keys, keys)
-    newtons, start, end = (number(where + ", chirp", key, body[key]) for key in keys)
+    return Chirp(*(number(where + ", chirp", key, body[key]) for key in keys))
+
+
+def _require_chirp(where: str, chirp: Chirp) -> None:
+    keys = ("newtons", "from", "to")
+    _, start, end = (number(where + ", chirp", key, value) for key, value in zip(keys, chirp, strict=True))
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
-    return Chirp(newtons, start, end)
 
 
-def _push(where: str, body: Any, shared: Shared, seconds: float) -> Push:
-    arm = shared.arm
+def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
     needed = ("cover", "contact_position", "newtons")
     known(where + ", push", body, (*needed, "begin", "end"), needed)
-    require(
-        body["cover"] in arm.covers.names,
-        f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
-    )
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
     place = number(where, "contact_position", body["contact_position"])
     begin, end = number(where, "begin", body.get("begin", 0.0)), number(where, "end", body.get("end", seconds))
-    length = arm.covers.length_of(body["cover"])
+    push = Push(body["cover"], place, (x, y, z), begin, end)
+    _require_place(where, push, arm)
+    return push._replace(aside=arm.covers.aside(push.cover, place))
+
+
+def _require_place(where: str, push: Push, arm: Arm) -> None:
+    require(push.cover in arm.covers.names, f"{where}: cover is {push.cover!r}; allowed: {', '.join(arm.covers.names)}")
+    place, length = number(where, "contact_position", push.position), arm.covers.length_of(push.cover)
     require(
         0.0 <= place <= length,
-        f"{where}: contact_position is {place:g} m; {body['cover']} reaches from 0 to {length:g} m",
+        f"{where}: contact_position is {place:g} m; {push.cover} reaches from 0 to {length:g} m",
     )
+
+
+def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
+    _require_place(where, push, shared.arm)
+    numbers(where, "newtons", push.force, 3)
+    begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
     require(
         0.0 <= begin < end <= seconds + ROUNDING,
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
         f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
     )
-    push = Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))
     excess = shared.push_excess(push.force, push.torque)
     require(not excess, f"{where}: push: {excess}")
-    return push

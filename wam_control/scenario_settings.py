@@ -33,10 +33,10 @@ def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
         require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
         live = {field.name: field for field in fields(_parameter_class(where, node, shared)) if field.live}
         for name, value in flatten(values).items():
+            has = meant(name, live).strip() or f"it has: {', '.join(sorted(live)) or 'none'}"
             require(
                 name in live,
-                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {meant(name, live)}"
-                f"it has: {', '.join(sorted(live)) or 'none'}",
+                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {has}",
             )
             try:
                 yield Setting(node, name, checked(live[name], value))

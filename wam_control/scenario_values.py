@@ -1,6 +1,7 @@
 """Values of a scenario file, each refused with the step, the key and what is allowed."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 from wam_description.number_text import as_number
@@ -19,13 +20,14 @@ def known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) 
 
 def number(where: str, key: str, value: Any) -> float:
     """A finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not is_finite(value):
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number or not is_finite(value):
         raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number{as_number(value)}")
     return float(value)
 
 
 def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     """A list of finite numbers."""
-    if not isinstance(value, list) or len(value) != length:
+    if not isinstance(value, (list, tuple)) or len(value) != length:
         raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
     return tuple(number(where, key, element) for element in value)

@@ -94,6 +94,11 @@ class Configuration(NamedTuple):
         """The parameters of one node, from its section '/**/name'."""
         return self._build(self._section(name), cls)
 
+    def with_nodes(self, *entries: str) -> "Configuration":
+        """The same configuration with more nodes; one that it lists already is not added again."""
+        nodes = self.shared.nodes
+        return self.with_values({"nodes": [*nodes, *(entry for entry in entries if entry not in nodes)]})
+
     def with_values(self, values: Mapping[str, Any]) -> "Configuration":
         """The same configuration with some values replaced.
 

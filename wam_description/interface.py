@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from wam_description.arm import Shared
 from wam_description.defects import Check, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
-from wam_description.parameters import ParameterError
+from wam_description.parameters import ParameterError, meant
 from wam_description.signals import BASE
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
@@ -252,7 +252,10 @@ class Interface:
         for name, one in self.declarations.items():
             for topic in (*one.inputs, *one.outputs):
                 if topic not in self.topics and topic not in BY_NAME:
-                    raise ParameterError(f"node '{name}' names the topic '{topic}', which is in no table of topics")
+                    raise ParameterError(
+                        f"node '{name}' names the topic '{topic}', which is in no table of topics; "
+                        f"{meant(topic, self.topics)}topics = (Topic(...),) on the class adds one of your own"
+                    )
             for row in one.topics:
                 if self.topics.get(row.name) != row:
                     raise ParameterError(

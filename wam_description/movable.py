@@ -53,10 +53,11 @@ class FreeBodies:
 
     def __post_init__(self) -> None:
         three = ("sizes", "positions", "rotations")
-        _aligned("bodies", self.names, vars(self), three)
+        _aligned("world.bodies", self.names, vars(self), three)
+        known = ", ".join(BODY_SHAPES)
         for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
-            require(shape in BODY_SHAPES, f"{name}: bodies.shapes is '{shape}'; allowed: {', '.join(BODY_SHAPES)}")
-            _positive(name, f"bodies.sizes of a {shape}", self.sizes[3 * i : 3 * i + BODY_SHAPES[shape]])
+            require(shape in BODY_SHAPES, f"{name}: world.bodies.shapes is '{shape}'; allowed: {known}")
+            _positive(name, f"world.bodies.sizes of a {shape}", self.sizes[3 * i : 3 * i + BODY_SHAPES[shape]])
 
     @property
     def present(self) -> tuple[int, ...]:
@@ -103,13 +104,14 @@ class Doors:
     )
 
     def __post_init__(self) -> None:
-        _aligned("doors", self.names, vars(self), ("positions", "rotations", "sizes"))
+        _aligned("world.doors", self.names, vars(self), ("positions", "rotations", "sizes"))
         for i, name in enumerate(self.names):
-            _positive(name, "doors.sizes", self.sizes[3 * i : 3 * i + 3])
+            _positive(name, "world.doors.sizes", self.sizes[3 * i : 3 * i + 3])
             low, high = self.lower[i], self.upper[i]
             require(
                 low <= 0.0 <= high and low < high,
-                f"{name}: doors.lower is {low:g} rad, upper {high:g} rad; 0, the angle at power-up, must be between",
+                f"{name}: world.doors.lower is {low:g} rad, upper {high:g} rad; 0, the angle at power-up, must be "
+                "between",
             )
 
     @property
@@ -133,7 +135,7 @@ class Motions:
     begin: tuple[float, ...] = parameter("start, since power-up", "s", low=0.0, high=1e6, before=())
 
     def __post_init__(self) -> None:
-        _aligned("motions", self.obstacles, vars(self), ("amplitude",), "obstacles")
+        _aligned("world.motions", self.obstacles, vars(self), ("amplitude",), "obstacles")
 
     @property
     def present(self) -> tuple[int, ...]:

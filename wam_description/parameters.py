@@ -312,9 +312,10 @@ def lengths(group: str, names: tuple[str, ...], arrays: Mapping[str, tuple[Any, 
     arrays : arrays by the name of their field.
     """
     for name, array in arrays.items():
+        need = "1 name needs" if len(names) == 1 else f"{len(names)} names need"
         require(
             len(array) == width * len(names),
-            f"parameter '{group}.{name}' has {len(array)} values; {len(names)} names need {width * len(names)}",
+            f"parameter '{group}.{name}' has {len(array)} value{'s' * (len(array) != 1)}; {need} {width * len(names)}",
         )
 
 

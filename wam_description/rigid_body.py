@@ -48,6 +48,7 @@ class RigidBody:
     ----------
     covers : names of all.
     moving : names of the covers whose origin moves: that of the elbow, and of a wrist.
+    reach : distance from the base frame's origin, m, beyond which the tool comes in no posture.
     """
 
     def __init__(self, arm: Arm, mass_scale: Sequence[float] | None = None) -> None:
@@ -59,6 +60,9 @@ class RigidBody:
         self._frame = {name: self._model.getFrameId(name) for name in self.covers}
         self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
         self.moving = tuple(name for name in self.covers if self.moves(name, (0.0, 0.0, 0.0)))
+        tool = self._model.frames[self._tool].placement
+        parts = [placement.translation for placement in (*list(self._model.jointPlacements)[1:], tool)]
+        self.reach = math.fsum(math.hypot(*part.tolist()) for part in parts)
         self._starts_and_tool = [*(self._frame[name] for name in self.moving), self._tool]
 
     def cover_pose(self, q: ArrayLike, cover: str) -> Pose:

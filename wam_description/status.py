@@ -1,6 +1,6 @@
 """The status of a node as key-value pairs and back: the one place that knows the keys."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from wam_description.signals import Level, NodeStatus
 
@@ -8,7 +8,8 @@ REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
 AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
-REFUSED = "refused"  # fact: topics whose present command a node does not obey
+REACTION = "reaction"  # fact: the most serious one; where the message is more or less than its reason, each is a fact
+REFUSED = "refused"  # fact: topics whose present message a node does not take, separated by ', '
 ENABLED = "enabled"  # mode of the driver in which no brake holds
 DONE = "done"  # message of the scenario that was played to its end
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
@@ -23,6 +24,19 @@ def pairs(status: NodeStatus) -> list[tuple[str, str]]:
     numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
     found += [(key, str(value)) for key, value in numbers.items() if value]
     return [*found, *((key, str(value)) for key, value in status.facts.items())]
+
+
+def with_refused(status: NodeStatus, refused: Mapping[str, str]) -> NodeStatus:
+    """A status with messages that are refused before the node has them: why, by topic; none leaves it as it is."""
+    if not refused:
+        return status
+    reasons = "; ".join(dict.fromkeys(refused.values()))
+    message = reasons if status.level is Level.OK else f"{status.message}; {reasons}"
+    before = [topic for topic in status.facts.get(REFUSED, "").split(", ") if topic]
+    facts = {**status.facts, REFUSED: ", ".join(dict.fromkeys([*before, *refused]))}
+    if REACTION in facts and status.level is not Level.OK:
+        facts.setdefault(facts[REACTION], status.message)
+    return status._replace(level=max(status.level, Level.WARN), message=message, facts=facts)
 
 
 def diagnosed_name(namespace: str, node: str) -> str:

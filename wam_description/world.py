@@ -33,20 +33,20 @@ class Obstacles:
 
     def __post_init__(self) -> None:
         one = ("shapes", "stiffness", "damping", "hardening", "friction")
-        lengths("obstacles", self.names, {key: getattr(self, key) for key in one})
+        lengths("world.obstacles", self.names, {key: getattr(self, key) for key in one})
         three = ("positions", "rotations", "sizes")
-        lengths("obstacles", self.names, {key: getattr(self, key) for key in three}, width=3)
-        require("" not in self.names, "parameter 'obstacles.names' has an empty name; name every obstacle")
+        lengths("world.obstacles", self.names, {key: getattr(self, key) for key in three}, width=3)
+        require("" not in self.names, "parameter 'world.obstacles.names' has an empty name; name every obstacle")
         require(
             len(set(self.names)) == len(self.names),
-            f"parameter 'obstacles.names' has a duplicate name: {', '.join(self.names)}",
+            f"parameter 'world.obstacles.names' has a duplicate name: {', '.join(self.names)}",
         )
         for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
-            require(shape in SHAPES, f"{name}: obstacles.shapes is '{shape}'; allowed: {', '.join(SHAPES)}")
+            require(shape in SHAPES, f"{name}: world.obstacles.shapes is '{shape}'; allowed: {', '.join(SHAPES)}")
             needed = self.sizes[3 * i : 3 * i + SHAPES[shape]]
             require(
                 shape == "plane" or min(needed) > 0.0,
-                f"{name}: obstacles.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
+                f"{name}: world.obstacles.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
                 "each must be above 0",
             )
 
@@ -63,7 +63,7 @@ class Springs:
 
     def __post_init__(self) -> None:
         keys = ("stiffness", "lever", "rest", "bilateral")
-        lengths("springs", self.joints, {key: getattr(self, key) for key in keys})
+        lengths("world.springs", self.joints, {key: getattr(self, key) for key in keys})
 
 
 NO_SPRINGS = Springs((), (), (), (), ())
@@ -111,20 +111,21 @@ class Pushers:
 
     def __post_init__(self) -> None:
         single = {key: value for key, value in vars(self).items() if key not in ("names", "sizes")}
-        lengths("pushers", self.names, single)
-        lengths("pushers", self.names, {"sizes": self.sizes}, width=3)
+        lengths("world.pushers", self.names, single)
+        lengths("world.pushers", self.names, {"sizes": self.sizes}, width=3)
         require(
             "" not in self.names and len(set(self.names)) == len(self.names),
-            f"parameter 'pushers.names' is {', '.join(self.names)}; give each pusher a name of its own",
+            f"parameter 'world.pushers.names' is {', '.join(self.names)}; give each pusher a name of its own",
         )
         for i, name in enumerate(self.names):
             needed = self.sizes[3 * i : 3 * i + (1 if self.shapes[i] == "sphere" else 3)]
             require(
-                min(needed) > 0.0, f"{name}: pushers.sizes of a {self.shapes[i]} are {needed}; each must be above 0"
+                min(needed) > 0.0,
+                f"{name}: world.pushers.sizes of a {self.shapes[i]} are {needed}; each must be above 0",
             )
             require(
                 self.begin[i] + 2.0 * self.rise[i] <= self.end[i],
-                f"{name}: pushers.end is {self.end[i]:g} s; it must be at least twice the rise after "
+                f"{name}: world.pushers.end is {self.end[i]:g} s; it must be at least twice the rise after "
                 f"begin, {self.begin[i] + 2.0 * self.rise[i]:g} s",
             )
 
@@ -166,7 +167,7 @@ class World:
         for i, name in enumerate(self.motions.obstacles):
             require(
                 name in known or self.motions.frequency[i] == 0.0,
-                f"motions.obstacles names '{name}'; obstacles: {', '.join(known) or 'none'}",
+                f"world.motions.obstacles names '{name}'; obstacles: {', '.join(known) or 'none'}",
             )
         pushing = [name for name, force in zip(self.pushers.names, self.pushers.force, strict=True) if force > 0.0]
         bodies = [self.bodies.names[i] for i in self.bodies.present]

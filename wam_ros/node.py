@@ -34,7 +34,7 @@ from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
 
 REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
-OUT_OF_TIME = "out of time"  # on a loaded machine all topics are, at once
+OUT_OF_TIME = "out of time"  # on a loaded machine all topics of other nodes are, at once
 SLOW_STEP = 0.5  # s, from which a step is reported
 SLOW_STEP_REPORTS = 5.0  # s between two of these reports
 PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
@@ -61,6 +61,7 @@ class AdaptedNode(TolerantNode):
         self.node = declaration.make(shared, own)
         self._worked = 0  # stamp of the last step, ns
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
+        self._commands = {item.topic for item in declaration.taken if item.age == "command"}
         self._is_realtime = shared.timing.mode == "realtime"
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
@@ -142,7 +143,7 @@ class AdaptedNode(TolerantNode):
         try:
             complete = synchroniser.put(topic, stamp, value)
         except OutOfTime as reason:
-            raise Refused(str(reason), kind=OUT_OF_TIME) from None
+            raise Refused(str(reason), kind="" if topic in self._commands else OUT_OF_TIME) from None
         for inputs in complete:
             self._step(inputs, feed.work)
             if feed.essential and self._is_realtime:

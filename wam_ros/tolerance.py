@@ -149,7 +149,7 @@ class TolerantNode(Node):
         if isinstance(error, UnusableOutput):
             return error.what
         text = raised(error)
-        return f"unexpected {text}, at {what}; correct it, or report it with the log of node {self.get_name()}"
+        return f"unexpected {text}, after {what}; correct it, or report it with the log of node {self.get_name()}"
 
     def _look_for_end(self) -> None:
         """Report that the fault is over, when callbacks have gone well for a while."""

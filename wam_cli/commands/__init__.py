@@ -43,9 +43,9 @@ def namespace(text: str) -> str:
 
 
 def exit_code_of(unmet: Sequence[object]) -> int:
-    """Print the answers of a report that are NO, if there are any; the exit code."""
+    """Print what in a report is not as it should be, if anything; the exit code."""
     if unmet:
-        print(f"\nnot as it should be: {'; '.join(map(str, unmet))}")
+        print(f"\nnot as it should be: {'; '.join(str(one) for one in unmet)}")  # `map` is a command here
     return int(bool(unmet))
 
 

@@ -22,6 +22,7 @@ from wam_cli.commands import (
 from wam_cli.commands.demo_nodes import play
 from wam_control.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
+from wam_description.interface import Interface
 from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
@@ -69,7 +70,8 @@ def run(given: argparse.Namespace) -> int:
     bag = new_bag(directory / name)
     if task:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
-    configuration = base.with_values({"nodes": [*base.shared.nodes, "scenario", "recorder"], "recorder:name": name})
+    configuration = base.with_nodes("scenario", "recorder").with_values({"recorder:name": name})
+    Interface(configuration.shared)  # refused before anything is printed
     steps = report_task(configuration, bag, task.name if task else "")
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:
@@ -141,7 +143,7 @@ def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
 
     made = report(bag, bag / "demo.png")
-    return made.text, tuple(map(str, made.unmet))
+    return made.text, made.unmet
 
 
 def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:

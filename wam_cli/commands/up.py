@@ -59,7 +59,7 @@ def run(given: argparse.Namespace) -> int:
     die_with_parent()
     configuration = timed(configuration_of(given), given)
     extra = ["scenario"] * bool(given.scenario) + ["recorder"] * given.record
-    configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, *extra]})
+    configuration = configuration.with_nodes(*extra)
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
         load_for(configuration, given.scenario)  # refused before any node starts
