@@ -59,7 +59,7 @@ MOVING = [
         "posture": [0.0, -0.6, -0.1, 0.4],
         "push": {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.3, "end": 0.9},
     },
-    {"name": "brake", "seconds": 0.1, "request": "disable"},
+    {"name": "brake", "seconds": 0.1, "request": "disable", "set": {"force_loop": {"force_gain": [1e-3]}}},
 ]
 
 
@@ -114,7 +114,7 @@ def moving(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> R
     script.write_text(yaml.safe_dump({"steps": MOVING}))
     values = {
         "driver:effects.ripples.amplitude": [RIPPLE, 0.0, 0.0, 0.0],
-        "driver:amplifier.torque_ripple": [0.0] * 4,
+        "driver:amplifier.torque_ripple": [0.0, 0.01, 0.0, 0.0],
         "driver:sensors.encoder_noise": [2e-6] * 4,
         "driver:sensors.strain_noise": [0.02] * 4,
     }
@@ -236,6 +236,20 @@ def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
     assert found.note.startswith("24 cycles per turn")
 
 
+def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:
+    text = " ".join(section_of(moving, "happened").sentences)
+    gain = moving.configuration.sections["force_loop"]["force_gain"]
+    assert f"Changed while it ran: force_loop:force_gain from {gain} to [0.001] at 2.9" in text
+    assert text.count("Changed") == 1
+
+
+def test_the_ripple_of_an_amplifier_is_predicted_too(moving: Recorded) -> None:
+    found = moving.finding("motor2: largest ripple")
+    assert found.measured == pytest.approx(found.predicted, rel=0.15)
+    assert found.predicted > 1e-3
+    assert found.note.startswith("24 cycles per turn")
+
+
 def test_a_push_is_in_no_friction_and_no_ripple_where_only_gravity_is_known(moving: Recorded) -> None:
     def seen(*left_out: str) -> tuple[Section, Section]:
         topics = {name: one for name, one in moving.bag.topics.items() if not name.endswith((*LOADS, *left_out))}
@@ -332,20 +346,24 @@ def test_provenance_names_the_parameters_and_the_counts(moving: Recorded) -> Non
 # forces
 
 
-def pressed(touch: float, impact: float) -> Section:
-    """A press of 5 N from 1 s on, in contact from `touch` s on; its force swings to `impact` N for 0.04 s at first."""
+def pressed(touch: float, impact: float, before: float = 1.0, known: bool = True) -> Section:
+    """A press of 5 N from 1 s on, in contact from `touch` s on; its force swings to `impact` N for 0.04 s at first.
+
+    Until 1 s the contact has `before` N, which are measured where they are `known`.
+    """
     stamps = np.arange(0, 4_000_000_000, 5_000_000)
     time = stamps / 1e9
     commanded = np.where(time >= 1.0, -5.0, 0.0)
     since = time - max(touch, 1.0)
     pressing = 5.0 * np.clip(since / 0.01, 0.2, 1.0) + (impact - 5.0) * np.sin(np.pi * np.clip(since / 0.04, 0.0, 1.0))
-    force = -np.where(since >= 0.0, pressing, np.where(time >= touch, 1.0, 0.0))
+    force = -np.where(since >= 0.0, pressing, np.where(time >= touch, before, 0.0))
+    measured = np.where((since >= 0.0) | known, force, 0.0)
 
     def wrench(force_y: Any) -> WrenchColumns:
         forces = np.column_stack([0.0 * time, force_y, 0.0 * time])
         return WrenchColumns(stamps, stamps, ("outer_link",) * len(time), forces, np.zeros_like(forces))
 
-    columns = {"force_command": commanded, "force_measured": force, "sim/contact/wrench": -force}
+    columns = {"force_command": commanded, "force_measured": measured, "sim/contact/wrench": -force}
     topics: dict[str, Any] = {f"/wam/{name}": wrench(force_y) for name, force_y in columns.items()}
     analysis = analyse_bag(Bag(Path("made"), topics, {}, {}, {}), lambda doing: None)
     return next(section for section in analysis.sections if section.key == "force")
@@ -376,6 +394,17 @@ def test_a_press_in_a_contact_that_was_there_has_its_overshoot() -> None:
     assert 0.005 <= rise.error < 0.02, "a sample at least"
     assert rise._replace(measured=0.13, predicted=0.0418).deviates
     assert not rise._replace(measured=0.05, predicted=0.0418).deviates
+
+
+def test_a_press_that_begins_in_a_contact_of_which_nothing_was_measured_has_no_rise_and_no_overshoot() -> None:
+    section = pressed(0.2, 11.0, before=90.0, known=False)
+    found = {finding.name.partition(": ")[2]: finding for finding in section.findings}
+    (said,) = [sentence for sentence in section.sentences if "commanded on" in sentence]
+    assert "it began in a contact of 90 N, which is why rise and overshoot are left out, settled to 5 %" in said
+    for name in ("overshoot", "rise time 10-90 %"):
+        assert math.isnan(found[name].measured)
+        assert "began in a contact of 90 N" in found[name].note
+    assert math.isfinite(found["settling time to 5 %"].measured)
 
 
 @pytest.mark.slow
@@ -517,9 +546,10 @@ def test_any_one_topic_alone_is_enough_to_say_something(moving: Recorded) -> Non
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_a_clock_that_was_reset_does_not_spoil_the_friction(moving: Recorded) -> None:
+def test_a_clock_that_was_set_back_does_not_spoil_the_friction(moving: Recorded) -> None:
     def twice(columns: Any) -> Any:
-        return type(columns)(*(np.concatenate([c, c]) if isinstance(c, np.ndarray) else c for c in columns))
+        again = columns.stamp_ns > 2_500_000_000  # by more than 1 s, it would be another run
+        return type(columns)(*(np.concatenate([c, c[again]]) if isinstance(c, np.ndarray) else c for c in columns))
 
     topics = {
         name: twice(columns) if hasattr(columns, "stamp_ns") and not isinstance(columns, TableColumns) else columns

@@ -114,6 +114,15 @@ def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
     assert "there is no format '.foo'; give a .png" in err
 
 
+def test_nodes_that_do_not_fit_are_refused_before_the_demonstration_is_announced(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = said(capsys, "demo", "--set", "nodes=[driver, gravity, gravity]")
+    assert (code, out) == (1, "")
+    assert "two nodes of the configuration are named 'gravity'; list one of them" in err
+
+
 def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -1379,6 +1379,39 @@ def test_box_has_six_faces_that_look_outwards():
         assert face.normal @ outwards == pytest.approx(np.linalg.norm(outwards))
 
 
+def with_outcome(folder, *statuses: tuple[str, str, int]):
+    """A bag on disk with these statuses alone: node, message, level; one a second."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
+    kind = "diagnostic_msgs/msg/DiagnosticStatus"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/wam/status", kind, typestore=store)
+        for stamp, (node, text, level) in enumerate(statuses, 1):
+            facts = {"stamp": str(stamp * 10**9), **({"fault": text} if level and node == "driver" else {})}
+            values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
+            message = kinds["DiagnosticStatus"](level, node, text, "", values)
+            writer.write(connection, stamp, store.serialize_cdr(message, kind))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("last", "failure"),
+    [
+        (("scenario", "done", 0), ""),
+        (("scenario", "step 'lower': no contact of 1.5 N detected within 0.7 s", 2), "step 'lower': no contact"),
+        (("driver", "speed of joint4 is above its limit", 2), "speed of joint4"),
+        (("driver", "enabled", 0), ""),  # the recording ends before the scenario does
+    ],
+)
+def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys, last, failure):
+    bag = with_outcome(tmp_path / "bag", ("scenario", "lower", 0), last)
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(bag)])
+    assert ended.value.code == int(bool(failure))
+    assert ("not as it should be" in capsys.readouterr().out) is bool(failure)
+    assert [one.partition(failure)[:2] for one in report(bag).unmet] == [("FAILED: ", failure)] * bool(failure)
+
+
 def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
@@ -1412,7 +1445,8 @@ def test_a_recording_of_something_else_is_refused_and_nothing_is_written_into_it
     said = capsys.readouterr()
     assert said.out == ""
     assert "is not a recording of the demonstration" in said.err
-    assert f"its topics: /chat. 'wam analyse {tmp_path}/bag'" in said.err
+    assert f"no step of a scenario; 'wam analyse {tmp_path}/bag' analyses any recording" in said.err
+    assert "/chat" not in said.err, "a recording of the stack has 37 topics, which would hide the hint"
     assert sorted((tmp_path / "bag").iterdir()) == before
 
 

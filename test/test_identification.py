@@ -11,7 +11,7 @@ import pytest
 from arms import CONFIGURATION, NOWHERE, WAM, changed
 from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import STORE, joint_state
+from test_bag import STORE, joint_state, wrench
 
 from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.fit import Identification, identify
@@ -300,15 +300,20 @@ def test_states_that_are_missing_or_braked_are_not_used() -> None:
 def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_have(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Who pushes motor1 along its motion, by more than its friction, takes the friction below zero."""
+    """Who pushes motor1 along its motion, by more than its friction, takes the friction below zero.
+
+    What the bag states of pushes is a warning, also where the model is possible.
+    """
     planted = Planted(14.0, 5)
     pushed = planted.torque - [0.3, 0.0, 0.0, 0.0] * np.sign(np.gradient(planted.theta, axis=0))
     bag, model, names = tmp_path / "bag", tmp_path / "model.yaml", [f"motor{i}" for i in (1, 2, 3, 4)]
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topic = writer.add_connection("/wam/motor_states", "sensor_msgs/msg/JointState", typestore=STORE)
+        push = writer.add_connection("/wam/sim/disturbance", "geometry_msgs/msg/WrenchStamped", typestore=STORE)
         for time, theta, torque in zip(planted.time, planted.theta.tolist(), pushed.tolist(), strict=True):
             stamp = round(1e9 * time)
             writer.write(topic, stamp, joint_state(stamp, names, theta, [0.0] * 4, torque))
+            writer.write(push, stamp, wrench(stamp, "inner_link", 0.0, 3.0 * (time > 7.0), 0.0, 0.0, 0.0, 0.0))
     with pytest.raises(SystemExit) as ended:
         main(["identify", str(bag), "--write", str(model)])
     assert ended.value.code == 1
@@ -316,6 +321,7 @@ def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_h
     printed = capsys.readouterr()
     impossible = r"'model\.motors\.coulomb_\w+' is -0\.\d+ N m; allowed: 0 to 100\. .*without contact"
     assert re.search(impossible, printed.err)
+    assert "warning: the simulator pushed the arm in 50 % of the recording" in printed.out
     first, *_ = printed.out.splitlines()  # before the report
     assert first.startswith("NOT POSSIBLE: ")
     assert re.search(impossible, first)

@@ -22,7 +22,7 @@ from wam_bag.bag import BagError, read
 from wam_control.reaction_status import REFUSAL
 from wam_description.status import DONE
 from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
-from wam_sim.recording import recorded_run
+from wam_sim.recording import RecordedRun, recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
@@ -62,10 +62,13 @@ class VerdictAnswer(NamedTuple):
 
 
 class DemoReport(NamedTuple):
-    """The report as text, at most 100 columns wide, and those answers of the verdict that are no."""
+    """The report as text, at most 100 columns wide, and what is not as it should be.
+
+    These are a failure of the run, and those answers of the verdict that are no.
+    """
 
     text: str
-    unmet: tuple[VerdictAnswer, ...]
+    unmet: tuple[str, ...]
 
 
 def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
@@ -87,8 +90,8 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
     summary = summary_of(run)
     if not summary.steps:
         raise BagError(
-            f"{bag} is not a recording of the demonstration: it has no step of a scenario; its topics: "
-            f"{', '.join(run.bag.counts) or 'none'}. 'wam analyse {bag}' analyses any recording"
+            f"{bag} is not a recording of the demonstration: it has no step of a scenario; 'wam analyse {bag}' "
+            f"analyses any recording, 'wam bag info {bag}' lists its topics"
         )
     notes: tuple[str, ...] = ()
     if picture is not None:
@@ -97,8 +100,16 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
         except OSError as error:
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
-    unmet = tuple(answer for answer in verdict(summary) if answer.result is VerdictResult.NO)
-    return DemoReport("\n".join([text(summary, notes), "", *files]), unmet)
+    wrong = [str(answer) for answer in verdict(summary) if answer.result is VerdictResult.NO]
+    failed = [f"FAILED: {failure}" for failure in [_failure(run)] if failure]
+    return DemoReport("\n".join([text(summary, notes), "", *files]), (*failed, *wrong))
+
+
+def _failure(run: RecordedRun) -> str:
+    """Why a run failed, '' where it did not or the recording ends before the scenario does, without a fault."""
+    if run.outcome:
+        return "" if run.outcome == DONE else run.outcome
+    return run.faults[-1].reason if run.faults else ""
 
 
 def reaction_report(bag: Path) -> str:
@@ -187,11 +198,11 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
             found -= {REFUSAL}  # that of a force has its own answer
         outcomes.update(found)
     counts = [f"{outcomes[one]} {one}" for one in OUTCOMES if outcomes[one]]
-    brief = len(unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_time))
+    brief = unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_times)
     if not counts and not brief:
         return []
     result = VerdictResult.NO if counts else VerdictResult.NOTHING
-    remark = f"{brief} {too_short(summary.settling_time)}" * bool(brief)
+    remark = f"{len(brief)} {too_short(summary.settling_times, brief)}" * bool(brief)
     return [VerdictAnswer("commands carried out", result, ", ".join(counts), remark)]
 
 

@@ -24,8 +24,9 @@ from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
+from wam_control.scenario import FORCE_LOOP
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
-from wam_sim.reactions import STEADY, RecordedReaction, steady_begin, watched_times, within
+from wam_sim.reactions import SETTLING_TIME, STEADY, RecordedReaction, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
@@ -107,7 +108,7 @@ class DemoSummary(NamedTuple):
     period : time between two instants of the traces, s.
     tasks : forces that tasks command.
     torques : begin and end of each time in which a task commands the same joint torques and motions, ns.
-    settling_time : of the force loop, s; NaN where it was not recorded.
+    settling_times : of the force loop, s, and since when it had each, ns; NaN where it was not recorded.
     contacts : all that were estimated.
     missed : true contacts that were not.
     unplanned : contacts without a command of a force, harder than allowed.
@@ -129,7 +130,7 @@ class DemoSummary(NamedTuple):
     traces: Traces
     tasks: tuple[TaskForce, ...]
     torques: tuple[tuple[int, int], ...]
-    settling_time: float
+    settling_times: tuple[tuple[int, float], ...]
     presses: tuple[SteadyPress, ...]
     touches: tuple[StepContact, ...]
     contacts: tuple[ListedContact, ...]
@@ -165,20 +166,21 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         notes.append(run.others)
     if not steps:
         notes.append("no step of a scenario was recorded (status of node scenario)")
-    missing = [name for name in RECORDED if not _length(run, name)]
+    refused = {one.topic for one in run.refused}
+    missing = [name for name in RECORDED if name not in refused and not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
     reactions = tuple(_with_forces(one, traces) for one in run.reactions(_end(traces, steps)))
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     certainty = certainty_of(run, traces)
-    refused = {press.step for press in presses if press.is_refused}
+    held = {press.step for press in presses if press.is_refused}
     blind = _blind(run, traces)
     if np.any(blind & traces.true.acts):
         notes.append(
             "contacts under the brakes are not compared: the motors, which alone are observed, sense none then"
         )
     seen = traces._replace(true=traces.true.unknown(blind), push=traces.push.unknown(blind))
-    touches = compared_contacts(seen, certainty, steps, refused)
+    touches = compared_contacts(seen, certainty, steps, held)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
@@ -192,7 +194,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         traces=traces,
         tasks=tuple(tasks),
         torques=tuple(watched_times(tasks_of(run), without_forces=True)),
-        settling_time=_settling_time(run),
+        settling_times=_settling_times(run),
         presses=presses,
         touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
@@ -209,7 +211,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         gone=lost.gone,
         lost=(*lost.sentences(bag.first_ns), *(gap.sentence(traces.zero) for gap in gaps)),
         moment=_moment(run, traces, presses),
-        notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
+        notes=(*notes, *(one.sentence for one in run.refused), *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
 
 
@@ -227,11 +229,16 @@ def _blind(run: RecordedRun, traces: Traces) -> Mask:
     return blind
 
 
-def _settling_time(run: RecordedRun) -> float:
+def _settling_times(run: RecordedRun) -> tuple[tuple[int, float], ...]:
+    """Those of the force loop, s, and since when it had each, ns: of its parameters, and changed while it ran."""
+    key = f"{FORCE_LOOP}:{SETTLING_TIME}"
     try:
-        return float(run.parameters.node("force_loop").get("limits.settling_time", NAN))
+        first = run.parameters.node(FORCE_LOOP).get(SETTLING_TIME, NAN)
     except BagError:
-        return NAN
+        first = NAN
+    changes = [(since, values[key]) for since, values in run.live_values(FORCE_LOOP) if key in values]
+    known = (int, float)
+    return tuple((since, float(value) if isinstance(value, known) else NAN) for since, value in [(0, first), *changes])
 
 
 def _length(run: RecordedRun, topic: str) -> int:

@@ -1,6 +1,7 @@
 """The arm and its controllers as they were when a bag was recorded, built from the parameters in the bag."""
 
-from typing import NamedTuple, TypeVar
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
 
 from wam_bag.bag import BagError
 from wam_control.force_loop_parameters import ForceLoopParameters
@@ -29,6 +30,7 @@ class PredictionParameters(NamedTuple):
     ----------
     springs : under the joints.
     effects : of the simulated transmission.
+    commutation : torque ripple of each simulated motor as a fraction of its torque, and its cycles per turn.
     force_loop : gains and limits.
     servo : gains of the velocity loop.
     note : why parts are missing, '' if none is.
@@ -39,6 +41,7 @@ class PredictionParameters(NamedTuple):
     springs: Springs
     timing: Timing | None
     effects: Effects | None
+    commutation: tuple[tuple[float, int], ...]
     force_loop: ForceLoopParameters | None
     servo: Servo | None
     note: str
@@ -61,10 +64,17 @@ def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
         springs=part(Springs, "driver", "world.springs.") or NO_SPRINGS,
         timing=part(Timing, "driver", "timing."),
         effects=part(Effects, "driver", "effects."),
+        commutation=_commutation(recorded.nodes.get("driver", {})),
         force_loop=part(ForceLoopParameters, "force_loop"),
         servo=part(Servo, "velocity_loop", "servo."),
         note="; ".join(notes),
     )
+
+
+def _commutation(driver: Mapping[str, Any]) -> tuple[tuple[float, int], ...]:
+    """Of the recorded values of the driver; none of a driver that simulates no amplifiers."""
+    fractions, cycles = (driver.get(f"amplifier.{name}", ()) for name in ("torque_ripple", "ripple_cycles"))
+    return tuple(zip(fractions, cycles, strict=False))
 
 
 def recorded_arm(recorded: RecordedParameters) -> RecordedArm:

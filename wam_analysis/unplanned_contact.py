@@ -10,6 +10,7 @@ from wam_analysis.demo_traces import NAN, Mask, Numbers, Times, Traces
 from wam_analysis.held_messages import held_rows
 from wam_bag.bag import BagError, TableColumns
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.scenario import FORCE_LOOP
 from wam_sim.recording import RecordedRun, RecordedStep
 
 AFTER = 100_000_000  # ns, for which the force of a push or a press may last after its command
@@ -72,7 +73,7 @@ def unplanned_contacts(
     found: list[HardContact] = []
     unknown: list[str] = []
     everywhere = _lacking(run)
-    is_planned, allowed = _planned(run, traces), _allowed(run, traces, steps)
+    is_planned, allowed = _planned(run, traces), _allowed(run, traces)
     for name, begin, end in _parts(traces, steps):
         rows = begin + np.flatnonzero(~is_planned[begin:end])
         source, signal = "true", traces.true
@@ -120,16 +121,14 @@ def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int
     return list(zip(names, [0, *bounds], [*bounds, len(traces.stamp)], strict=True))
 
 
-def _allowed(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> Numbers:
+def _allowed(run: RecordedRun, traces: Traces) -> Numbers:
     """The largest force that the configuration allows at each instant, (k,), N; NaN where it cannot be read."""
-    changes = [(step.begin, step.settings) for step in steps]
-    changes += [(change.after, change.settings) for change in run.changes("force_loop")]
     allowed = np.full(len(traces.stamp), NAN)
     parameters = run.parameters
-    for begin, settings in [(0, {}), *sorted(changes, key=lambda change: change[0])]:
+    for begin, settings in [(0, {}), *run.live_values(FORCE_LOOP)]:
         parameters = parameters.with_values(settings)
         try:
-            limit = parameters.part("force_loop", ForceLoopParameters).limits.contact_force
+            limit = parameters.part(FORCE_LOOP, ForceLoopParameters).limits.contact_force
         except BagError:
             limit = NAN
         allowed[traces.stamp >= begin] = limit

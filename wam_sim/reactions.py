@@ -1,5 +1,6 @@
 """What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
@@ -9,6 +10,7 @@ from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, watched_axes
 
 FAULT = "fault"
+SETTLING_TIME = "limits.settling_time"
 NUMBERS = re.compile(r"[-+\d.]+")
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
 OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
@@ -148,15 +150,30 @@ def unassessed(
     reactions: Sequence[RecordedReaction],
     times: Sequence[tuple[int, int]],
     steps: Sequence[Step],
-    settling_time: float,
+    settling_times: Sequence[tuple[int, float]],
 ) -> list[Step]:
-    """The steps of whose command nothing is reported because it lasts too briefly; arguments as of `is_too_short`."""
-    return [one for one in steps if is_too_short(times, one, settling_time) and not unmet(reactions, one)]
+    """The steps of whose command nothing is reported because it lasts too briefly; arguments as of `is_too_short`.
+
+    `settling_times`: since when, ns, the force loop has each, s, in order of time.
+    """
+    return [
+        one
+        for one in steps
+        if is_too_short(times, one, settling_time_in(settling_times, one)) and not unmet(reactions, one)
+    ]
 
 
-def too_short(settling_time: float) -> str:
-    """What `is_too_short` means, in words."""
-    limit = f"limits.settling_time, {settling_time:g} s"
+def settling_time_in(settling_times: Sequence[tuple[int, float]], step: StepSpan) -> float:
+    """The largest settling time, s, that was in force during a step; NaN where it is not known."""
+    before = [seconds for since, seconds in settling_times if since <= step.begin]
+    during = [seconds for since, seconds in settling_times if step.begin < since < step.end]
+    return max([*before[-1:], *during], default=math.nan)
+
+
+def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepSpan]) -> str:
+    """What `unassessed` means of the steps that it gives, in words."""
+    values = dict.fromkeys(settling_time_in(settling_times, one) for one in steps)
+    limit = f"{SETTLING_TIME}, {' or '.join(f'{seconds:g}' for seconds in values)} s"
     return f"not assessed: force, torque or motion of a task commanded for no longer than {limit}"
 
 

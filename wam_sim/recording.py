@@ -9,14 +9,16 @@ from typing import Any, NamedTuple
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
-from wam_control.reaction_status import stated
+from wam_control.reaction_status import CONTACT_FORCE, stated
 from wam_control.scenario import FORCE_LOOP
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
-from wam_description.status import CHANGES, DONE, parse
+from wam_description.status import CHANGES, DONE, ENABLED, parse
 from wam_description.topics import TOPICS
 from wam_sim.reactions import FAULT, RecordedReaction, lasting
+from wam_sim.recorded_commands import RefusedCommands, taken_commands
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
+from wam_sim.several_runs import several_runs
 
 
 class RecordedStep(NamedTuple):
@@ -48,6 +50,7 @@ class RecordedRun(NamedTuple):
 
     Attributes
     ----------
+    bag : with the commands that the stack took, see `wam_sim.recorded_commands`.
     namespace : of the arm, as '/wam'.
     arms : namespaces of all arms in the bag.
     parameters : of the arm's nodes.
@@ -57,6 +60,7 @@ class RecordedRun(NamedTuple):
     outcome : DONE, why the scenario failed, or '' if the recording ended before.
     faults : of the driver, each once.
     mode : 'lockstep', 'realtime' or 'unknown'.
+    refused : commands that are left out of the bag.
     """
 
     bag: Bag
@@ -69,6 +73,7 @@ class RecordedRun(NamedTuple):
     outcome: str
     faults: tuple[RecordedFault, ...]
     mode: str
+    refused: tuple[RefusedCommands, ...] = ()
 
     def __repr__(self) -> str:
         return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
@@ -103,6 +108,13 @@ class RecordedRun(NamedTuple):
                 found.append(RecordedChange(status.stamp, _settings(status), int(number[:9])))
         return found
 
+    def live_values(self, *nodes: str) -> list[tuple[int, Mapping[str, Any]]]:
+        """Live parameters by 'node:parameter' and when they were set, ns, in order: by steps, and by these nodes."""
+        steps = [*self.steps, *([self.unfinished] if self.unfinished else [])]
+        found = [(step.begin, step.settings) for step in steps]
+        found += [(change.after, change.settings) for node in nodes for change in self.changes(node)]
+        return sorted(found, key=lambda one: one[0])
+
     def stamped_statuses(self) -> list[tuple[int, NodeStatus]]:
         """Each status and when it was published, ns; where it has no stamp, the newest one that was recorded before it.
 
@@ -124,12 +136,21 @@ class RecordedRun(NamedTuple):
         ]
 
     def reactions(self, end: int) -> tuple[RecordedReaction, ...]:
-        """What the force loop and the driver did up to an end, ns, instead of what was commanded; in order of time."""
+        """What the force loop and the driver did up to an end, ns, instead of what was commanded; in order of time.
+
+        A push that begins under the brakes is none: they stop the arm with a force that looks like one.
+        """
         found = self.stamped_statuses()
         loop = [(stamp, stated(status)) for stamp, status in found if status.node == FORCE_LOOP]
         driver = [(stamp, status.fault) for stamp, status in found if status.node == "driver"]
         faults = [(stamp, {FAULT: fault} if fault else {}) for stamp, fault in driver]
-        return tuple(sorted((*lasting(loop, end), *lasting(faults, end))))
+        modes = sorted((stamp, status.mode) for stamp, status in found if status.node == "driver" and status.mode)
+
+        def is_braked(stamp: int) -> bool:
+            return next((mode for since, mode in reversed(modes) if since <= stamp), ENABLED) != ENABLED
+
+        pushed = [one for one in lasting(loop, end) if one.name != CONTACT_FORCE or not is_braked(one.begin)]
+        return tuple(sorted((*pushed, *lasting(faults, end))))
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
@@ -162,7 +183,7 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
     Raises
     ------
     BagError
-        if the bag has no such arm.
+        if the bag has no such arm, or several runs of it.
     """
     found, arms = namespaces(bag)
     chosen = f"/{namespace.strip('/')}" if namespace else found
@@ -171,6 +192,12 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
     namespace = chosen
     parameters = recorded_parameters(bag, namespace)
     statuses = tuple(status_of(message) for message in messages_of(bag, f"{namespace}/status"))
+    if namespace in arms and (several := several_runs(bag, namespace)):
+        raise BagError(
+            f"{bag.path}: {several}; a recorder that goes on while the stack is started again mixes them, and they are "
+            "not evaluated together: record each run in a bag of its own"
+        )
+    bag, refused = taken_commands(bag, namespace, parameters)
     commands = bag.topics.get(f"{namespace}/force_command")
     last = int(commands.stamp_ns[-1]) if isinstance(commands, WrenchColumns) and len(commands.stamp_ns) else 0
     steps, unfinished, outcome = _steps(statuses, last)
@@ -186,6 +213,7 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
         outcome,
         tuple(faults),
         mode_of(bag.metadata, bag.attachments.get(ATTACHMENT)),
+        refused,
     )
 
 

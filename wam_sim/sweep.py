@@ -20,6 +20,7 @@ from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
 from wam_sim.reactions import (
     BRIEF,
+    SETTLING_TIME,
     STEADY,
     PlayedStep,
     RecordedReaction,
@@ -185,10 +186,16 @@ def _unassessed(
     """Steps whose task commands a force, a torque or a motion too briefly to be assessed; '' where none was."""
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
-    settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
+    settling = [(0, configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time)]
+    settling += [
+        (one.begin, setting.value)
+        for one in played
+        for setting in one.step.settings
+        if (setting.node, setting.name) == (FORCE_LOOP, SETTLING_TIME) and isinstance(setting.value, (int, float))
+    ]
     times = watched_times((one.step.task, one.begin, one.end) for one in played)
     brief = unassessed(reactions, times, played, settling)
-    return f"{', '.join(one.name for one in brief)}: {too_short(settling)}" if brief else ""
+    return f"{', '.join(one.name for one in brief)}: {too_short(settling, brief)}" if brief else ""
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:

@@ -83,10 +83,12 @@ class AnalysedRun(NamedTuple):
 
     def lacking(self, *names: str) -> tuple[str, ...]:
         """Those of some topics that were not recorded."""
+        refused = {one.topic for one in self.run.refused}
         return tuple(
             name
             for name in names
-            if not ((columns := self.bag.topics.get(f"{self.namespace}/{name}")) and len(columns.log_time_ns))
+            if name not in refused
+            and not ((columns := self.bag.topics.get(f"{self.namespace}/{name}")) and len(columns.log_time_ns))
         )
 
     @property

@@ -23,7 +23,9 @@ from wam_bag.bag import Bag, BagError, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.status import DONE
+from wam_sim.recording import RecordedRun
 
+MOST_CHANGES = 4  # of parameters that are named
 LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
 
@@ -130,7 +132,7 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     motion = motion_sections(recording)
     progress("timing")
     prefix = f"{recording.namespace}/"
-    duration = extent({name: topic for name, topic in bag.topics.items() if name.startswith(prefix)})
+    duration = extent({name: topic for name, topic in recording.bag.topics.items() if name.startswith(prefix)})
     sections = (_happened(recording, duration), *middle, *motion.sections, timing_section(recording))
     return Analysis(recording, held, motion, duration, provenance(recording), (_verdict(sections), *sections))
 
@@ -154,15 +156,18 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     if recording.holds:
         forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
         sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
+    sentences += [f"{one.sentence}." for one in recording.run.refused]
     sentences += _touched(summary.traces)
     faults = driver_faults(recording.run, summary.traces.zero)
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
+    sentences += _changed(recording.run, summary.traces.zero)
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
     others = [f"{recording.run.others[0].upper()}{recording.run.others[1:]}."] if recording.run.others else []
     verdict = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
+    verdict += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
     verdict += [f"STOPPED: {fault}." for fault in faults]
     if summary.steps and summary.outcome != DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")
@@ -179,6 +184,24 @@ def _touched(traces: Traces) -> Iterator[str]:
             number = len(contacts_by_link(traces.stamp, signal))
             yield f"{touched} {times(number)}." if number else never
             return
+
+
+def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
+    """The live parameters that were changed while the arm ran, each to its first other value; zero is in ns."""
+    found: dict[str, str] = {}
+    for stamp, values in run.live_values(*run.parameters.nodes):
+        for key, value in values.items():
+            node, _, name = key.partition(":")
+            before = run.parameters.nodes.get(node, {}).get(name)
+            if before not in (None, value):
+                found.setdefault(key, f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s")
+    if found:
+        named = list(found.values())
+        more = f" and {len(named) - MOST_CHANGES} more" * (len(named) > MOST_CHANGES)
+        yield (
+            f"Changed while it ran: {', '.join(named[:MOST_CHANGES])}{more}. "
+            "Predictions and domains of gains are for the values at the start."
+        )
 
 
 def _brief(note: str) -> str:

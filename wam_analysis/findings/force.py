@@ -73,12 +73,12 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 
 def _command_verdict(summary: DemoSummary) -> list[str]:
     """Steps whose command was not reached in the end, and those that are too short to assess, in a sentence each."""
-    reactions, steps, settling = summary.reactions, summary.steps, summary.settling_time
+    reactions, steps, settling = summary.reactions, summary.steps, summary.settling_times
     found = [(step.name, {one.outcome for one in unmet(reactions, step)}) for step in steps]
     named = {what: "; ".join(name for name, outcomes in found if what in outcomes) for what in (TOO_MUCH, UNREACHED)}
-    brief = [step.name for step in unassessed(reactions, summary.torques, steps, settling)]
+    brief = unassessed(reactions, summary.torques, steps, settling)
     verdict = [f"{what.upper()} in the end: {names}." for what, names in named.items() if names]
-    return [*verdict, *([f"{'; '.join(brief)}: {too_short(settling)}."] if brief else [])]
+    return [*verdict, *([f"{'; '.join(step.name for step in brief)}: {too_short(settling, brief)}."] if brief else [])]
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
@@ -152,14 +152,21 @@ def _press_sentence(one: HeldForce) -> str:
         sentences = [f"settled to 5 % after {shown(response.settling, 's')}"]
         if not math.isfinite(response.settling):
             sentences = ["did not settle to 5 %"]
-        if math.isfinite(one.touched):
+        if impact := _impact(one):
             sentences[0] += " from there" if one.touched > 0.0 and math.isfinite(response.settling) else ""
-            sentences.insert(0, f"{_touched(one)}, which is why rise and overshoot are left out")
+            sentences.insert(0, f"{impact}, which is why rise and overshoot are left out")
         else:
             sentences.insert(0, f"rose in {shown(response.rise, 's')}")
             sentences += [f"overshot by {100.0 * response.overshoot:.0f} %"] if response.overshoot > 0.01 else []
         text += f"; it {', '.join(sentences)}"
     return text + ("; the arm was pushed meanwhile." if hold.disturbed else ".")
+
+
+def _impact(one: HeldForce) -> str:
+    """Why rise and overshoot of a press are not those of the control, '' where they are."""
+    if one.before:
+        return f"began in a contact of {shown(one.before, 'N')}"
+    return _touched(one) if math.isfinite(one.touched) else ""
 
 
 def _touched(one: HeldForce) -> str:
@@ -182,9 +189,9 @@ def _press_findings(one: HeldForce) -> list[Finding]:
         rise, note = math.nan, ""
     if response is not None:
         rose, late, over, why = response.rise, response.rise_error, 100.0 * response.overshoot, ""
-        if math.isfinite(one.touched):
+        if impact := _impact(one):
             rose = late = over = math.nan
-            why = f"not measured: it {_touched(one)}"
+            why = f"not measured: it {impact}"
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
             Finding(f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note))), late),

@@ -32,6 +32,7 @@ BAND = 0.05  # of the step: settled within it
 LOUD = 0.1  # of the force: an error that stays within it has settled
 LEAST_STEP = 0.1  # of the force; a smaller change is not evaluated as a step
 FRESH = 0.2  # s; the force of a more recent contact is that of the impact
+FAR = 0.5  # of a force: where the loop measured less by that of what acted before a command, it had no measurement
 FEW = 20  # samples below which a signal is not evaluated
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
@@ -47,6 +48,8 @@ class HeldForce(NamedTuple):
     response : of the measured force; None if there is no step.
     touched : start of the contact, s from the start, at most FRESH before it; NaN if the contact began earlier or is
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
+    before : force of the contact in which the hold began and of which the loop had no measurement yet, N, as where no
+        force was commanded until then; 0 where there is none.  Rise and overshoot are those of the measurement.
     measured_accuracy, true_accuracy : in the steady part.
     cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
     stability : of the error.
@@ -64,6 +67,7 @@ class HeldForce(NamedTuple):
     true: Numbers
     response: StepResponse | None = None
     touched: float = math.nan
+    before: float = 0.0
     measured_accuracy: ForceAccuracy = UNMEASURED
     true_accuracy: ForceAccuracy = UNMEASURED
     cycle: LimitCycle = NO_CYCLE
@@ -121,6 +125,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         true=true,
         response=response,
         touched=touched,
+        before=_before(recording, hold, measured),
         measured_accuracy=_accuracy(hold, measured[late]),
         true_accuracy=_accuracy(hold, true[late_true]),
         cycle=_cycle(time_true[swings_true], true[swings_true], dither)
@@ -191,6 +196,19 @@ def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
         begin = float(traces.stamp[free[-1] + 1] - hold.begin) / 1e9
         return begin if begin > -FRESH else math.nan
     return math.nan
+
+
+def _before(recording: AnalysedRun, hold: Hold, measured: Numbers) -> float:
+    """Force of the contact in which a hold began, by the simulator, else by the estimate; see `HeldForce`."""
+    traces = recording.summary.traces
+    row = int(np.searchsorted(traces.stamp, hold.begin)) - 1
+    for signal in (traces.true, traces.estimated):
+        if row >= 0 and len(measured) and signal.is_known[row]:
+            is_there = signal.acts[row] and signal.frame[row] in (hold.cover or hold.frame, BASE)
+            force = float(signal.size[row]) if is_there or hold.frame == BASE else 0.0
+            known = float(traces.measured.size[row] if traces.measured.is_known[row] else abs(measured[0]))
+            return force if force - known > FAR * max(force, hold.commanded) else 0.0
+    return 0.0
 
 
 def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:

@@ -1,5 +1,6 @@
 """Sections about the transmission: stick and slip, friction, ripple."""
 
+import cmath
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, Transmiss
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
+from wam_analysis.recorded import PredictionParameters
 from wam_description.arm import Arm
 from wam_description.effects import Effects
 
@@ -66,7 +68,7 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
     sections = (
         stick,
         _friction_section(recording, arm, signals, friction, joints),
-        _ripple_section(signals.load_from, ripple, friction, recording.parameters.effects),
+        _ripple_section(signals, ripple, friction, recording.parameters),
         power_section(arm, signals, friction, joints),
         frequency_section(recording, arm),
     )
@@ -270,7 +272,7 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
     for i, name in enumerate(arm.motors.names):
         known = friction[name]
         velocity = signals.velocity[:, i]
-        rows = (np.abs(velocity) > MOTOR_REST) & signals.use & signals.sampled
+        rows = _turning(signals, i)
         if not math.isfinite(known.dynamic) or not np.any(rows):
             continue
         rest = signals.torque[:, i] - signals.load[:, i] - known.dynamic * np.sign(velocity)
@@ -281,8 +283,16 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
     return found
 
 
+def _turning(signals: TransmissionSignals, motor: int) -> NDArray[np.bool_]:
+    """The samples in which a motor turns."""
+    return (np.abs(signals.velocity[:, motor]) > MOTOR_REST) & signals.use & signals.sampled
+
+
 def _ripple_section(
-    load_from: str, ripple: dict[str, Ripple], friction: dict[str, Friction], effects: Effects | None
+    signals: TransmissionSignals,
+    ripple: dict[str, Ripple],
+    friction: dict[str, Friction],
+    parameters: PredictionParameters,
 ) -> Section:
     sentences, findings = [], []
     for name, found in ripple.items():
@@ -292,7 +302,7 @@ def _ripple_section(
             continue
         top = int(np.argmax(found.amplitude))
         order, amplitude = int(found.order[top]), float(found.amplitude[top])
-        configured = _configured_ripple(effects, name, order)
+        configured = _configured_ripple(parameters, signals, name, order)
         findings.append(
             Finding(
                 f"{name}: largest ripple",
@@ -308,21 +318,24 @@ def _ripple_section(
             if clear
             else f"{name}: no significant ripple; the largest order has {shown(amplitude, 'N m')}."
         )
-    if load_from == GRAVITY:
+    if signals.load_from == GRAVITY:
         sentences.append("Ripple was not measured: of the motors' load only that of gravity is known in this bag.")
     elif not ripple:
         sentences.append("No motor turned enough to identify its ripple.")
     return Section("ripple", "Torque ripple by pulley angle", tuple(sentences), tuple(findings))
 
 
-def _configured_ripple(effects: Effects | None, shaft: str, order: int) -> float:
-    if effects is None:
+def _configured_ripple(parameters: PredictionParameters, signals: TransmissionSignals, shaft: str, order: int) -> float:
+    """Amplitude of this order on a motor, N m: ripple of its shaft, and of its amplifier at the mean torque."""
+    if parameters.arm is None or parameters.effects is None:
         return math.nan
-    ripples = effects.ripples
-    return sum(
-        ratio * amplitude
-        for name, ratio, amplitude, cycles in zip(
-            ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, strict=True
-        )
+    ripples, motor = parameters.effects.ripples, parameters.arm.motors.names.index(shaft)
+    torque = float(np.mean(signals.torque[_turning(signals, motor), motor]))
+    rows = zip(ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, ripples.phase, strict=True)
+    waves = [
+        ratio * amplitude * cmath.exp(1j * phase)
+        for name, ratio, amplitude, cycles, phase in rows
         if name == shaft and round(cycles * ratio) == order
-    )
+    ]
+    waves += [fraction * torque for fraction, cycles in parameters.commutation[motor : motor + 1] if cycles == order]
+    return abs(sum(waves))

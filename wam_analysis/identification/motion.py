@@ -5,7 +5,7 @@ Golay 1964); the torque goes through the same window, so that the equation of mo
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,11 @@ WINDOW = 0.05  # s
 THINNING = 0.5  # windows from one sample to the next
 SHORTEST = 10.0  # s of motion
 LARGEST_GAP = 3.5  # periods that are bridged
+LOADS = {
+    "sim/disturbance": "the simulator pushed the arm",
+    "contact/wrench": "a contact was estimated",
+}  # topics of forces that the equation of motion does not have, and what each is
+LEAST_SHARE = 1e-3  # of the messages of such a topic, below which it is not reported
 BRAKED = 1e-9  # N m; the torque of a motor that has no current
 
 
@@ -88,6 +93,15 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
         return motion(evenly(columns.stamp_ns / 1e9, columns.position[:, order], columns.effort[:, order]))
     except ValueError as error:
         raise BagError(f"{where}: {error}") from None
+
+
+def loaded(run: RecordedRun) -> Iterator[str]:
+    """What acted on the arm in a bag, and for how much of it: its torques are then taken for friction and weight."""
+    for topic, what in LOADS.items():
+        forces = run.wrench(topic)
+        share = 0.0 if forces is None else float(np.mean(np.any(forces.force != 0.0, axis=1)))
+        if share > LEAST_SHARE:
+            yield f"{what} in {100.0 * share:.2g} %"
 
 
 def evenly(stamps: Array, theta: Array, effort: Array) -> MotorRecord:

@@ -10,7 +10,7 @@ from pathlib import Path
 import yaml
 
 from wam_analysis.identification.fit import identify
-from wam_analysis.identification.motion import recorded_motion
+from wam_analysis.identification.motion import LOADS, loaded, recorded_motion
 from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
@@ -33,7 +33,7 @@ from wam_ros.run import NAMESPACE
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
 
-TOPICS = ("motor_states", "status")
+TOPICS = ("motor_states", "status", *LOADS)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,6 +80,12 @@ def run(given: argparse.Namespace) -> int:
     print(report(shared, found, str(bag)), flush=True)
     if run_in_bag.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
         print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
+    if loads := " and ".join(loaded(run_in_bag)):
+        print(
+            f"warning: {loads} of the recording: what acted on the arm is in the values above, and not in their "
+            "standard errors; identify from free motion. A contact where nothing was comes from a model that is off, "
+            "as before an identification"
+        )
     if impossible:
         raise ParameterError(impossible)
     if given.write is not None:
@@ -123,8 +129,8 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     if given.only_write:
         return None
     name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    played = configuration.with_nodes("scenario", "recorder")
     values = {
-        "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
         "timing.mode": "lockstep",
         "timing.real_time_factor": 0.0,
         "timing.dither_cycle": 0,
@@ -132,7 +138,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
         "recorder:directory": str(given.directory),
         "recorder:name": name,
     }
-    return given.directory / name if _play(configuration.with_values(values), given.seconds) else None
+    return given.directory / name if _play(played.with_values(values), given.seconds) else None
 
 
 def _play(configuration: Configuration, seconds: float) -> bool:

@@ -15,7 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the report; nothing is written into the directory of the bag.  1 where it has a NO."""
+    """Print the report; nothing is written into the directory of the bag.  1 where it has a NO or the run failed."""
     if given.picture:
         writable_picture("--picture", given.picture)
     made = report(given.bag, given.picture, given.namespace or "")

@@ -1,0 +1,118 @@
+"""Commands of programs in a bag as the stack took them: with the stamps that it gave them, without those it refused."""
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns
+from wam_description.arm import Arm
+from wam_description.signals import BASE
+from wam_description.synchroniser import LONGEST_JUMP
+from wam_sim.recorded_parameters import RecordedParameters
+
+Times = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Commands = WrenchColumns | TableColumns
+
+PUSH = "sim/disturbance"  # whose stamp the driver does not use
+COMMANDS = ("force_command", "task_command", PUSH)
+STATES = ("motor_states", "joint_sensors", "joint_states", "sim/joint_states")  # the clock, the finest first
+AHEAD = "a stamp far ahead of every state (the wall clock?)"
+
+
+class RefusedCommands(NamedTuple):
+    """Messages of a topic that the stack refused for one reason: how many, and what is wrong with them."""
+
+    topic: str
+    number: int
+    defect: str
+
+    @property
+    def sentence(self) -> str:
+        """Without the full stop."""
+        many = "1 message" if self.number == 1 else f"{self.number} messages"
+        return f"{many} of {self.topic} with {self.defect}: the stack refused them, they are left out"
+
+
+class TakenCommands(NamedTuple):
+    """A bag with the commands that the stack took, and those that it refused."""
+
+    bag: Bag
+    refused: tuple[RefusedCommands, ...]
+
+
+def states_of(bag: Bag, namespace: str) -> tuple[str, JointColumns] | None:
+    """The topic whose stamps are the arm's clock and its messages, None if no state was recorded."""
+    for name in STATES:
+        columns = bag.topics.get(f"{namespace}/{name}")
+        if isinstance(columns, JointColumns) and len(columns.stamp_ns):
+            return name, columns
+    return None
+
+
+def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> TakenCommands:
+    """The commands of a bag as the stack took them.
+
+    A command without a stamp has that of the newest state that was logged before it, as has a push by the wall clock.
+    Commands are left out which are far ahead of every state of the recording, or in a frame that the arm does not have.
+
+    Parameters
+    ----------
+    bag : any.
+    namespace : of the arm.
+    parameters : of its nodes; without them every frame is taken.
+    """
+    found, frames = states_of(bag, namespace), _frames(parameters)
+    topics, refused = dict(bag.topics), list[RefusedCommands]()
+    for name in COMMANDS:
+        topic = f"{namespace}/{name}"
+        columns = topics.get(topic)
+        if not isinstance(columns, (WrenchColumns, TableColumns)) or not len(columns.stamp_ns):
+            continue
+        kept = np.ones(len(columns.stamp_ns), bool)
+        if found is not None:
+            last = int(np.max(found[1].stamp_ns)) + LONGEST_JUMP
+            is_ahead = columns.stamp_ns > last
+            columns = _stamped(columns, found[1], (columns.stamp_ns == 0) | (is_ahead if name == PUSH else False))
+            kept = columns.stamp_ns <= last
+            refused.append(RefusedCommands(name, int(np.sum(~kept)), AHEAD))
+        if frames:
+            unknown = kept & ~np.isin(np.array(columns.frames, np.str_), frames)
+            for frame, count in sorted(Counter(np.array(columns.frames, np.str_)[unknown].tolist()).items()):
+                defect = f"the frame '{frame}', which is none of {', '.join(frames)}"
+                refused.append(RefusedCommands(name, count, defect))
+            kept &= ~unknown
+        topics[topic] = columns if np.all(kept) else _only(columns, kept)
+    changed = any(columns is not bag.topics[topic] for topic, columns in topics.items())
+    taken = bag._replace(topics=type(bag.topics)(topics)) if changed else bag
+    return TakenCommands(taken, tuple(one for one in refused if one.number))
+
+
+def _frames(parameters: RecordedParameters) -> tuple[str, ...]:
+    """The frames that a command may have, none if the arm is not known."""
+    try:
+        return BASE, *parameters.part("driver", Arm, "arm.").covers.names
+    except BagError:
+        return ()
+
+
+def _stamped(columns: Commands, states: JointColumns, missing: Mask) -> Commands:
+    """The same with the stamps that are missing, (k,), as far as there is a state before."""
+    if not np.any(missing):
+        return columns
+    rows = np.searchsorted(states.log_time_ns, columns.log_time_ns, side="right")
+    newest = np.concatenate([[0], np.maximum.accumulate(states.stamp_ns)])
+    return columns._replace(stamp_ns=np.where(missing, newest[rows], columns.stamp_ns))
+
+
+def _only(columns: Commands, kept: Mask) -> Commands:
+    """Some of the messages, (k,)."""
+    frames = np.array(columns.frames, object)[kept]
+    columns = columns._replace(log_time_ns=columns.log_time_ns[kept], stamp_ns=columns.stamp_ns[kept], frames=frames)
+    if isinstance(columns, WrenchColumns):
+        return columns._replace(force=columns.force[kept], torque=columns.torque[kept])
+    rows = kept[columns.message]
+    values = {name: value[rows] for name, value in columns.columns.items()}
+    return columns._replace(message=(np.cumsum(kept) - 1)[columns.message[rows]], columns=values)
