@@ -234,7 +234,7 @@ def test_of_a_computer_that_is_too_slow_for_realtime_the_late_periods_are_named_
     assert realtime.lateness == ""
     play(1500, every=2)
     assert realtime.lateness == (
-        "33 % of the newest periods were late, allowed 5 %: this computer is too busy or too slow for realtime; end "
+        "33.3 % of the newest periods were late, allowed 5 %: this computer is too busy or too slow for realtime; end "
         "other programs, or use lockstep"
     )
     play(2000, every=20)
@@ -270,7 +270,7 @@ def test_on_a_computer_too_slow_for_realtime_the_brakes_stay_on_unless_late_peri
         on_time(bench, realtime, 1, period=3e-3)
         waited += 1
     assert waited * 3e-3 == pytest.approx(10.0, abs=0.01)
-    assert realtime.obstacle().startswith("67 % of the newest periods were late, allowed 5 %: this computer is too")
+    assert realtime.obstacle().startswith("66.7 % of the newest periods were late, allowed 5 %: this computer is too")
     assert not bench.driver.enable(realtime.obstacle()).success
     bold.take_currents(bench.driver.stamp, HOLDING)
     assert bold.obstacle() == ""

@@ -72,7 +72,7 @@ class DriverNode(TolerantNode):
                 self.driver, shared.timing, own.watchdog, own.late_periods, self._publish, time.perf_counter
             )
             advice = self.driver.stale_advice
-            self.driver.stale_advice = lambda: self.time.lateness or advice()
+            self.driver.stale_advice = lambda: self._with_lateness(advice())
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
@@ -138,7 +138,11 @@ class DriverNode(TolerantNode):
         """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
         if status.level is Level.ERROR and status.fault:
-            self._fault("; ".join(filter(None, (f"{status.node}: {status.fault}", self.time.lateness))))
+            self._fault(self._with_lateness(f"{status.node}: {status.fault}"))
+
+    def _with_lateness(self, reason: str) -> str:
+        """The reason, and that the computer may be the cause of it where many periods are late."""
+        return "; ".join(filter(None, (reason, self.time.lateness)))
 
     def _take_problem(self, reason: str) -> None:
         if reason and self.driver.safety.mode is Mode.ENABLED:

@@ -122,7 +122,7 @@ class Realtime:
             return ""
         part, allowed = 100.0 * late / count, 100.0 * self._late_periods
         return (
-            f"{part:.0f} % of the newest periods were late, allowed {allowed:.3g} %: "
+            f"{part:.3g} % of the newest periods were late, allowed {allowed:.3g} %: "
             "this computer is too busy or too slow for realtime; end other programs, or use lockstep"
         )
 
