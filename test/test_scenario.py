@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -594,6 +594,11 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
         (ScenarioStep("go", 1.0, chirp=Chirp(1.0, 0.1, 2.0)), "chirp needs a force above 0 N"),
         (ScenarioStep("go", 1.0, tuple(GOAL), tip=(0.5, 0.0, 0.0)), "posture and tip are given; give one of them"),
         (ScenarioStep("go", 1.0, tip=(0.5, math.inf, 0.0)), "tip is inf; it must be a finite number"),
+        (
+            ScenarioStep("go", 1.0, cast(Any, np.array(GOAL))),
+            "posture is array.*; it must be a list .*; give its tolist",
+        ),
+        (ScenarioStep("go", 1.0, tip=cast(Any, np.array(ZERO))), "tip is array.*; it must be a list .*; give its tol"),
         (ScenarioStep("go", 1.0, push=Push("base", 0.1, ZERO, 0.0, 1.0)), "cover is 'base'; allowed: inner_link"),
         (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
         (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.5)), "begin 0 s and end 1.5 s; allowed"),

@@ -12,7 +12,7 @@ from wam_control.contact_position import torque_of_position
 from wam_control.motion import GoalMotion, LineMotion, PostureMotion
 from wam_control.posture_watch import BEHIND, CAUGHT_UP
 from wam_control.scenario_settings import Setting, require_settings, settings_of
-from wam_control.scenario_values import known, number, numbers
+from wam_control.scenario_values import known, number, numbers, require_list
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_text import task_of_text, torque_task
 from wam_description import yaml_text
@@ -519,6 +519,9 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     if step.chirp is not None:
         _require_chirp(where, step.chirp)
         require(any(step.force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+    require_list(where, "posture", step.posture, "joint angles")
+    if step.tip is not None:
+        _tip(where, step.tip)
     moves = [key for key, given in zip(MOTIONS, (step.posture, step.trajectory, step.tip), strict=True) if given]
     forces = ["force"] * (step.force != NO_FORCE)
     if step.task is not None:
@@ -537,8 +540,6 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
         for point in step.trajectory.points:
             _require_posture(where, point.position, arm)
             number(where, "times", point.time)
-    if step.tip is not None:
-        _tip(where, step.tip)
     if step.push is not None:
         _require_push(where, step.push, shared, seconds)
 

@@ -28,6 +28,12 @@ def number(where: str, key: str, value: Any) -> float:
 
 def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     """A list of finite numbers."""
-    if not isinstance(value, (list, tuple)) or len(value) != length:
-        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
+    require_list(where, key, value, f"{length} numbers")
+    require(len(value) == length, f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
     return tuple(number(where, key, element) for element in value)
+
+
+def require_list(where: str, key: str, value: Any, content: str) -> None:
+    """Refuse what is no list or tuple; an array, whose truth is unknown, with what makes a list of it."""
+    advice = "; give its tolist()" if hasattr(value, "tolist") else ""
+    require(isinstance(value, (list, tuple)), f"{where}: {key} is {value!r}; it must be a list of {content}{advice}")
