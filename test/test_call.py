@@ -163,6 +163,16 @@ def test_where_the_arm_is_paused_a_silent_topic_ends_with_what_continues_it(stac
     assert err == f"wam call: {waits}; the arm is paused, and continues after 'wam call resume'\n"
 
 
+def test_of_a_topic_that_no_node_publishes_that_is_told(stack: None) -> None:
+    code, out, err = called("echo", "sim/disturbance", "--timeout", "3")
+    assert (code, out) == (1, "")
+    waits = "waits for message 1 of sim/disturbance"
+    assert err.splitlines() == [
+        f"{waits}; no node publishes it now; Ctrl-C ends, --timeout S after S seconds",
+        f"wam call: {waits}; none for 3 s (--timeout); no node publishes it now",
+    ]
+
+
 def test_the_timeout_holds_where_there_is_no_such_arm(stack: None) -> None:
     """The search for the topic took 10 s, whatever the timeout."""
     code, out, err = called("echo", "force_measured", "--timeout", "3", "--namespace", "nowhere")

@@ -202,6 +202,10 @@ class CalledStack:
         finally:
             self.node.destroy_subscription(subscription)
 
+    def is_published(self, topic: str) -> bool:
+        """Whether a node publishes a topic, named as for `messages`, at present."""
+        return self.node.count_publishers(topic) > 0
+
     def _is_of_others(self, topic: str) -> bool:
         """Whether a node has a topic other than one that calls, as this one, which subscribes to the status."""
         ends = (*self.node.get_publishers_info_by_topic(topic), *self.node.get_subscriptions_info_by_topic(topic))

@@ -6,7 +6,8 @@ import math
 import re
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import islice
 from typing import Any, Final
 
@@ -150,7 +151,8 @@ def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
     at_least("--timeout", silence, 0.0)
     if given.count is not None:
         at_least("--count", given.count, 1)
-    waiting = Waiting(given.topic, given.count, silence, stack.heard_statuses())
+    is_published = partial(stack.is_published, given.topic)
+    waiting = Waiting(given.topic, given.count, silence, stack.heard_statuses(), is_published)
     try:
         for message in islice(stack.messages(given.topic, check=waiting.check), given.count):
             waiting.take()
@@ -170,14 +172,23 @@ class Waiting:
     topic, count : as given.
     timeout : s without a message, from now on, after which the waiting ends.
     statuses : of the nodes by name, kept up to date by somebody else.
+    is_published : whether a node publishes the topic at present.
 
     Attributes
     ----------
     text : what is waited for.
     """
 
-    def __init__(self, topic: str, count: int | None, timeout: float, statuses: Mapping[str, NodeStatus]) -> None:
+    def __init__(
+        self,
+        topic: str,
+        count: int | None,
+        timeout: float,
+        statuses: Mapping[str, NodeStatus],
+        is_published: Callable[[], bool],
+    ) -> None:
         self._topic, self._count, self._timeout, self._statuses = topic, count, timeout, statuses
+        self._is_published = is_published
         self._taken, self._since, self._is_reported = 0, time.monotonic(), False
 
     @property
@@ -214,7 +225,9 @@ class Waiting:
         driver = self._statuses.get("driver")
         if driver is None:
             return f"; no driver was found: {START}"
-        return "; the arm is paused, and continues after 'wam call resume'" * (PAUSED in driver.facts)
+        if PAUSED in driver.facts:
+            return "; the arm is paused, and continues after 'wam call resume'"
+        return "" if self._is_published() else "; no node publishes it now"
 
 
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:
