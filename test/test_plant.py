@@ -490,6 +490,29 @@ def test_the_end_of_a_tube_may_be_deep_in_what_is_soft(depth: float) -> None:
     assert plant.sunk() == ""
 
 
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+@pytest.mark.parametrize(("part", "sunk", "sign"), [(0.7, False, -1.0), (0.9, True, -1.0), (1.1, True, 1.0)])
+def test_a_tube_at_the_middle_of_a_thin_object_is_sunk(shape: str, part: float, sunk: bool, sign: float) -> None:
+    """Beyond the middle of a box, MuJoCo's normal is that of the face behind."""
+    q, half = (0.0, -1.8, 0.0, 1.0), 0.03
+    low = (cover_frame(q, "outer_link") @ [TIP, 0.0, 0.0, 1.0])[2] - RADIUS
+    thin = box((0.0, 0.0, low + RADIUS + part * half - half), (2.0, 2.0, half), 100.0)
+    if shape == "cylinder":
+        thin = dataclasses.replace(thin, shapes=("cylinder",), sizes=(2.0, half, 0.0))
+    plant = at(ideal_plant(WAM, thin, 5e-4), q)
+    assert shape == "cylinder" or float(plant.data.contact[0].frame[2]) == sign
+    assert (" mm deep in block, beyond whose middle the contact force would be to the other" in plant.sunk()) is sunk
+
+
+def test_a_plane_has_no_middle() -> None:
+    q = (0.0, -1.8, 0.0, 1.0)
+    low = (cover_frame(q, "outer_link") @ [TIP, 0.0, 0.0, 1.0])[2] - RADIUS
+    plane = dataclasses.replace(box((0.0, 0.0, low + 0.2), (2.0, 2.0, 0.1), 100.0), shapes=("plane",))
+    plant = at(ideal_plant(WAM, plane, 5e-4), q)
+    assert plant.data.contact.dist.min() == pytest.approx(-0.2, abs=1e-6)
+    assert plant.sunk() == ""
+
+
 # pushes
 
 

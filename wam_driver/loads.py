@@ -17,6 +17,7 @@ from wam_description.contact_pairs import folded
 from wam_description.signals import Load
 from wam_description.world import Springs
 
+MIDDLE = 0.8  # part of the way from a surface to the middle of an object, up to which an axis may be in it
 LEAN = 0.3  # cosine between a contact's normal and a tube, above which it is none of the tube's side
 
 
@@ -142,13 +143,22 @@ class CoverLoads:
 
         Where the axis of a tube passes through an edge, MuJoCo takes the face that is nearest to the axis: the force
         jumps to one along the tube, and deeper in there is none.  What touches the side of a tube pushes across it.
+        Beyond the middle of an object the nearest face is the one behind it, and the force changes its sign.
         """
         data, sizes = self._data, self._model.geom_size
         for i in range(data.ncon):
-            for geom, sign in zip(data.contact.geom[i].tolist(), (1.0, -1.0), strict=True):
+            pair = data.contact.geom[i].tolist()
+            for geom, other, sign in zip(pair, reversed(pair), (1.0, -1.0), strict=True):
                 depth, (radius, half, _) = -float(data.contact.dist[i]), sizes[geom].tolist()
                 if geom not in self._cover_of_geom or depth <= radius:
                     continue
+                deepest = radius + MIDDLE * _half_thickness(self._model.geom(other))
+                if depth > deepest:
+                    return (
+                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}, "
+                        f"beyond whose middle the contact force would be to the other side; allowed: "
+                        f"{deepest * 1e3:.3g} mm; press less, or on a stiffer surface"
+                    )
                 normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
                 nearest = data.contact.pos[i] - sign * (radius - 0.5 * depth) * normal  # point of the axis
                 if abs(normal @ axis) > LEAN and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half:
@@ -197,6 +207,16 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     place = sum((w * part.position for w, part in zip(weights, parts, strict=True)), 0.0) / whole
     force, moment = reduce(add, (part.force for part in parts)), reduce(add, (part.moment for part in parts))
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
+
+
+def _half_thickness(geom: Any) -> float:
+    """From the surface of a geom of MuJoCo to its middle, m."""
+    (x, y, z), kind = geom.size.tolist(), geom.type
+    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
+        return math.inf
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return min(x, y, z)
+    return min(x, y) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else x  # of a sphere and a tube, the radius
 
 
 def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
