@@ -25,7 +25,8 @@ LOADS = {
     "sim/disturbance": "the simulator pushed the arm",
     "contact/wrench": "a contact was estimated",
 }  # topics of forces that the equation of motion does not have, and what each is
-LEAST_SHARE = 1e-3  # of the messages of such a topic, below which it is not reported
+LEAST_SHARE = 1e-3  # of the time of a recording, below which such a force is not reported
+HELD = 100_000_000  # ns, for which a message of such a topic is taken to hold where no other follows
 BRAKED = 1e-9  # N m; the torque of a motor that has no current
 
 
@@ -97,9 +98,13 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
 
 def loaded(run: RecordedRun) -> Iterator[str]:
     """What acted on the arm in a bag, and for how much of it: its torques are then taken for friction and weight."""
+    states = run.joints("motor_states")
     for topic, what in LOADS.items():
         forces = run.wrench(topic)
-        share = 0.0 if forces is None else float(np.mean(np.any(forces.force != 0.0, axis=1)))
+        if states is None or forces is None or not len(forces.stamp_ns):
+            continue
+        lasted = np.clip(np.diff(forces.stamp_ns, append=states.stamp_ns[-1]), 0, HELD)
+        share = float(np.sum(lasted[np.any(forces.force != 0.0, axis=1)]) / max(np.ptp(states.stamp_ns), 1))
         if share > LEAST_SHARE:
             yield f"{what} in {100.0 * share:.2g} %"
 
