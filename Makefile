@@ -14,7 +14,9 @@ STAMPS := $(VENV)/stamps-$(shell pwd | cksum | cut -d ' ' -f 1)
 # A change in any of these files reinstalls the package.
 SOURCE := setup.py setup.cfg pyproject.toml package.xml config launch resource scripts wam_*
 SOURCE_ID := $(shell find $(SOURCE) -type f ! -name '*.pyc' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c 1-16)
-INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)
+# COMPILE=1: the inner loop as C; stays so until COMPILE= or `make clean`
+COMPILE ?= $(if $(wildcard $(STAMPS)/compiled),1)
+INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)$(if $(COMPILE),-compiled)
 
 # A sourced ROS or another environment must not reach .venv: its libraries would mix with those of the wheels.
 unexport PYTHONPATH PYTHONHOME RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -41,7 +43,7 @@ help:  ## print this list
 demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam box, record, report; ARGS="--real-time-factor 0"
 	@$(VENV)/bin/wam demo $(ARGS)
 
-install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help
+install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help; COMPILE=1: the inner loop as C
 
 dependencies: $(STAMPS)/test  # for the container: everything but the package itself
 
@@ -111,6 +113,7 @@ TEST_EXTRAS := $(ROS_EXTRAS),test
 DOCS_EXTRAS := $(TEST_EXTRAS),docs
 
 define INSTALL_WITH
+@rm -f $(STAMPS)/installed-*
 @$(TIDY)
 @$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
 @$(TIDY)
@@ -130,9 +133,11 @@ $(STAMPS)/docs: $(STAMPS)/test
 	@echo "Installing what builds the site"
 	$(call INSTALL_WITH,$(DOCS_EXTRAS))
 
-$(INSTALLED): $(STAMPS)/ros
-	@rm -f $(STAMPS)/installed-*
+$(INSTALLED): $(STAMPS)/$(if $(COMPILE),test,ros)
+	@rm -f $(STAMPS)/installed-* $(STAMPS)/compiled
 	@$(TIDY)
-	@$(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
+	$(if $(COMPILE),@echo "Compiling the inner loop: some minutes")
+	@$(if $(COMPILE),WAM_COMPILE=1) $(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
+	@$(if $(COMPILE),touch $(STAMPS)/compiled)
 	@$(TIDY)
 	@touch $@
