@@ -452,7 +452,7 @@ def test_of_two_robots_neither_has_the_command_of_the_other(commands: str, origi
     assert origin in two
 
 
-@pytest.mark.parametrize("jump", [100.0, -5.0])
+@pytest.mark.parametrize("jump", [100.0, -5.0, -0.6, -0.05])
 def test_a_clock_that_is_set_makes_no_gap(jump: float, tmp_path: Path) -> None:
     time = np.arange(0.0, 20.0, 0.01)
     sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
@@ -462,6 +462,68 @@ def test_a_clock_that_is_set_makes_no_gap(jump: float, tmp_path: Path) -> None:
     assert re.search(r"a repeats at 2.2 Hz, 0.0(199|20\d*) rad peak to peak, from 0.0 to 20.0 s", told)
     assert "times of reception are used" in told
     assert "periods without a message" not in told
+
+
+def test_a_message_that_overtakes_another_resets_no_clock(tmp_path: Path) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
+    late = [one._replace(received=one.received + 0.035 * (i % 500 == 250)) for i, one in enumerate(sent)]
+    found = quiet(by_rosbags(tmp_path / "bag", late))
+    assert "times of reception" not in " ".join(section(found, "happened"))
+
+
+OTHER_CLOCKS: dict[str, Callable[[float], float]] = {
+    "behind": lambda t: t - 40.0,
+    "since the start of the computer": lambda t: t - 1.7e9 + 5123.0,
+    "never set": lambda t: -1.7e9,
+    "simulated, slower": lambda t: 0.5 * t - 1.7e9,
+}
+
+
+@pytest.mark.parametrize("clock", list(OTHER_CLOCKS))
+@pytest.mark.parametrize("whose", ["state", "command"])
+def test_a_command_by_another_clock_is_that_of_the_motion(clock: str, whose: str, tmp_path: Path) -> None:
+    """Without the clocks told apart, a commanded motion is a limit cycle that nobody commanded."""
+    time = np.arange(0.0, 20.0, 0.01)
+    topics = {"state": "/joint_states", "command": "/joint_command"}
+    sent = [
+        one._replace(stamp=OTHER_CLOCKS[clock](one.stamp)) if name == whose else one
+        for name, late in (("state", 0.05), ("command", 0.0))
+        for one in joints(topics[name], time, ["a", "b"], position=cycling(time - late, 0.8, 0.3))
+    ]
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    (one,) = (line for line in section(found, "stability") if line.startswith("a "))
+    assert one.endswith("as it was commanded.")
+    told = [line for line in section(found, "happened") if "clock" in line]
+    assert len(told) == 1
+    assert (topics[whose] if clock == "never set" else "/joint_") in told[0]
+
+
+def test_a_command_that_was_sent_before_and_held_belongs_to_no_other_clock(tmp_path: Path) -> None:
+    """Sent 0.5 s before the recording begins, to which the recorder got it late."""
+    time = np.arange(0.0, 20.0, 0.01)
+    sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
+    sent += joints("/joint_command", [-0.5], ["a", "b"], position=np.zeros((1, 2)), delay=0.6)
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert "clock" not in " ".join(section(found, "happened"))
+    assert "it was not commanded" in " ".join(section(found, "stability"))
+
+
+def test_receptions_of_a_converted_bag_shift_no_clock(tmp_path: Path) -> None:
+    """Its receptions are those of the conversion, topic after topic."""
+    time = np.arange(0.0, 20.0, 0.01)
+    both = {
+        topic: joints(topic, time, ["a", "b"], position=cycling(time - late, 0.8, 0.3))
+        for topic, late in (("/joint_states", 0.05), ("/joint_command", 0.0))
+    }
+    sent = [
+        one._replace(received=100.0 + 0.2 * k + 1e-5 * i)
+        for k, those in enumerate(both.values())
+        for i, one in enumerate(those)
+    ]
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert "clock" not in " ".join(section(found, "happened"))
+    assert "as it was commanded" in " ".join(section(found, "stability"))
 
 
 @pytest.mark.slow
@@ -646,6 +708,21 @@ def test_a_mapped_mcap_of_json_is_read(tmp_path: Path) -> None:
         found((tmp_path / "bag.mcap", wrong))
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_a_stamp_in_another_unit_is_refused_until_the_unit_is_given(unit: str, factor: float, tmp_path: Path) -> None:
+    """Taken as seconds, an inertia of 0.5 kg m2 became one of 5e5."""
+    time = 7.0 + times(12.0)
+    position = at_rest(time, ["x", "y"], 33) + np.column_stack([sine(time, 3.1, 0.02), np.zeros(len(time))])
+    sent = joints("/state", time, ["x", "y"], position=position)
+    fields = ["name=state.name", "position=state.position", "stamp=time"]
+    bag = by_json(tmp_path / "bag", [one._replace(stamp=round(factor * one.stamp)) for one in sent])
+    with pytest.raises(ValueError, match=r"--unit stamp=(UNIT|ms|us)" if unit == "ns" else f"--unit stamp={unit}"):
+        found((bag, topic_map(["/state"], [], [], fields, [])))
+    _, numbers = found((bag, topic_map(["/state"], [], [], fields, [f"stamp={unit}"])))
+    assert numbers["x: frequency"] == pytest.approx(3.1, rel=CLOSE)
+    assert numbers["/state: period"] == pytest.approx(4.0, rel=1e-3)
+
+
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
     time = times(4.0, 50.0)
@@ -674,6 +751,8 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
     for topic in ("/ur/joint_states", "/ft/wrench"):
         with pytest.raises(ValueError, match=rf"{topic} is of type .*; its stamp is 'header.stamp', not 'time'"):
             found((small, topic_map([topic], [], [], ["stamp=time"], [])))
+        with pytest.raises(ValueError, match=rf"{topic} has stamps of ROS"):
+            found((small, topic_map([topic], [], [], [], ["stamp=us"])))
 
 
 @pytest.mark.parametrize(
@@ -682,7 +761,8 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
         (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
         (([], [], [], ["effort"], []), "--map is 'effort'"),
         (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
-        (([], [], [], [], ["stamp=s"]), "--unit is 'stamp=s'"),
+        (([], [], [], [], ["name=s"]), "--unit is 'name=s'"),
+        (([], [], [], [], ["stamp=deg"]), "'deg' is no unit of stamp; it may be a factor or s, ms, us, ns"),
         (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; it may be a factor or N, "),
         (([], [], [], [], ["position=deg", "position=rad"]), "--unit position is given twice"),
         (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),

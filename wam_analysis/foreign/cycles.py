@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import FEWEST, Piece, Source, longest, pieces
+from wam_analysis.foreign.sources import ABSENT, FEWEST, Piece, Source, longest, pieces
 from wam_analysis.measures.episodes import EDGE, Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import SpectralLine, spectral_lines
@@ -141,7 +141,7 @@ def _is_harmonic(one: Episode, frequency: float) -> bool:
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
     """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
-    if quantity not in command.values or len(command.time) < FEWEST or command.time[0] > piece.time[0]:
+    if quantity not in command.values or len(command.time) < FEWEST or _begins_after(command, piece.time[0]):
         return None
     if np.any(command.is_away(piece.time)):
         return None
@@ -176,7 +176,7 @@ def _slowed(value: Numbers, share: float) -> Numbers:
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
-    if command is None or not len(command.time) or command.time[0] > one.begin:
+    if command is None or not len(command.time) or _begins_after(command, one.begin):
         return None
     desired = quantity if quantity in command.values else next(iter(command.values))
     time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
@@ -188,8 +188,14 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
+def _begins_after(command: Source, begin: float) -> bool:
+    """Whether nothing was commanded yet; of two topics that begin at once either may have the first message."""
+    period = float(np.median(np.diff(command.time))) if len(command.time) >= FEWEST else 0.0
+    return float(command.time[0]) > begin + ABSENT * period
+
+
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:
-    """The last command before each of some times, (n,)."""
+    """The last command before each of some times, before the first one that, (n,)."""
     rows = np.maximum(np.searchsorted(command.time, time, side="right") - 1, 0)
     values: Numbers = command.values[quantity][rows]
     return values

@@ -2,7 +2,9 @@
 
 import importlib
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from numbers import Integral
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +13,8 @@ import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.findings.finding import shown
+from wam_analysis.foreign.topic_map import UNITS, TopicMap
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.contents import contents
 
@@ -23,7 +26,10 @@ WRENCH_FIELDS = {"force": "wrench.force", "torque": "wrench.torque"}
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 CONTROLLER_PARTS = {"": ("feedback", "actual"), " command": ("reference", "desired")}  # suffix of the topic: names
 IN_JOINTS = ("position", "velocity", "effort")
+TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
 ROSBAGS = (".bag", ".db3")
+BILLION = 1_000_000_000
+FASTER = 30.0  # times the receptions: stamps that go on so fast are not in s
 SECONDS = 1e17  # an integer time below this is in seconds or less, above it in ns since 1970
 
 
@@ -193,6 +199,8 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
 
 def _refuse_other_fields(topic: str, kind: str, given: TopicMap) -> None:
     """Refuse a map of what a known type has in one place only; position, velocity and effort may be exchanged."""
+    if "stamp" in given.units:
+        raise ValueError(TIME_OF_ROS.format(topic))
     fields = {"stamp": "header.stamp"} | (JOINT_FIELDS if kind == JOINTS else WRENCH_FIELDS)
     for quantity, field in fields.items():
         if quantity not in IN_JOINTS and given.fields.get(quantity, field) != field:
@@ -211,23 +219,39 @@ def _at(topic: str, message: Any, path: str) -> Any:
     return value
 
 
-def _times(topic: str, columns: Messages, fields: Mapping[str, str]) -> NDArray[np.int64]:
+def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> NDArray[np.int64]:
     """Stamps of the messages, ns; times of reception where they have none."""
     path = fields.get("stamp", "header.stamp")
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
+    stamps = [_at(topic, message, path) for message in columns.messages]
+    has_unit = "stamp" in given.units
+    if hasattr(stamps[0], "sec"):
+        if has_unit:
+            raise ValueError(TIME_OF_ROS.format(topic))
+        nanoseconds = [getattr(one, "nanosec", getattr(one, "nsec", 0)) for one in stamps]
+        return np.array([int(one.sec) * BILLION + int(ns) for one, ns in zip(stamps, nanoseconds, strict=True)])
     try:
-        return np.array([_nanoseconds(_at(topic, message, path)) for message in columns.messages], np.int64)
-    except (TypeError, OverflowError):
-        raise ValueError(f"{topic}: the field '{path}' has no times") from None
+        is_ns = not has_unit and all(isinstance(one, Integral) for one in stamps) and min(stamps) > SECONDS
+        factor = BILLION * given.scaled("stamp")[0]
+        found = np.array([one if is_ns else round(float(one) * factor) for one in stamps], np.int64)
+    except (TypeError, ValueError, OverflowError):
+        unit = "" if has_unit else "; of a number in other than s, --unit stamp=UNIT names it: ms, us, ns or a factor"
+        raise ValueError(f"{topic}: the field '{path}' has no times{unit}") from None
+    if not (has_unit or is_ns):
+        _refuse_other_pace(topic, path, found, columns.log_time_ns)
+    return found
 
 
-def _nanoseconds(stamp: Any) -> int:
-    if hasattr(stamp, "sec"):
-        return int(stamp.sec) * 1_000_000_000 + int(getattr(stamp, "nanosec", getattr(stamp, "nsec", 0)))
-    if isinstance(stamp, int) and stamp > SECONDS:
-        return stamp
-    return round(float(stamp) * 1e9)
+def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], received: NDArray[np.int64]) -> None:
+    """Refuse numbers as seconds where the receptions show that they are others."""
+    took, numbers = np.ptp(received) / 1e9, np.ptp(stamps) / 1e9
+    if took > 0.0 and numbers > FASTER * took:
+        nearest = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * numbers / took)))
+        raise ValueError(
+            f"{topic}: the field '{path}' goes on by {shown(numbers)} while {shown(took, 's')} were recorded, so it is "
+            f"not in s; give --unit stamp={nearest}, or another one of s, ms, us, ns or a factor"
+        )
 
 
 def _frames(columns: Messages) -> NDArray[np.object_]:
@@ -264,7 +288,7 @@ def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
             for name, value in zip(some, row, strict=False):
                 array[k, place[name]] = value
         arrays.append(given.scaled(quantity)[0] * array)
-    return JointColumns(columns.log_time_ns, _times(topic, columns, fields), _frames(columns), names, *arrays)
+    return JointColumns(columns.log_time_ns, _times(topic, columns, fields, given), _frames(columns), names, *arrays)
 
 
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:
@@ -275,4 +299,4 @@ def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: Top
             part = row[3:] if quantity == "torque" and len(row) == 6 else row[:3]
             values[k, : len(part)] = part
         parts.append(given.scaled(quantity)[0] * values)
-    return WrenchColumns(columns.log_time_ns, _times(topic, columns, fields), _frames(columns), *parts)
+    return WrenchColumns(columns.log_time_ns, _times(topic, columns, fields, given), _frames(columns), *parts)

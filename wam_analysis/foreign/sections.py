@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.foreign.clocks import CLOCK_SET
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -18,7 +19,7 @@ from wam_analysis.foreign.mechanics import (
     sticking,
     velocity_factor,
 )  # fmt: skip
-from wam_analysis.foreign.sources import FEWEST, Source, alternates, rising, sources
+from wam_analysis.foreign.sources import FEWEST, Source, alternates, clocks_of, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -99,13 +100,10 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
         else "This is not a recording of this stack."
     )
     sentences = [what]
+    clocks = {name: clock for name, clock in clocks_of(bag, given).items() if clock.note}
     for name, columns in sorted(bag.topics.items()):
         if isinstance(columns, JointColumns) and len(columns.stamp_ns):
             sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
-            if len(columns.stamp_ns) > 1 and not np.array_equal(
-                rising(columns.stamp_ns, columns.log_time_ns), columns.stamp_ns
-            ):
-                sentences.append(f"{name}: stamps of a clock that was set or never set; times of reception are used.")
             angles = columns.position[np.isfinite(columns.position)]
             if len(angles) and not given.units.get("position") and float(np.max(np.abs(angles))) > TURNS:
                 sentences.append(
@@ -121,6 +119,7 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
             sizes = sizes[np.isfinite(sizes)]
             what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
             sentences.append(f"{name}: {len(columns.stamp_ns)} forces, {what}.")
+    sentences += [f"{name}: {clock.note}." for name, clock in clocks.items()]
     others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
     if others:
         sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
@@ -132,7 +131,8 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]
-    return Section("happened", "What happened", (*sentences, *verdict), (), (), tuple(verdict))
+    two_clocks = [f"{name}: {clock.note}." for name, clock in clocks.items() if clock.note != CLOCK_SET]
+    return Section("happened", "What happened", (*sentences, *verdict), (), (), (*verdict, *two_clocks))
 
 
 def _sparse(one: Source, quantity: str) -> str:

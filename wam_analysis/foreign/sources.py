@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.runs import noise
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
-Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 FEWEST = 20  # messages of what was measured, and of a piece of it; a command may be sent once and hold
@@ -21,9 +21,6 @@ ALTERNATES = 5.0  # times the change over two messages: the change over one, whe
 FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
 LOUD = 1e3  # roundings of a number: smaller changes are none
-PACE = 0.2  # by which the median period of the receptions may differ from that of the stamps
-RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset
-AWAY = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
 PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
 WIDEST = 0.03  # s about each sample that such a velocity is taken from
 COMMAND = re.compile(r"(^|[/_ ])(command|commands|cmd|desired|reference|ref|target|setpoint|goal)($|[/_ ])")
@@ -106,16 +103,11 @@ def _last(stamps: Numbers, time: Numbers) -> Numbers:
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
     """The joints of a bag, each once for each topic and sender, and the wrenches, each once for each frame, too."""
     found: list[Source] = []
-    enough = {
-        topic: (columns, rising(columns.stamp_ns, columns.log_time_ns))
-        for topic, columns in sorted(bag.topics.items())
-        if isinstance(columns, (JointColumns, WrenchColumns))
-        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else FEWEST)
-    }
-    origin = min((int(stamps.min()) for _, stamps in enough.values()), default=0)
-    for topic, (columns, stamps) in enough.items():
+    found_clocks = clocks_of(bag, given)
+    origin = min((int(clock.times.min()) for clock in found_clocks.values()), default=0)
+    for topic, columns in _stamped(bag, given).items():
         is_command = _is_command(topic, given)
-        time, received = (stamps - origin) / 1e9, (columns.log_time_ns - origin) / 1e9
+        time, received = ((each - origin) / 1e9 for each in (found_clocks[topic].times, columns.log_time_ns))
         for frame, rows, sent in _frames(columns, time, is_command):
             for name, values, units in _parts(columns, given):
                 given_by = (time[rows], time[sent], received[sent], np.unique(time[sent & ~rows]))
@@ -123,6 +115,20 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 if (whole := _whole(one, rows)) is not None:
                     found.append(whole)
     return _labelled(found)
+
+
+def clocks_of(bag: Bag, given: TopicMap) -> dict[str, Clock]:
+    """The times of the topics of joints and wrenches with enough messages, by name."""
+    return clocks(_stamped(bag, given))
+
+
+def _stamped(bag: Bag, given: TopicMap) -> dict[str, JointColumns | WrenchColumns]:
+    return {
+        topic: columns
+        for topic, columns in sorted(bag.topics.items())
+        if isinstance(columns, (JointColumns, WrenchColumns))
+        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else FEWEST)
+    }
 
 
 def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bool) -> list[tuple[str, Mask, Mask]]:
@@ -167,22 +173,6 @@ def alternates(source: Source) -> bool:
         if once > ALTERNATES * twice and once > LOUD * np.finfo(float).eps * float(np.max(np.abs(values))):
             return True
     return False
-
-
-def rising(stamps: Times, received: Times) -> Times:
-    """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
-
-    A clock was set forward where the stamps jump and the receptions, which keep the same period, do not.  A few stamps
-    that are years away from their reception, such as 0, are replaced by it.
-    """
-    away = np.abs(stamps - received) > AWAY
-    if 2 * int(np.sum(away)) < len(stamps):
-        stamps = np.where(away, received, stamps)
-    steps = np.diff(stamps)
-    arrivals = np.diff(received)
-    keeps_pace = len(steps) > 0 and abs(np.median(arrivals) - np.median(steps)) <= PACE * np.median(steps)
-    was_set = bool(keeps_pace and np.any(steps - arrivals > RESET))
-    return received if was_set or np.any(steps < -RESET) or not np.any(steps) else stamps
 
 
 def _parts(

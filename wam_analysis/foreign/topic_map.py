@@ -4,11 +4,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N m", "force": "N", "torque": "N m"}  # unit of ROS
+QUANTITIES = {
+    "position": "rad",
+    "velocity": "rad/s",
+    "effort": "N m",
+    "force": "N",
+    "torque": "N m",
+    "stamp": "s",
+}  # unit of ROS
 SHOWN = {q: (unit,) for q, unit in QUANTITIES.items()} | {
     "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"),
 }  # fmt: skip
-MAPPED = (*QUANTITIES, "name", "stamp")
+MAPPED = (*QUANTITIES, "name")
 UNITS = {  # as given: factor, unit that is shown
     "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
     "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180.0, "rad/s"), "rpm": (math.pi / 30.0, "rad/s"),
@@ -16,6 +23,7 @@ UNITS = {  # as given: factor, unit that is shown
     "N": (1.0, "N"), "mN": (1e-3, "N"), "kN": (1e3, "N"),
     "Nm": (1.0, "N m"), "N m": (1.0, "N m"), "mNm": (1e-3, "N m"), "mN m": (1e-3, "N m"),
     "A": (1.0, "A"), "mA": (1e-3, "A"),
+    "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "ns": (1e-9, "s"),
 }  # fmt: skip
 
 
