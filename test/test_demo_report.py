@@ -1069,7 +1069,8 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording = Recording()
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
-    assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
+    answer = "of the time without contact: NOT SHOWN, 200 ms, as a contact that ends may take"
+    assert answer in verdict(recording.summary())
 
 
 @pytest.mark.parametrize("true", [PositionedForce(0.26, 4.0), PositionedForce()])

@@ -14,7 +14,7 @@ from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycl
 from wam_analysis.measures.loop_timing import latency, stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
-from wam_analysis.measures.runs import runs, without_short
+from wam_analysis.measures.runs import after_gaps, runs, without_short
 from wam_analysis.measures.stability import half_cycle_peaks, stability
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
@@ -286,6 +286,16 @@ def test_planted_friction_is_recovered(offset):
         assert abs(value - truth) < 4.0 * error < truth / 2.0
 
 
+def test_friction_of_a_recording_with_gaps_is_that_of_the_rest():
+    """A third of the time is missing: with the mean period, the inertia was half as large again."""
+    time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
+    kept = (time < 3.1) | ((time > 5.4) & (time < 9.3)) | (time > 11.9)
+    noisy = torque + draws(7, len(time), 0.01)
+    found = identify_friction(time[kept], velocity[kept], noisy[kept], rest=0.1, window=0.02)
+    assert found.inertia == PRECISE(0.004, rel=0.05)
+    assert found.dynamic == near(0.18)
+
+
 def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
     """A spring of cables that settles after each start: alike in every sample of a motion, which is no noise."""
     time = np.arange(6_000) / 1000.0
@@ -402,6 +412,24 @@ def test_the_bandwidth_is_where_the_response_has_fallen_3_db():
     assert math.isnan(bandwidth(other, believable(other, 0.8, 1e-4)))
 
 
+def test_no_segment_of_a_frequency_response_extends_over_a_gap():
+    """Joined, a slow motion with gaps has jumps, which look like coherent motion of every frequency."""
+    rate, time = 500.0, np.arange(40_000) / 500.0
+    put = np.sin(2.0 * math.pi * 0.13 * time) + 0.01 * draws(14, len(time), 1.0)
+    got = np.sin(2.0 * math.pi * 0.13 * (time - 0.05)) + 0.01 * draws(15, len(time), 1.0)
+    kept = np.mod(time, 8.3) > 1.7
+    gaps = after_gaps(time[kept])
+    assert np.count_nonzero(gaps) == 9
+    joined = frequency_response(rate, put[kept], got[kept], 1000)
+    divided = frequency_response(rate, put[kept], got[kept], 1000, gaps)
+    high = (joined.frequency > 10.0) & (joined.frequency < 30.0)
+    assert np.median(joined.coherence[high]) > 0.5
+    assert np.median(divided.coherence[high]) < 0.1
+    assert divided.segments < joined.segments
+    with pytest.raises(ValueError, match="two segments of 4000"):
+        frequency_response(rate, put[kept], got[kept], 4000, gaps)
+
+
 def test_an_input_that_stands_still_is_refused():
     with pytest.raises(ValueError, match="is constant"):
         frequency_response(100.0, np.ones(1000), np.ones(1000), 100)
@@ -465,6 +493,14 @@ def test_efficiency_is_work_out_over_work_in_both_ways():
     assert found.forward == near(0.93)
     assert found.back == near(0.8)
     assert found.forward_put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
+
+
+def test_a_gap_holds_no_work():
+    time = np.arange(10_000) / 1000.0
+    kept = (time < 1.3) | (time > 4.4)
+    motor = np.sin(time)
+    found = efficiency(time[kept], motor[kept], 0.93 * motor[kept])
+    assert found.forward_put == near(float(np.sum(motor[kept & (motor > 0.0)])) / 1000.0)
 
 
 # ripple

@@ -95,6 +95,34 @@ def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
     assert not any(one.failure for one in found)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("frame", ["outer_link", "base"])
+def test_a_force_that_a_larger_one_on_another_link_hides_is_not_assessed(frame: str, tmp_path: Path) -> None:
+    """`sim/contact/wrench` has the link that bears most: 7 N of error were stated for a force that was right."""
+    newtons = {"outer_link": "[0.0, -8.0, 0.0]", "base": "[0.0, 0.0, -8.0]"}[frame]
+    at = ", contact_position: 0.26" if frame == "outer_link" else ""
+    file, found = tmp_path / "two.yaml", []
+    for size in (0.0, 15.0):
+        push = f"push: {{cover: inner_link, contact_position: 0.02, newtons: [0.0, 0.0, {size}]}}"
+        force = f"force: {{frame: {frame}, newtons: {newtons}{at}}}"
+        file.write_text(f"""
+steps:
+  - {{name: release, seconds: 0.3, request: enable}}
+  - {{name: above, seconds: 2.0, posture: [0.0, -1.8, 0.0, 1.45]}}
+  - {{name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}}
+  - {{name: press, seconds: 2.0, {force}, {push}}}
+""")
+        configuration = Configuration.load(packaged("wam"))
+        (point,) = points(configuration, load(file, configuration.shared), [], [()])
+        found.append(outcome(point))
+    alone, hidden = found
+    assert alone.force_rms < 3.0  # without a known position the force is known to 2 N
+    assert not alone.unassessed
+    assert math.isnan(hidden.force_rms)
+    assert hidden.unassessed == f"8 N in {frame}: another link bears more in 100 % of its steady state"
+    assert hidden.force_peak > 14.0
+
+
 def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) -> None:
     file, found = tmp_path / "force.yaml", []
     for newtons in ("[0.0, -20.0, 0.0]", "[20.0, 0.0, 0.0]"):

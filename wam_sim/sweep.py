@@ -1,6 +1,7 @@
 """One scenario with many parameter sets: how well each holds the commanded force."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from itertools import groupby, product
@@ -60,7 +61,8 @@ class SweepResult(NamedTuple):
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
-    unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; '' for none.
+    unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; and those
+        whose force another link hides, which bears more; '' for none.
     """
 
     failure: str
@@ -155,6 +157,7 @@ def _measured(
     errors: list[float] = []
     refusals: list[str] = []
     brief: list[str] = []
+    axes = run.rows.get("force_axis", [])
     commands = [row for row in run.rows.get("force_command", []) if row.stamp in truth]
     for (_, *force), rows in groupby(commands, key=lambda row: (row.frame, *row.values)):
         held = list(rows)
@@ -167,7 +170,11 @@ def _measured(
             continue
         if BRIEF < held[-1].stamp - held[0].stamp < 1e9 * STEADY - BRIEF:  # no sample of a chirp
             brief.append(f"{command}: commanded for less than {STEADY:g} s")
-        errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
+        seen = [row for row in settled if _is_seen(row, truth[row.stamp], axes)]
+        if len(seen) < len(settled):
+            part = 100.0 * (1.0 - len(seen) / len(settled))
+            brief.append(f"{command}: another link bears more in {part:.0f} % of its steady state")
+        errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in seen]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
     failure = "; ".join(filter(None, dict.fromkeys((*failures, *refusals))))
@@ -196,6 +203,17 @@ def _unassessed(
     times = watched_times((one.step.task, one.begin, one.end) for one in played)
     brief = unassessed(reactions, times, played, settling)
     return f"{', '.join(one.name for one in brief)}: {too_short(settling, brief)}" if brief else ""
+
+
+def _is_seen(command: TopicValue, true: TopicValue, axes: Sequence[TopicValue]) -> bool:
+    """Whether the true force, that on the link which bears most, is the one that is commanded.
+
+    A force in the frame of the base is commanded on the link that the last `force_axis` has.
+    """
+    link = command.frame
+    if link == BASE and (row := bisect_right(axes, command.stamp, key=lambda one: one.stamp)):
+        link = axes[row - 1].frame
+    return BASE in (link, true.frame) or link == true.frame
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:

@@ -7,11 +7,13 @@ import numpy as np
 from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
+from wam_analysis.measures.runs import after_gaps
 from wam_description.arm import Arm
 
 COHERENT = 0.8  # coherence from which a response is taken
 EXCITED = 1e-4  # of the strongest part of the input
 SEGMENT = 2.0  # s
+SEGMENTS = 6  # that are averaged at least: of fewer, noise is often coherent
 
 
 def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
@@ -28,8 +30,12 @@ def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
             good = there & np.isfinite(commanded[:, i])
             put, out = commanded[good, i], got[row[good], i]
             try:
-                found = frequency_response(rate, put, out, max(8, round(SEGMENT * rate)))
+                found = frequency_response(
+                    rate, put, out, max(8, round(SEGMENT * rate)), after_gaps(commands.stamp_ns[good])
+                )
             except ValueError:
+                continue
+            if found.segments < SEGMENTS:
                 continue
             believed = believable(found, COHERENT, EXCITED)
             width = bandwidth(found, believed)
@@ -41,7 +47,10 @@ def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
             ]
             sentences.append(_bandwidth_sentence(name, width, top))
     if not sentences:
-        sentences.append("The velocity commands are too short for a frequency response.")
+        least = 0.5 * (SEGMENTS + 1) * SEGMENT
+        sentences.append(
+            f"The velocity commands are too short for a frequency response, which takes {least:g} s without a gap."
+        )
     return Section("frequency", "Frequency response of the velocity loops", tuple(sentences), tuple(findings), lacking)
 
 

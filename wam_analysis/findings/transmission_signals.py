@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
+from wam_analysis.measures.runs import after_gaps
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 
@@ -25,7 +26,7 @@ SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity
 
 
 class TransmissionSignals(NamedTuple):
-    """k instants at a constant rate, n motors and joints.
+    """k instants at a constant rate, but for gaps, n motors and joints.
 
     Attributes
     ----------
@@ -160,12 +161,14 @@ def _recorded_at(recording: AnalysedRun, topic: str, stamps: NDArray[np.int64]) 
 
 
 def _of(recording: AnalysedRun, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
-    """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages."""
+    """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages and in their gaps."""
     result = np.full((len(stamps), len(names)), np.nan)
     columns = recording.run.joints(topic)
     values = None if columns is None else by_names(columns, field, names)
     if columns is not None and values is not None and len(columns.stamp_ns) > 1:
         inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])
+        row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
+        inside &= ~after_gaps(columns.stamp_ns)[row] | (stamps == columns.stamp_ns[row])
         for i in range(len(names)):
             result[inside, i] = np.interp(stamps[inside], columns.stamp_ns, values[:, i])
     return result

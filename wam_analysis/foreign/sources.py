@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.topic_map import TopicMap
-from wam_analysis.measures.runs import noise
+from wam_analysis.measures.runs import after_gaps, noise
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
@@ -18,7 +18,6 @@ Mask = NDArray[np.bool_]
 FEWEST = 20  # messages of what was measured, and of a piece of it; a command may be sent once and hold
 ABSENT = 1.5  # periods between two messages of a frame, from which one is absent
 ALTERNATES = 5.0  # times the change over two messages: the change over one, where two publishers take turns
-FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
 LOUD = 1e3  # roundings of a number: smaller changes are none
 PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
@@ -229,9 +228,9 @@ def _labelled(found: list[Source]) -> list[Source]:
 def pieces(source: Source) -> list[Piece]:
     """The stretches of a source between gaps, at a constant rate; velocities made from positions if need be."""
     period = float(np.median(np.diff(source.time)))
-    begins = np.flatnonzero(np.diff(source.time, prepend=-math.inf) > FILLED * period)
+    inner = np.flatnonzero(after_gaps(source.time)).tolist()
     found = []
-    for begin, end in zip(begins.tolist(), [*begins[1:].tolist(), len(source.time)], strict=True):
+    for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
         if end - begin < FEWEST:
             continue
         time = source.time[begin:end]

@@ -34,9 +34,13 @@ def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Eff
 
     Notes
     -----
-    A sample is forward if both powers are positive, backward if both are negative.
+    A sample is forward if both powers are positive, backward if both are negative.  Of a gap that is longer than the
+    median period nothing is known: it holds no work.
     """
-    dt = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(len(time))
+    dt = np.diff(time, append=time[-1:])
+    if len(time) > 1:
+        dt = np.minimum(dt, np.median(dt[:-1]))
+        dt[-1] = dt[-2]
 
     def work(power: Numbers, rows: NDArray[np.bool_]) -> float:
         return float(np.sum(np.abs(power[rows]) * dt[rows]))

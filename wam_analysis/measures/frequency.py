@@ -1,5 +1,6 @@
 """Frequency response of recorded signals, its coherence and bandwidth."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,9 @@ class FrequencyResponse(NamedTuple):
     segments: int
 
 
-def frequency_response(rate: float, put: Numbers, got: Numbers, segment: int) -> FrequencyResponse:
+def frequency_response(
+    rate: float, put: Numbers, got: Numbers, segment: int, after_gap: Mask | None = None
+) -> FrequencyResponse:
     """Response and coherence by averaging segments (Welch, Hann window, half overlapped).
 
     Parameters
@@ -37,20 +40,22 @@ def frequency_response(rate: float, put: Numbers, got: Numbers, segment: int) ->
     rate : Hz.
     put, got : (n,), input and output.
     segment : samples of a segment; the frequencies are `rate`/`segment` apart.
+    after_gap : (n,), samples before which others are missing; no segment extends over them.  None without any.
 
     Raises
     ------
     ValueError
-        if the recording is shorter than two segments or the input is constant.
+        if the recording has less than two segments without a gap or the input is constant.
     """
     n = len(put)
-    if segment < 8 or n < 2 * segment or len(got) != n:
+    edges = [0, *([] if after_gap is None else np.flatnonzero(after_gap).tolist()), n]
+    if segment < 8 or sum((end - begin) // segment for begin, end in pairwise(edges)) < 2 or len(got) != n:
         raise ValueError(
             f"{n} samples of input, {len(got)} of output; two segments of {segment} (at least 8) are needed"
         )
     hop = segment // 2
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(segment) + 0.5) / segment)
-    begins = range(0, n - segment + 1, hop)
+    begins = [at for begin, end in pairwise(edges) for at in range(begin, end - segment + 1, hop)]
     pp, gg, gp = np.zeros(hop + 1), np.zeros(hop + 1), np.zeros(hop + 1, dtype=np.complex128)
     for begin in begins:
         a, b = (np.fft.rfft(window * _level(x[begin : begin + segment]))[: hop + 1] for x in (put, got))

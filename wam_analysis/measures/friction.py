@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.measures.runs import noise
+from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 
 Numbers = NDArray[np.float64]
@@ -76,7 +76,7 @@ def identify_friction(
 
     Parameters
     ----------
-    time : (n,), s, at a constant rate.
+    time : (n,), s, at a constant rate but for gaps.
     velocity : (n,), of the shaft, rad/s.
     torque : (n,), on the shaft, less what it passes on to the load, N m.
     rest : speed up to which the shaft is at rest, rad/s.
@@ -95,7 +95,9 @@ def identify_friction(
     if n < FEWEST or int(np.sum(allowed)) < FEWEST:
         return _UNSEEN
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
-    period = float(time[-1] - time[0]) / (n - 1)
+    period = float(np.median(np.diff(time)))
+    gaps = np.flatnonzero(after_gaps(time))
+    allowed[gaps] = allowed[gaps - 1] = False  # no window extends over them
     half = max(1, round(window / period / 2.0))
     acting = np.empty((n, 0)) if load is None else np.where(allowed[:, np.newaxis], load, 0.0)
     solution, errors, left = _in_motion(velocity, torque, acting, rest, half, period, allowed)

@@ -9,6 +9,20 @@ Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.int64]
 
+FILLED = 5.5  # periods of the longest gap that is filled by interpolation
+
+
+def after_gaps(time: Numbers | Rows) -> Mask:
+    """Samples that come so long after the one before that nothing is known between them, (n,).
+
+    Parameters
+    ----------
+    time : (n,), rising, in any unit.
+    """
+    steps = np.diff(time)
+    late = steps > FILLED * np.median(steps) if len(steps) else np.zeros(0, np.bool_)
+    return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
+
 
 def require_usable(what: str, signal: Numbers, **threshold: float) -> None:
     """Refuse a threshold that cannot be above the noise, and a signal that has gaps.
