@@ -134,6 +134,13 @@ class ForceAxis(NamedTuple):
     precision: Array
     covariance_there: Array
 
+    def times(self, side: float) -> "ForceAxis":
+        """The same with its direction to the other side, where that is -1."""
+        if side > 0.0:
+            return self
+        turned = {name: -getattr(self, name) for name in ("lever", "press", "sense", "move", "carried")}
+        return self._replace(**turned)
+
     def signal(self, force: float, torque_sd: Sequence[float]) -> float:
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
         return force * float(np.linalg.norm(self.press / np.array(torque_sd)))

@@ -42,9 +42,9 @@ LEFT = 0.25  # of the settling time, after which a force that is too large, or h
 FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
 FAINT = 0.5  # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
 SLOWED = 0.5  # of the speed along the force, from then on
-SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
+SHAKE_SAMPLES = 8  # outer periods, at least: a dither of 25 Hz
 RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
-WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
+WATCHED = 0.2  # s, for which the shaking is watched before the arm moves, or for a whole cycle of a slower dither
 SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
 SENSORS = "use joint sensors"
 RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
@@ -145,6 +145,7 @@ class ForceHold:
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
         self._frequency = self._watched = self._shaking = self._blocked = 0.0
+        self._is_watching = False
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
@@ -235,7 +236,11 @@ class ForceHold:
 
         It is watched before the arm moves: what is touched would add its own motion.
         """
-        if self._watched >= WATCHED:
+        samples = max(SHAKE_SAMPLES, round(2.0 * math.pi / (frequency * dt)))
+        if samples != self._shake.samples:
+            self._shake = Shake(samples)
+        self._is_watching = self._watched < max(WATCHED, (samples + 1) * dt)
+        if not self._is_watching:
             return False
         self._shake.step(moved)
         self._watched += dt
@@ -393,7 +398,7 @@ class ForceHold:
         besides = f", or {refusal.besides}" if refusal.besides else ""
         if others is None:
             return f": bend the arm, or command more force, another direction or position{besides}"
-        if 0.0 < self._watched < WATCHED:
+        if self._is_watching:
             return ""  # how the dither shakes the arm counts, too
         self._advice.step(
             case.desired, (refusal.reaction, parameters), others, lambda one: self._admits(one, parameters)

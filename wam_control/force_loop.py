@@ -119,6 +119,7 @@ class ForceLoop:
         self._contact_rejected = False
         self._given = GivenWay(self._body)
         self._held = HeldArm(self._body, self._given)
+        self._tasks = TaskControl(arm, self._body, self._given)
         self._goes_back = False
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
@@ -215,7 +216,7 @@ class ForceLoop:
         self._torque_sd = np.full(self._n, sensing.torque_sd)
         self._force_axes = ForceAxes(self._arm, self._body, sensing)
         self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit, self._given)
-        self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision, self._given)
+        self._tasks.retune(self._force_axes, parameters, self._supervision)
         self._transfer.restart()
 
     def tare(self) -> str:

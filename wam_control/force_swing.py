@@ -55,9 +55,10 @@ class Reversals:
 
 
 class Shake:
-    """Motion of the joints about its own course, over a window of whole cycles of a dither."""
+    """Motion of the joints about its own course, over a window of whole cycles of a dither, of so many samples."""
 
     def __init__(self, samples: int) -> None:
+        self.samples = samples
         self._poses: deque[Array] = deque(maxlen=samples + 1)
 
     def reset(self) -> None:

@@ -47,7 +47,9 @@ class LimitParameters:
         high=1e3,
         before=0.0,
     )
-    settling_time: float = tunable("time after which a force that is still not reached is reported", "s", before=1e9)
+    settling_time: float = tunable(
+        "time after which a force that is still not reached is reported", "s", low=1e-3, before=1e9
+    )
     free_travel: float = tunable(
         "largest way along a commanded force that is not right, or back against it with what pushes; then the arm "
         "holds its position",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wam_control.arm_push import ArmPush
 from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
-from wam_control.force_axis import ForceAxes, PressedForce
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_case import ForceCase
 from wam_control.force_hold import ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force_loop_parameters import ForceLoopParameters
@@ -68,26 +68,30 @@ class TaskControl:
     ----------
     arm : the arm as the controller knows it.
     body : its kinematics and dynamics.
-    axes : of forces, with their sensing.
-    parameters : of the force loop.
-    supervision : the guard of its gains.
     given : how far the arm has given way.
+
+    Notes
+    -----
+    `retune` comes before the first `step`.
     """
 
-    def __init__(
-        self,
-        arm: Arm,
-        body: RigidBody,
-        axes: ForceAxes,
-        parameters: ForceLoopParameters,
-        supervision: Supervision,
-        given: GivenWay,
-    ) -> None:
-        self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
-        self._body, self._force_axes, self._held, self._given = body, axes, HeldArm(body, given), given
-        self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
-        self._feed_forward = FeedForward(arm)
+    def __init__(self, arm: Arm, body: RigidBody, given: GivenWay) -> None:
+        self._arm, self._body, self._covers = arm, body, arm.covers
+        self._held, self._given, self._feed_forward = HeldArm(body, given), given, FeedForward(arm)
         self.restart()
+
+    def retune(self, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision) -> None:
+        """Take new parameters; a task goes on with them, and one that was refused is tried again.
+
+        Parameters
+        ----------
+        axes : of forces, with their sensing.
+        parameters : of the force loop.
+        supervision : the guard of its gains.
+        """
+        self._frame = TaskFrame(self._arm, self._body, axes, parameters.task, parameters.sensing)
+        self._force_axes, self._parameters, self._supervision = axes, parameters, supervision
+        self._refusal = ""
 
     def restart(self) -> None:
         """Forget the task."""
@@ -102,6 +106,7 @@ class TaskControl:
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
         self._begun: list[float] = []  # (n,) rad, where the task began
+        self._sides: list[float] = []  # of each axis, 1 or -1: where along it the link is touched
         self._held.release()
         self._feed_forward.reset()
         self._refusal = ""
@@ -138,9 +143,10 @@ class TaskControl:
         if has_changed:
             self._begun = list(q)
             self._given.restart()
-        states = self._frame.states(task, q, self._points(task, contact), self._begun)
+        states = self._frame.states(task, q, self._points(task, contact), self._begun, self._sides)
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
+        self._find_sides(states, forces)
         self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
         found = (
             [(ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")]
@@ -174,7 +180,8 @@ class TaskControl:
         if self._held.is_holding:
             allowed = math.fsum(map(_desired, states)) or push.allowed
             push = push._replace(allowed=min(push.allowed, allowed))
-            back = [self._back(*one, factor, dt) for one in zip(states, forces, self._holds, strict=True)]
+            pairs = zip(states, forces, self._holds, strict=True)
+            back = [self._back(*one, self._torque_error(one[0], push.torque_sd), factor, dt) for one in pairs]
             inertia = self._force_axes.moved_inertia(q)
             velocity, is_yielding = self._held.step(q, [one for one in back if one], push, inertia, own)
             reactions = {reaction: reason + self._held.push for reaction, reason in reactions.items()}
@@ -196,6 +203,7 @@ class TaskControl:
         if before is not None and _axes(before) == _axes(task):
             return False
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
+        self._sides = [1.0] * len(task.axes)
         self._holds = [ForceHold() for _ in task.axes]
         self._torques = [TorqueWatch(axis.name) for axis in task.axes]
         self._motions = [MotionWatch(axis.name, axis.unit) for axis in task.axes]
@@ -249,6 +257,12 @@ class TaskControl:
             found.append(begun if state.axis.value is None else state.axis.value)
         return found
 
+    def _find_sides(self, states: Sequence[AxisState], forces: Sequence[float]) -> None:
+        """On which side an impedance is touched: a force is commanded on one, an impedance presses on either."""
+        for i, (state, force) in enumerate(zip(states, forces, strict=True)):
+            if state.axis.kind is AxisKind.IMPEDANCE and force * self._sides[i] < -self._parameters.task.deadband:
+                self._sides[i] = -self._sides[i]
+
     def _beyond(self, task: TaskCommand) -> str:
         """Why a task is refused: the first axis beyond a limit; '' if there is none."""
         own = self._parameters
@@ -286,8 +300,7 @@ class TaskControl:
                 if state.axis.kind is AxisKind.FORCE:
                     found.append(torque.step(desired, force, sd, self._parameters, dt, error, unknown[1]))
             elif state.sensed and state.point and desired:
-                error = -float(state.sensed.sense @ unknown[0])
-                case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
+                case = self._case(state, state.sensed, state.point, external_sd, unknown)
                 is_holding = self._held.is_holding
                 if not is_holding:
                     hold.travel(float(state.row @ moved), dt, is_led)
@@ -396,12 +409,34 @@ class TaskControl:
                 posture = followed(posture, jacobian, _desired(state), gain)
         return posture
 
-    def _back(self, state: AxisState, force: float, hold: ForceHold, factor: float, dt: float) -> RetreatForce | None:
+    def _case(
+        self, state: AxisState, axis: ForceAxis, point: ForcePoint, torque_sd: Array, unknown: tuple[Array, str]
+    ) -> ForceCase:
+        """The force of an axis, with what is known of the torques now."""
+        desired = _desired(state)
+        return ForceCase(
+            axis,
+            point,
+            desired,
+            signal=axis.signal(desired, torque_sd.tolist()) if self._parameters.is_estimated else math.inf,
+            torque_error=self._torque_error(state, torque_sd),
+            unknown=-float(axis.sense @ unknown[0]),
+            meaning=unknown[1],
+        )
+
+    def _torque_error(self, state: AxisState, torque_sd: Array) -> float:
+        """Standard deviation of a force, N, by those of the estimated torques (n,), N m; 0 with sensors."""
+        is_estimated = self._parameters.is_estimated and state.sensed
+        return state.sensed.error(torque_sd.tolist()) if is_estimated and state.sensed else 0.0
+
+    def _back(
+        self, state: AxisState, force: float, hold: ForceHold, torque_error: float, factor: float, dt: float
+    ) -> RetreatForce | None:
         """How an arm that holds goes back along a force, N; None along other axes."""
         desired = _desired(state)
         if not (state.sensed and state.point and desired):
             return None
-        excess = hold.excess(state.sensed, force, desired)
+        excess = hold.excess(state.sensed, force, desired, torque_error)
         law = self._supervision.force_law.along(state.axis.direction)
         return RetreatForce(state.sensed, factor * law.velocity(0, -excess, -excess, dt) if excess else 0.0)
 

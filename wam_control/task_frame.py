@@ -38,7 +38,7 @@ class AxisState(NamedTuple):
     ----------
     axis : what is commanded.
     row : velocity along the axis per joint velocity, and torque on the joints per force (n,), m or 1.
-    direction : in the base frame (3,); zeros for a joint.
+    direction : in the base frame (3,), towards what is touched; zeros for a joint.
     coordinate : present position along the axis, m or rad.
     sensed, point : how the force along it is measured, and where it acts; None for a motion or a joint.
     """
@@ -88,7 +88,12 @@ class TaskFrame:
         self._parameters, self._sensing = parameters, sensing
 
     def states(
-        self, task: TaskCommand, q: Sequence[float], points: Sequence[ForcePoint], begun: Sequence[float] = ()
+        self,
+        task: TaskCommand,
+        q: Sequence[float],
+        points: Sequence[ForcePoint],
+        begun: Sequence[float] = (),
+        sides: Sequence[float] = (),
     ) -> list[AxisState]:
         """Every axis of a task.
 
@@ -98,18 +103,20 @@ class TaskFrame:
         q : joint angles (n,), rad.
         points : where each axis acts.
         begun : joint angles at which the task began (n,), rad; as q by default.
+        sides : of each impedance, 1 or -1, where along its direction the link is touched; 1 by default.
         """
         n = len(q)
         rotation = np.eye(3) if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
         directions = [rotation @ np.array(axis.direction) for axis in task.axes]
         # a force is positive along its direction, which is the normal of the surface
         directions = [-d if _pulls(axis) else d for axis, d in zip(task.axes, directions, strict=True)]
+        sides = sides or [1.0] * len(directions)
         torques = [
-            self._torques(q, begun, axis, point, u) if axis.is_sensed and axis.joint < 0 else []
-            for axis, u, point in zip(task.axes, directions, points, strict=True)
+            self._torques(q, begun, axis, point, side * u) if axis.is_sensed and axis.joint < 0 else []
+            for axis, u, point, side in zip(task.axes, directions, points, sides, strict=True)
         ]
         found = []
-        for i, (axis, u, own) in enumerate(zip(task.axes, directions, torques, strict=True)):
+        for i, (axis, u, own, side) in enumerate(zip(task.axes, directions, torques, sides, strict=True)):
             if axis.joint >= 0:
                 found.append(AxisState(axis, np.eye(n)[axis.joint], u, q[axis.joint], None))
                 continue
@@ -126,9 +133,9 @@ class TaskFrame:
                 is_same = (task.axes[k].cover, task.axes[k].position) == (axis.cover, axis.position)
                 others += [] if k == i else other[:1] if is_same else other
             turned = self._turned(q, begun, axis.cover, u) if others else 0.0
-            pressed = PressedForce(axis.cover, position, position_sd, u, _size(axis))
-            sensed = self._axes.axis(q, pressed, others, turned)
-            found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
+            pressed = PressedForce(axis.cover, position, position_sd, side * u, _size(axis))
+            sensed = self._axes.axis(q, pressed, others, turned).times(side)
+            found.append(AxisState(axis, sensed.lever, side * u, coordinate, sensed, points[i]))
         return found
 
     def _turned(self, q: Sequence[float], begun: Sequence[float], cover: str, direction: Array) -> float:

@@ -283,7 +283,7 @@ class Plant:
         else:
             changed = friction.follow(velocity, self._transmitted_torque(), self._friction_torque())
             if friction.elastic:
-                self._applied[:] = friction.elastic
+                self._applied[: 2 * self._n] = friction.elastic  # the rest is of free bodies and doors
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
             self._is_set = friction.is_steady and not circuits.is_slack
