@@ -272,12 +272,16 @@ def test_the_guard_considers_the_forces_of_a_task_together() -> None:
 
 
 def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Joint velocities (4,), rad/s, of an arm that is kept at an angle, rad, from where the task began."""
+    """Joint velocities (4,), rad/s, of an arm that is kept at an angle, rad, from where the task began.
+
+    It is pressed along both axes, so that no torque of these makes another side of the link the touched one.
+    """
     world = Springs()
     world.loop.tune(replace(OWN, limits=replace(OWN.limits, impact=0.0), task=replace(OWN.task, deadband=0.0)))
     world.step(task)
     for _ in range(150):
-        world.q, world.hand = np.array(POSE) + angle, -(torque + 9.0 * world.lever(DOWN))
+        pressed = 9.0 * world.lever(DOWN) + 4.0 * world.lever(X)
+        world.q, world.hand = np.array(POSE) + angle, -(torque + pressed)
         out = world.step(task)
     return np.array(out.velocity)
 
