@@ -152,6 +152,21 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
     assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
 
 
+@pytest.mark.parametrize("samples", [8, 16, 32])
+def test_the_shaking_is_watched_for_a_whole_cycle_of_the_dither(samples: int) -> None:
+    """Of a part of a slow one little more than its slope is seen, which is taken for the course of the arm."""
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    stiff, shared = replace(own, guard=replace(own.guard, contact_stiffness=1e5)), CONFIGURATION.shared
+    loop = ForceLoop(ARM, shared.servo, stiff, replace(shared.timing, dither_cycle=5 * samples))
+    world, axis, size = World(1e-9), lever(POSE), 1e-4 * (samples / 8.0) ** 2  # as much acceleration
+    for k in range(60):
+        swing = size * math.sin(2.0 * math.pi * k / samples)
+        world.q = (POSE + swing * axis / float(axis @ axis)).tolist()
+        ask(loop, world, down(5.0), external=STILL)
+    assert loop.reaction is ForceReaction.SHAKEN
+    assert f"the arm shakes by {2.0 * size:.3g} m" in loop.reason
+
+
 def test_what_is_advised_in_place_of_a_force_that_is_not_detected_does_not_shake_the_arm_too_much_either() -> None:
     own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
     sensing = replace(own.sensing, force_sd_limit=1e9, stated_fraction=1e9)

@@ -278,6 +278,7 @@ def test_servo_gains_are_live_at_the_velocity_loop_alone(ros: Any) -> None:
         ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
         ("force_loop", {"force_limit": 1e308}, "force_limit"),
         ("force_loop", {"joint_speed_limit": 1e308}, "joint_speed_limit"),
+        ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time out of range Min: 0.001"),
         ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
     ],
 )

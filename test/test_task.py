@@ -176,6 +176,77 @@ def test_an_impedance_yields_as_its_spring_and_its_damper_do(stiffness: float, d
     assert lever @ lever > 0.0
 
 
+def impedance(along: Triple, value: float | None = None, stiffness: float = 400.0) -> TaskAxis:
+    return TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, along, value, 0.0, stiffness, 100.0)
+
+
+def test_live_parameters_leave_the_equilibrium_of_an_impedance_where_it_was() -> None:
+    world, task = Springs(), base(impedance(Y))
+    world.step(task, 10)
+    start = world.point(Y)[1]
+    for _ in range(200):
+        world.hand = 12.0 * world.lever(Y)
+        world.step(task)
+    assert world.point(Y)[1] - start > 0.02
+    world.loop.tune(replace(OWN, posture_gain=1.1 * OWN.posture_gain))
+    world.hand = np.zeros(4)
+    world.step(task, 400)
+    assert world.point(Y)[1] == pytest.approx(start, abs=3e-3)
+
+
+def test_live_parameters_do_not_begin_the_way_in_free_air_anew() -> None:
+    world, task = Springs(), base(force(8.0))
+    world.step(task, 600)
+    assert world.loop.reaction is ForceReaction.NOTHING_TOUCHED
+    there = world.point(DOWN)
+    world.loop.tune(replace(OWN, posture_gain=1.1 * OWN.posture_gain))
+    world.step(task, 300)
+    assert world.loop.reaction is ForceReaction.NOTHING_TOUCHED
+    assert world.point(DOWN) == pytest.approx(there, abs=2e-3)
+
+
+def test_a_refused_task_is_tried_again_with_new_parameters() -> None:
+    world, task = Springs(springs={DOWN: 4000.0, Y: 4000.0}), base(force(10.0), force(5.0, Y))
+    low = replace(OWN, force_limit=8.0)
+    world.loop.tune(low)
+    world.step(task, 5)
+    assert world.loop.reaction is ForceReaction.TASK_REFUSED
+    world.loop.tune(OWN)
+    world.step(task, 150)
+    assert world.force(DOWN) == pytest.approx(10.0, rel=0.01)
+
+
+def test_an_impedance_is_sensed_at_the_side_that_is_touched_whichever_way_it_is_written() -> None:
+    """Friction along the link has another lever at the other side of it: the force was wrong by as much."""
+    found = []
+    for along, sign in ((DOWN, 1.0), (Z, -1.0)):
+        world = Springs(springs={DOWN: 4000.0})
+        task = base(impedance(along, float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0)) @ along) + 0.04 * sign))
+        for _ in range(400):
+            rotation = BODY.cover_pose(world.q, COVER).rotation
+            surface = (PLACE, *(ARM.covers.radius[1] * (rotation.T @ DOWN))[1:])
+            rubbing = 0.3 * world.force(DOWN) * rotation[:, 0]
+            world.hand = -rubbing @ BODY.point_jacobian(world.q, COVER, surface)
+            out = world.step(task)
+        found.append((world.force(DOWN), sign * out.rows[0][2]))
+    assert found[0] == pytest.approx(found[1], rel=0.01)
+    assert found[0][1] == pytest.approx(found[0][0], rel=0.1)
+    assert found[0][0] > 5.0
+
+
+@pytest.mark.parametrize(("sd", "is_known"), [(0.01, True), (0.8, False)])
+def test_a_force_from_torques_that_are_known_badly_is_reported_with_its_uncertainty(sd: float, is_known: bool) -> None:
+    """As one that is commanded alone."""
+    world = Springs()
+    world.loop.tune(replace(OWN, feedback="contact_estimate"))
+    lever, still = world.lever(DOWN), State(POSE, REST, [1.0] * 4)
+    contact = Contact(COVER, PLACE, (0.0, 0.0, 5.0), 0.001, 1.0, 0.1)
+    external, task = (-5.0 * lever).tolist(), base(force(5.0))
+    for _ in range(400):
+        world.loop.step(still, None, contact, external, None, None, None, DT, task, external_sd=[sd] * 4)
+    assert ("known to +-" in world.loop.reason) is not is_known, world.loop.reason
+
+
 @pytest.mark.parametrize("stiffness", [400.0, 4000.0, 10000.0])
 def test_a_free_arm_follows_a_stiff_hand_without_oscillating(stiffness: float) -> None:
     world, task = Springs(), base(*joint_axes(AxisKind.IMPEDANCE, [None] * 4))

@@ -17,6 +17,7 @@ from wam_description.parameters import ParameterError, build_part
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ObjectState
 from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_sim.simulation import Simulation
 
@@ -150,6 +151,22 @@ def test_objects_that_are_switched_off_leave_the_model_as_it_was() -> None:
     assert all((world.bodies.names, world.doors.names, world.motions.obstacles))
     assert world.objects == ()
     assert mjcf(WAM, STEP, world, no_effects(WAM)) == mjcf(WAM, STEP, plain, no_effects(WAM))
+
+
+def test_elastic_friction_of_the_arm_leaves_free_bodies_and_doors_alone() -> None:
+    """They have torques of their own, which are behind those of the arm."""
+    elastic = dataclasses.replace(
+        COULOMB_STICTION, motor_presliding_stiffness=(50.0,), joint_presliding_stiffness=(400.0,)
+    )
+    found = []
+    for friction in (COULOMB_STICTION, elastic):
+        plant = Plant(WAM, World(TABLE, NO_SPRINGS, bodies=body(), doors=door()), no_effects(WAM), STEP, friction)
+        plant.data.joint("thing_pose").qvel[0] = 0.6
+        plant.data.joint("door_hinge").qvel[0] = 0.5
+        play(plant, 0.1)
+        found.append([plant.data.joint("thing_pose").qpos[0], plant.data.joint("door_hinge").qpos[0]])
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[0][0] > 0.72
 
 
 def test_the_inertia_is_that_of_a_uniform_body() -> None:
