@@ -1,5 +1,6 @@
 """`wam call` on a running stack: parameters, topics, pushes and the time."""
 
+import argparse
 import os
 import signal
 import subprocess
@@ -10,6 +11,8 @@ import pytest
 import yaml
 from conftest import LONG
 
+from wam_cli.commands.call import _wrench, arguments
+from wam_description.configuration import Configuration, packaged
 from wam_description.wiring import Call
 from wam_ros.call import CalledStack
 
@@ -106,6 +109,16 @@ def test_a_push_that_is_no_number_or_too_great_is_refused(words: tuple[str, ...]
     code, out, err = called("push", "outer_link", *words)
     assert (code, out) == (1, "")
     assert message in err
+
+
+def test_a_push_on_the_inner_link_acts_on_the_axis_of_its_tube() -> None:
+    parser = argparse.ArgumentParser()
+    arguments(parser)
+    given = parser.parse_args(["push", "inner_link", "0", "10", "0", "--at", "0.5"])
+    driver = Configuration.load(packaged("wam")).sections["/**"]
+    wrench, at, _ = _wrench(given, driver)
+    assert at == 0.5
+    assert wrench.torque == pytest.approx((-10.0 * 0.5 / 0.5588 * 0.04064, 0.0, 5.0), rel=1e-6)
 
 
 def test_the_tare_is_that_of_the_force_loop(stack: None) -> None:

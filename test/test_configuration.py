@@ -14,6 +14,7 @@ import yaml
 from wam_control.scenario_values import number
 from wam_description.configuration import Configuration, option_values, packaged
 from wam_description.parameters import ParameterError, build, parameter
+from wam_sim.simulation import Simulation
 
 WAM = Configuration.load(packaged("wam"))
 
@@ -257,6 +258,18 @@ def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: 
     path.write_text(text)
     with pytest.raises(ParameterError, match=message):
         Configuration.load(path)
+
+
+def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path) -> None:
+    """It was left out in silence, and with it a limit of the force."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n"
+        "/**: {ros__parameters: {nodes: [driver, transform, 'wam_control.gravity_node:GravityNode']}}\n"
+    )
+    found = Configuration.load(path)
+    with pytest.raises(ParameterError, match=r"section '/\*\*/force_lop' is of no node.*did you mean 'force_loop'"):
+        Simulation(found, [])
 
 
 def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -343,6 +343,21 @@ def test_a_wrong_bag_is_refused(bag: str, text: str) -> None:
         recorded_motion(recorded_run(read(folder, ["motor_states", "status"], may_lack=True)), WAM)
 
 
+def test_nothing_of_somebody_elses_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own, steps = tmp_path / "own.yaml", tmp_path / "steps.yaml"
+    own.write_text("base: wam\n")
+    steps.write_text("steps: []\n")
+    for words, reason in (
+        (["bag", "--config", str(own), "--write", str(own)], "is the configuration itself"),
+        (["--excite", str(steps), "--only-write"], "is another file; give a new one"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["identify", *words])
+        assert ended.value.code == 1
+        assert reason in capsys.readouterr().err
+    assert (own.read_text(), steps.read_text()) == ("base: wam\n", "steps: []\n")
+
+
 @pytest.mark.slow
 def test_the_exciting_scenario_is_one_that_plays_and_keeps_its_limits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -21,8 +21,10 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, fields, like, parameter, require, tunable, values
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_description.wiring import SetParameters as SetParametersRequest
 from wam_ros.bring_up import parameter_file
 from wam_ros.node import AdaptedNode, make_node
+from wam_ros.requests import refusal_of
 
 ROOT = Path(__file__).parents[1]
 WAM = Configuration.load(packaged("wam"))
@@ -330,6 +332,39 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
     assert (node.node.gain, node.node.servo) == (1.0, before)
     assert change(ros, "velocity_loop", gain=1.5, **{"servo.integral_gain": [3.0] * 4}).successful
     assert (node.node.gain, node.node.servo.integral_gain) == (1.5, (3.0,) * 4)
+
+
+def test_a_node_that_fails_on_a_value_keeps_the_old_one_and_says_so(ros: Any) -> None:
+    class Fails:
+        name, parameters = "velocity_loop", Gains
+
+        def __init__(self, shared: Shared, own: Gains) -> None:
+            self.gain = own.gain
+
+        @reaction(Input("motor_states"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+        def tune(self, own: Gains) -> None:
+            self.gain = own.gain
+            self.inverse = 1.0 / (own.gain - 0.75)
+
+    given = {**WAM.sections[SHARED], "gain": 1.0, "names": ["a"], "weights": [1.0]}
+    overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
+    node = ros.add(
+        AdaptedNode(declaration(Fails), namespace="/wam", context=ros.context, parameter_overrides=overrides)
+    )
+    refused = change(ros, "velocity_loop", gain=0.75)
+    assert not refused.successful
+    assert "the node failed on it: ZeroDivisionError" in refused.reason
+    assert node.node.gain == 1.0
+    assert node.get_parameter("gain").value == 1.0
+    assert change(ros, "velocity_loop", gain=0.5).successful
+
+
+def test_an_answer_without_a_result_is_no_success() -> None:
+    request = SetParametersRequest("filter", {"gain": 0.7})
+    assert "filter failed on it" in refusal_of(request, SetParameters.Response())
 
 
 def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:

@@ -164,6 +164,8 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
     steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), SHARED)
     out = play(Scenario(steps), 1)[0]
     np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
+    same = ScenarioStep("a", 0.2, push=Push("inner_link", 0.5588, (0.0, 10.0, 0.0), 0.0, 0.1))
+    np.testing.assert_allclose(play(Scenario([same], SHARED), 1)[0].push_torque, out.push_torque, rtol=1e-9)
 
 
 def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_without_a_pause(tmp_path: Path) -> None:

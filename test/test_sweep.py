@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from wam_cli.main import main
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -209,6 +210,41 @@ def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
+        (("scenario:script=a,b",), "the scenario is that of --scenario"),
+    ],
+)
+def test_an_axis_that_would_not_be_used_is_refused(
+    axes: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["sweep", str(tmp_path / "s.csv"), *(word for axis in axes for word in ("--vary", axis))])
+    assert ended.value.code
+    assert words in capsys.readouterr().err
+
+
+def test_runs_with_a_node_of_ones_own_are_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its code may have changed: what was kept of other code was taken for its own."""
+    monkeypatch.syspath_prepend(tmp_path)
+    module, overlay, script = tmp_path / "own_push.py", tmp_path / "own.yaml", tmp_path / "steps.yaml"
+    module.write_text("from wam_control.gravity_node import GravityNode as Own\n")
+    overlay.write_text(
+        "base: wam\n/**: {ros__parameters: {nodes: [driver, transform, velocity_loop, 'own_push:Own']}}\n"
+    )
+    script.write_text("steps:\n  - {name: release, seconds: 0.1, request: enable}\n")
+    command = ["sweep", str(tmp_path / "s.csv"), "--config", str(overlay), "--scenario", str(script), "--workers", "1"]
+    for _ in range(2):
+        with pytest.raises(SystemExit):
+            main([*command, "--vary", "arm.payload=0.0", "--keep", str(tmp_path / "kept")])
+        assert "from an earlier run" not in capsys.readouterr().err
+    assert not list((tmp_path / "kept").glob("**/*.*"))
+
+
 def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path) -> None:
     table, plot = tmp_path / "sweep.csv", tmp_path / "sweep.png"
     command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--config", "testbed", "--fresh"]

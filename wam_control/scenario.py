@@ -72,12 +72,12 @@ class Push(NamedTuple):
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
-    aside: tuple[float, float] = (0.0, 0.0)  # m, y and z of the tube's axis there
+    aside: tuple[float, float] | None = None  # m, y and z of the tube's axis there; of the arm by default
 
     @property
     def torque(self) -> Triple:
         """About the origin of the cover, N m."""
-        x, y, z = self.position, *self.aside
+        x, y, z = self.position, *(self.aside or (0.0, 0.0))
         fx, fy, fz = self.force
         return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
@@ -175,6 +175,7 @@ class Scenario:
         if shared is not None:
             for i, step in enumerate(steps):
                 _require_step(f"step {i + 1}", step, shared)
+            steps = [s._replace(push=_on_axis(s.push, shared.arm)) if s.push else s for s in steps]
         self._steps, self._shared = list(steps), shared
         self._motion: Motion | None = None
         self._rate: tuple[float, ...] = ()
@@ -617,7 +618,12 @@ def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
     begin, end = number(where, "begin", body.get("begin", 0.0)), number(where, "end", body.get("end", seconds))
     push = Push(body["cover"], place, (x, y, z), begin, end)
     _require_place(where, push, arm)
-    return push._replace(aside=arm.covers.aside(push.cover, place))
+    return _on_axis(push, arm)
+
+
+def _on_axis(push: Push, arm: Arm) -> Push:
+    """The push with where the tube's axis is, unless it has that."""
+    return push if push.aside else push._replace(aside=arm.covers.aside(push.cover, push.position))
 
 
 def _require_place(where: str, push: Push, arm: Arm) -> None:

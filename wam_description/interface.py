@@ -2,6 +2,7 @@
 
 import importlib
 from collections.abc import Callable, Collection, Iterable, Mapping
+from difflib import get_close_matches
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
+NEARLY = 0.8  # of the letters
 TOGETHER = 0.7  # of the age of the oldest: topics of this age have stopped with it, younger ones are only late
 
 
@@ -47,6 +49,25 @@ def declared(entry: str) -> Declaration:
         return declaration(found)
     except TypeError as error:
         raise ParameterError(f"node '{entry}': {error}") from error
+
+
+def require_sections(sections: Iterable[str], entries: Iterable[str]) -> None:
+    """Refuse a section that is of no node, but nearly of one: next to nodes of one's own, its name alone shows that.
+
+    Parameters
+    ----------
+    sections : names of the nodes for which a configuration has parameters.
+    entries : of the parameter `nodes`.
+
+    Raises
+    ------
+    ParameterError
+        where a section is of no node and has nearly the name of one.
+    """
+    names = {declared(entry).name for entry in entries}
+    for section in set(sections) - names - set(NODES):
+        if near := get_close_matches(section, [*NODES, *names], n=1, cutoff=NEARLY):
+            raise ParameterError(f"section '/**/{section}' is of no node in 'nodes'; did you mean '{near[0]}'?")
 
 
 def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:

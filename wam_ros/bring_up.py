@@ -16,7 +16,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
-from wam_description.interface import declared
+from wam_description.interface import declared, require_sections
 from wam_description.nodes import EACH, ONE
 from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
@@ -56,6 +56,7 @@ def start(
     """
     names = node_names(configuration)
     require_places(names.values(), namespace)
+    require_sections(configuration.sections, names)
     for entry, name in names.items():
         if name in configuration.sections:
             configuration.node(name, declared(entry).parameter_class)  # refused before anything starts

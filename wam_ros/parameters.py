@@ -16,6 +16,7 @@ from rclpy.qos import qos_profile_parameter_events
 
 from wam_description.arm import Shared
 from wam_description.parameters import Field, ParameterError, build, fields, listed, values
+from wam_description.wiring import raised
 
 T = TypeVar("T")
 OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
@@ -118,6 +119,11 @@ def follow_together(
                     present[i] = before[i]
                     take(before[i])
             return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:  # of a node of one's own: it must not go on with a part of the set
+            present[:] = before
+            for own, (_, take, _) in zip(before, parts, strict=True):
+                take(own)
+            return SetParametersResult(successful=False, reason=f"the node failed on it: {raised(error)}")
         if present != before:
             report(given)
         return SetParametersResult(successful=True)

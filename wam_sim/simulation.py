@@ -14,7 +14,7 @@ from wam_control.reaction_status import stated
 from wam_control.scenario import FORCE_LOOP, Scenario, ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
-from wam_description.interface import Interface
+from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
 from wam_description.signals import BASE, Level, NodeStatus, Point, State, Wrench
 from wam_description.synchroniser import Inputs, Synchroniser
@@ -80,6 +80,7 @@ class Simulation:
         self._reasons: list[tuple[int, dict[str, str]]] = []  # why the force loop does not obey, each time this changes
         self.nodes: dict[str, Any] = {}
         self._synchronisers: dict[str, set[Synchroniser]] = {}
+        require_sections(configuration.sections, shared.nodes)
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
                 self._connect(name, declaration, shared, configuration, steps)

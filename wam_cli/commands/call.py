@@ -14,6 +14,7 @@ from typing import Any, Final
 import yaml
 
 from wam_cli.commands import at_least, namespace
+from wam_control.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
@@ -253,7 +254,8 @@ def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrenc
     if not low <= at <= high:
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
-    wrench = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
+    on_axis = Push(given.cover, at, (x, y, z), 0.0, given.seconds, covers.aside(given.cover, at))
+    wrench = Wrench(given.cover, on_axis.force, on_axis.torque)
     if excess := shared.push_excess(wrench.force, wrench.torque):
         raise ValueError(excess)
     return wrench, at, shared

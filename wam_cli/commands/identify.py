@@ -33,6 +33,7 @@ from wam_ros.run import NAMESPACE
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
 
+HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
 TOPICS = ("motor_states", "status", *LOADS)
 
 
@@ -62,6 +63,7 @@ def run(given: argparse.Namespace) -> int:
     for option, file in (("--write", given.write), ("--excite", given.excite)):
         if file is not None:
             writable_file(option, file)
+    _refuse_loss(given)
     bag = given.bag
     if given.excite is not None:
         bag = _excite(configuration, given)
@@ -95,6 +97,16 @@ def run(given: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse_loss(given: argparse.Namespace) -> None:
+    """Refuse to write over the configuration that is read, or over a scenario that is somebody's own."""
+    if given.write is not None and Path(given.config).resolve() == given.write.resolve():
+        raise ValueError(f"--write {given.write} is the configuration itself; give another file, which builds on it")
+    if given.excite is not None and given.excite.exists():
+        text = given.excite.read_text(encoding="utf-8", errors="replace")
+        if text.strip() and not text.startswith(HEADING):
+            raise ValueError(f"--excite {given.excite} would be written, and it is another file; give a new one")
+
+
 def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
     """Refuse a bag of an arm with another transmission, as far as the bag has it."""
     if "driver" not in run.parameters.nodes:
@@ -123,7 +135,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
         writable_directory("--directory", given.directory)
     text = yaml.safe_dump(scenario(configuration, given.seed, given.seconds), sort_keys=False, default_flow_style=None)
     command = f"wam identify --excite {given.excite} --seed {given.seed} --seconds {given.seconds:g}"
-    given.excite.write_text(f"# Moves that show the arm's parameters: {command}\n{text}", encoding="utf-8")
+    given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
     print(f"written: {given.excite}; on an arm of yours: wam up --record --scenario {given.excite}{still}", flush=True)
     if given.only_write:

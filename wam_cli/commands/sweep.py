@@ -73,10 +73,21 @@ def run(given: argparse.Namespace) -> int:
     if given.picture:
         writable_picture("--picture", given.picture)
     axes: list[Axis] = given.vary
+    _refuse_idle(axes)
     sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
     failed = sum((_of_experiment if given.experiment else _of_scenario)(given, axes, sets))
     print(f"{len(sets)} sets, {failed} failed, in {given.file}")
     return int(failed == len(sets))
+
+
+def _refuse_idle(axes: list[Axis]) -> None:
+    """Refuse an axis whose values would stand in the table without having been used."""
+    names = [axis.name for axis in axes]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
+        if name.partition(":")[0] in ("scenario", "recorder"):
+            raise ValueError(f"--vary {name}: a run of a sweep has no such node; the scenario is that of --scenario")
 
 
 def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
@@ -86,7 +97,8 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> lis
     path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
     runs = points(configuration, load(path, configuration.shared), axes, sets)
     with batch_of(given) as batch:
-        found = sweep(runs, *batch)
+        is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
+        found = sweep(runs, batch.executor, None if is_own else batch.folder, batch.report)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
         scenario_figure(given.picture, axes, sets, found)
