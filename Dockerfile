@@ -3,7 +3,7 @@ FROM debian:bookworm-slim
 
 RUN apt-get update \
     && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
-        chromium git libegl1 libgl1 libgomp1 libosmesa6 make procps python3 python3-venv \
+        chromium gcc git libc6-dev libegl1 libgl1 libgomp1 libosmesa6 make procps python3 python3-dev python3-venv \
     && rm -rf /var/lib/apt/lists/*
 
 # a user of its own: Chromium and the tests of permissions want no root

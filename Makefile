@@ -14,9 +14,10 @@ STAMPS := $(VENV)/stamps-$(shell pwd | cksum | cut -d ' ' -f 1)
 # A change in any of these files reinstalls the package.
 SOURCE := setup.py setup.cfg pyproject.toml package.xml config launch resource scripts wam_*
 SOURCE_ID := $(shell find $(SOURCE) -type f ! -name '*.pyc' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c 1-16)
-# COMPILE=1: the inner loop as C; stays so until COMPILE= or `make clean`
-COMPILE ?= $(if $(wildcard $(STAMPS)/compiled),1)
-INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)$(if $(COMPILE),-compiled)
+# The inner loop as C, with the same bits, where there is a compiler.  COMPILE=1: or the reason why not; COMPILE=0: as plain
+# Python, which stays so until COMPILE=1 or `make clean`.
+COMPILE ?= $(if $(wildcard $(STAMPS)/plain),0,auto)
+INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)$(if $(filter 0,$(COMPILE)),-plain)
 
 # A sourced ROS or another environment must not reach .venv: its libraries would mix with those of the wheels.
 unexport PYTHONPATH PYTHONHOME RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -43,7 +44,7 @@ help:  ## print this list
 demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam box, record, report; ARGS="--real-time-factor 0"
 	@$(VENV)/bin/wam demo $(ARGS)
 
-install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help; COMPILE=1: the inner loop as C
+install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help; COMPILE=0: nothing as C
 
 dependencies: $(STAMPS)/test  # for the container: everything but the package itself
 
@@ -88,7 +89,7 @@ endef
 
 constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[completion,docs,live,ros,test,view]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[compile,completion,docs,live,ros,test,view]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \
@@ -108,7 +109,7 @@ $(STAMPS)/venv:
 		echo "Could not make $(VENV); on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	@mkdir -p $(STAMPS) && touch $@
 
-ROS_EXTRAS := completion,live,ros
+ROS_EXTRAS := compile,completion,live,ros
 TEST_EXTRAS := $(ROS_EXTRAS),test
 DOCS_EXTRAS := $(TEST_EXTRAS),docs
 
@@ -133,11 +134,19 @@ $(STAMPS)/docs: $(STAMPS)/test
 	@echo "Installing what builds the site"
 	$(call INSTALL_WITH,$(DOCS_EXTRAS))
 
-$(INSTALLED): $(STAMPS)/$(if $(COMPILE),test,ros)
-	@rm -f $(STAMPS)/installed-* $(STAMPS)/compiled
+REINSTALL := $(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
+
+$(INSTALLED): $(STAMPS)/ros
+	@rm -f $(STAMPS)/installed-* $(STAMPS)/plain
 	@$(TIDY)
-	$(if $(COMPILE),@echo "Compiling the inner loop: some minutes")
-	@$(if $(COMPILE),WAM_COMPILE=1) $(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
-	@$(if $(COMPILE),touch $(STAMPS)/compiled)
+	$(if $(filter-out 0,$(COMPILE)),@echo "Compiling the inner loop: about a minute; COMPILE=0 leaves it as plain Python")
+ifeq ($(COMPILE),auto)
+	@WAM_COMPILE=auto $(REINSTALL) 2>$(STAMPS)/compile.log || WAM_COMPILE= $(REINSTALL)
+	@cd $(VENV) && bin/python3 -c 'import wam_driver.fast_steps' 2>/dev/null || \
+		echo "It stays plain Python, with the same numbers; as C: apt install gcc python3-dev, then make install COMPILE=1"
+else
+	@WAM_COMPILE=$(filter-out 0,$(COMPILE)) $(REINSTALL)
+	@$(if $(filter 0,$(COMPILE)),touch $(STAMPS)/plain)
+endif
 	@$(TIDY)
 	@touch $@

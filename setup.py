@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+import sysconfig
 from glob import glob
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +17,7 @@ NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
 PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
 # The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py).
-# The substeps of the plant are C then, too: wam_driver/fast_steps.c.
+# The substeps of the plant are C then, too: wam_driver/fast_steps.c.  WAM_COMPILE=auto: only where that is possible.
 COMPILED = (
     "wam_control/arm_push.py",
     "wam_control/bumpless_transfer.py",
@@ -65,7 +66,10 @@ CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets", "co
 
 def extensions():
     """C extensions of the modules that are compiled; none without WAM_COMPILE."""
-    if not os.environ.get("WAM_COMPILE"):
+    wanted = os.environ.get("WAM_COMPILE")
+    compiler = str(sysconfig.get_config_var("CC") or "cc").split()[0]
+    is_possible = shutil.which(compiler) and Path(sysconfig.get_path("include"), "Python.h").exists()
+    if not wanted or (wanted == "auto" and not is_possible):
         return []
     try:
         from mypyc.build import mypycify
@@ -122,6 +126,8 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # the inner loop as C: WAM_COMPILE
+        "compile": ["mypy", "setuptools<80"],
         # Tab in the shell: `wam completion bash`
         "completion": ["argcomplete"],
         # maps and benchmarks on many machines: `wam map --dask ADDRESS`

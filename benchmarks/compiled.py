@@ -1,9 +1,11 @@
 """The inner loop compiled to C by mypyc against the same source as plain Python: a direct run, substeps of the plant.
 
-A copy of the tree is compiled (`WAM_COMPILE`, see setup.py); both answer in turns, and every number that the run
-publishes has to have the same bits.  With `--folder` the compiled copy stays there for the next time.
+The compiled one is what is installed, if it is of the same source; otherwise a copy of the tree is compiled
+(`WAM_COMPILE`, see setup.py).  Both answer in turns, and every number that the run publishes has to have the same bits.
+With `--folder` the compiled copy stays there for the next time.
 """
 
+import filecmp
 import hashlib
 import json
 import os
@@ -38,6 +40,16 @@ CASES = {
     "in contact": lambda: Case(pose_in_contact(), extra=0.0),
     "testbed, moving": lambda: Case((0.1,), extra=0.2, name="testbed"),
 }
+
+
+def installed() -> Path | None:
+    """Where the compiled packages of this source are installed; None where they are not."""
+    site = Path(sysconfig.get_path("purelib"))
+    if not any(site.glob("wam_driver/fast_steps.*.so")):
+        return None
+    sources = [path.relative_to(ROOT) for path in ROOT.glob("wam_*/**/*.py")]
+    _, differing, missing = filecmp.cmpfiles(ROOT, site, map(str, sources), shallow=False)
+    return None if differing or missing else site
 
 
 def compiled(folder: Path) -> Path:
@@ -117,7 +129,7 @@ def main() -> None:
     with ExitStack() as stack:
         folder = given.folder or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="wam_bench_")))
         folder.mkdir(parents=True, exist_ok=True)
-        trees = [compiled(folder), ROOT]
+        trees = [(not given.folder and installed()) or compiled(folder), ROOT]
         children = [stack.enter_context(server(tree, seconds)) for tree in trees]
         direct: list[list[Any]] = [[], []]
         substeps: dict[str, list[list[Any]]] = {name: [[], []] for name in CASES}
@@ -142,7 +154,7 @@ def main() -> None:
     for name, (ours, theirs) in substeps.items():
         over, under = ([plant / bare for plant, bare in each] for each in (ours, theirs))
         add(f"substep over mj_step, {name}", over, under, ratios(under, over), SUBSTEP)
-    print(machine())
+    print(machine().rpartition(", ")[0])
     print(table(["equal bits", "compiled", "plain", "faster by (middle half)", "[must, aim]"], rows))
     save("compiled", given, measured)
 

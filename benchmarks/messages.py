@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any
 
+import comparing.source_tree  # noqa: F401 - before the packages
 from comparing import arguments, machine, quartiles, ratios, save, table
 from parts import NODES
 from speed import scenario_steps

@@ -11,6 +11,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
+import comparing.source_tree  # noqa: F401 - before the packages
 import yaml
 from comparing import arguments, machine, quartiles, save, table
 from speed import scenario

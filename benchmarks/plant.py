@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+import comparing.source_tree  # noqa: F401 - before the packages
 import mujoco
 import numpy as np
 from comparing import Quartiles, arguments, machine, mark, quartiles, ratios, save, table

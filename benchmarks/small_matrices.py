@@ -5,6 +5,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
+import comparing.source_tree  # noqa: F401 - before the packages
 import numpy as np
 from comparing import arguments, machine, quartiles, ratios, save, table
 from speed import scenario_steps

@@ -17,7 +17,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.defects import UnusableOutput
 from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
-from wam_description.signals import ForceCommand, Level, NodeStatus, State
+from wam_description.signals import ForceCommand, Level, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.topics import JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
 from wam_description.wiring import Call, Input, Outputs, declaration, reaction
@@ -109,6 +109,62 @@ def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
     run = Simulation(configured, steps, controllers={"echo": Echo})
     assert run.play() == ""
     assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
+
+
+class Arrays:
+    """Takes the place of the example's controller: its torques as arrays of numpy, a velocity command as a tuple."""
+
+    name, parameters = "damping", Nothing
+    topics = (
+        Topic("strength", WRENCH, "outer", "of the torques, N m", ""),
+        Topic("rows", TABLE, "outer", "the same", columns=("torque",)),
+    )
+    kind: Any = staticmethod(np.array)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(
+        Input("joint_states", "velocity"),
+        outputs=("joint_velocity_command", "joint_effort_command", "strength", "rows"),
+    )
+    def step(self, inputs: Inputs) -> Outputs:
+        torques = self.kind([-3.0 * v for v in inputs["joint_states"].velocity])
+        return {
+            "joint_velocity_command": State((), (), ()),  # type: ignore[arg-type]
+            "joint_effort_command": State(self.kind([]), self.kind([]), torques),
+            "strength": Wrench("base", self.kind([0.0, 0.0, sum(torques)]), self.kind([0.0] * 3)),
+            "rows": Table("base", self.kind([[torque] for torque in torques])),
+        }
+
+
+class Lists(Arrays):
+    """The same as lists."""
+
+    kind = staticmethod(list)
+
+
+class Takes(Echo):
+    """Takes what they publish, so that it is looked at."""
+
+    name = "takes"
+    topics = ()
+
+    @reaction(Input("strength"), Input("rows"), outputs=())
+    def step(self, inputs: Inputs) -> Outputs:
+        assert type(inputs["strength"].force) is tuple
+        assert type(inputs["rows"].rows[0][0]) is float
+        return {}
+
+
+def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(configured: Configuration, tmp_path: Path) -> None:
+    own = {"nodes": [node for node in configured.shared.nodes if ":" not in node]}
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    runs = [
+        Simulation(configured.with_values(own), steps, {"damping": kind, "takes": Takes}) for kind in (Arrays, Lists)
+    ]
+    assert [run.play() for run in runs] == ["", ""]
+    assert np.abs([row.values for row in runs[0].rows["joint_effort_command"]]).max() > 0.01, "zeros would show nothing"
+    assert repr(runs[0].rows) == repr(runs[1].rows), "as text, in which NaN equals NaN"
 
 
 class Misspelt:

@@ -1,6 +1,7 @@
 """What makes a value of a topic unusable: wrong lengths, numbers that are not finite or that no arm reaches.
 
-Messages that come over topics and what a node returns are refused for the same reasons, in the same words.
+Messages that come over topics and what a node returns are refused for the same reasons, in the same words.  What a node
+returns may be any sequence of numbers, as a numpy array; the others get lists and tuples of Python's own.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,7 +11,7 @@ from typing import Any
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
 
-Check = Callable[[Any], None]  # raises UnusableOutput
+Check = Callable[[Any], Any]  # the value in lists and tuples of floats; raises UnusableOutput
 _KINDS: dict[str, Any] = {JOINT_STATE: State, WRENCH: Wrench, POINT: Point, TABLE: Table}
 
 
@@ -23,7 +24,7 @@ class UnusableOutput(ValueError):
 
 
 def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence[str], arrays: str) -> Check:
-    """What refuses an unusable output of a node.
+    """What refuses an unusable output of a node, and returns another as the nodes of the stack take it.
 
     Parameters
     ----------
@@ -41,15 +42,28 @@ def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence
         TABLE: lambda value: table_defect(value, topic.columns, frames),
     }[topic.type]
 
-    def check(value: Any) -> None:
+    def check(value: Any) -> Any:
         try:
             defect = look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
+            if not defect:
+                return _AS_TAKEN[topic.type](value)
         except (TypeError, ValueError) as error:
             defect = f"{value} does not hold numbers: {error}"
-        if defect:
-            raise UnusableOutput(node, topic.name, defect)
+        raise UnusableOutput(node, topic.name, defect)
 
     return check
+
+
+def _floats(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(map(float, values))
+
+
+_AS_TAKEN: dict[str, Callable[[Any], Any]] = {
+    JOINT_STATE: lambda state: State(*(list(map(float, values)) for values in state)),
+    WRENCH: lambda wrench: Wrench(wrench.frame, _floats(wrench.force), _floats(wrench.torque)),  # type: ignore[arg-type]
+    POINT: lambda point: Point(point.frame, _floats(point.position)),  # type: ignore[arg-type]
+    TABLE: lambda table: Table(table.frame, tuple(map(_floats, table.rows))),
+}
 
 
 def state_defect(state: State, owners: Sequence[str], arrays: str) -> str:

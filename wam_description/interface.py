@@ -161,7 +161,7 @@ class Interface:
         )
 
     def checks(self, declaration: Declaration) -> dict[str, Check]:
-        """What refuses an unusable output of a node of your own, by topic, where another node takes it.
+        """What looks at an output of a node of your own, by topic, where another node takes it; see `output_check`.
 
         The nodes of the stack are not looked at: the simulation would be slower by a twentieth.
         """

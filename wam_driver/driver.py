@@ -163,7 +163,7 @@ class Driver:
         self.stamp = tick * self._timing.period_ns
         self.is_outer = self._timing.is_outer(self.stamp)
 
-    def command(self, stamp: int, currents: list[float]) -> None:
+    def command(self, stamp: int, currents: Sequence[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
 
         The command is ignored unless the driver is enabled.  It is also ignored if its state is older than the

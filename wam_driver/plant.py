@@ -239,7 +239,7 @@ class Plant:
         self._kept = position, (plastic + (self._plastic - before)).tolist()
         self._is_set = False
 
-    def step(self, torque: list[float], count: int = 1) -> None:
+    def step(self, torque: Sequence[float], count: int = 1) -> None:
         """Advance by one step or several.
 
         Parameters

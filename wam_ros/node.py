@@ -232,9 +232,8 @@ class AdaptedNode(TolerantNode):
             elif topic not in self._outputs:
                 self._declaration.require_declared(outputs)
             else:
-                if (check := self._checks.get(topic)) is not None:
-                    check(value)
-                self._ports.publish(topic, stamp, value)
+                check = self._checks.get(topic)
+                self._ports.publish(topic, stamp, check(value) if check else value)
         if self._ports.report_due(stamp):
             if diagnostics := getattr(self.node, "diagnostics", None):
                 self._ports.facts |= diagnostics()

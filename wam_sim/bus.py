@@ -52,7 +52,7 @@ class Bus:
         ----------
         declaration : of the node.
         feeds : its reactions to each topic.
-        checks : what refuses an unusable output, by topic.
+        checks : what each output goes through, by topic; see `output_check`.
         """
         outlets = _Outlets(declaration)
         for name in declaration.outputs:
@@ -206,16 +206,13 @@ def _masked_inlet(feed: Feed, topic: str) -> Inlet:
 
 
 def _checked(work: Work, checks: Mapping[str, Check]) -> Work:
-    """A step whose unusable outputs are refused."""
+    """A step whose outputs are as others take them; an unusable one is refused."""
     if not checks:
         return work
 
     def step(inputs: Inputs) -> Outputs:
         outputs = work(inputs)
-        for name, output in outputs.items():
-            if name in checks:
-                checks[name](output)
-        return outputs
+        return {name: checks[name](output) if name in checks else output for name, output in outputs.items()}
 
     return step
 

@@ -12,6 +12,7 @@ import statistics
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,7 +78,8 @@ def machine() -> str:
         names = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
         cpu = names[0] if names else ""
     python = f"Python {platform.python_version()}"
-    return f"{os.cpu_count()} cores, {cpu or platform.machine()}, {platform.system()}, {python}"
+    edition = "inner loop as C" if find_spec("wam_driver.fast_steps") else "plain"
+    return f"{os.cpu_count()} cores, {cpu or platform.machine()}, {platform.system()}, {python}, {edition}"
 
 
 def save(name: str, given: argparse.Namespace, measured: Mapping[str, Any]) -> None:
