@@ -14,10 +14,10 @@ STAMPS := $(VENV)/stamps-$(shell pwd | cksum | cut -d ' ' -f 1)
 # A change in any of these files reinstalls the package.
 SOURCE := setup.py setup.cfg pyproject.toml package.xml config launch resource scripts wam_*
 SOURCE_ID := $(shell find $(SOURCE) -type f ! -name '*.pyc' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c 1-16)
-# The inner loop as C, with the same bits, where there is a compiler.  COMPILE=1: or the reason why not; COMPILE=0: as plain
-# Python, which stays so until COMPILE=1 or `make clean`.
-COMPILE ?= $(if $(wildcard $(STAMPS)/plain),0,auto)
-INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)$(if $(filter 0,$(COMPILE)),-plain)
+# auto: the inner loop as C, with the same bits, where there is a compiler; 1: or the reason why not; 0: as plain Python.
+# It stays so until another is given, or `make clean`.
+COMPILE ?= $(or $(patsubst $(STAMPS)/compile-%,%,$(wildcard $(STAMPS)/compile-?)),auto)
+INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)-$(COMPILE)
 
 # A sourced ROS or another environment must not reach .venv: its libraries would mix with those of the wheels.
 unexport PYTHONPATH PYTHONHOME RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -36,7 +36,7 @@ export MPLCONFIGDIR ?= $(CURDIR)/.cache/matplotlib
 .NOTPARALLEL:
 
 # Remove what a build leaves here: build/lib would bring back deleted modules
-TIDY := rm -rf build/lib build/bdist.* *.egg-info; rmdir build 2>/dev/null || true
+TIDY := rm -rf build/lib* build/temp* build/mypyc build/launchers build/bdist.* *.egg-info; rmdir build 2>/dev/null || true
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-12s %s\n", $$1, $$2}' Makefile
@@ -137,16 +137,16 @@ $(STAMPS)/docs: $(STAMPS)/test
 REINSTALL := $(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
 
 $(INSTALLED): $(STAMPS)/ros
-	@rm -f $(STAMPS)/installed-* $(STAMPS)/plain
+	@rm -f $(STAMPS)/installed-* $(STAMPS)/compile-?
 	@$(TIDY)
-	$(if $(filter-out 0,$(COMPILE)),@echo "Compiling the inner loop: about a minute; COMPILE=0 leaves it as plain Python")
 ifeq ($(COMPILE),auto)
-	@WAM_COMPILE=auto $(REINSTALL) 2>$(STAMPS)/compile.log || WAM_COMPILE= $(REINSTALL)
+	@echo "Compiling the inner loop, where there is a compiler: about a minute; COMPILE=0 leaves it as plain Python"
+	@WAM_COMPILE=auto $(REINSTALL) 2>$(STAMPS)/compile.log || $(REINSTALL)
 	@cd $(VENV) && bin/python3 -c 'import wam_driver.fast_steps' 2>/dev/null || \
 		echo "It stays plain Python, with the same numbers; as C: apt install gcc python3-dev, then make install COMPILE=1"
 else
 	@WAM_COMPILE=$(filter-out 0,$(COMPILE)) $(REINSTALL)
-	@$(if $(filter 0,$(COMPILE)),touch $(STAMPS)/plain)
+	@touch $(STAMPS)/compile-$(COMPILE)
 endif
 	@$(TIDY)
 	@touch $@

@@ -1,6 +1,7 @@
 """Steps of the plant in C, as WAM_COMPILE builds them, against the plain way: the same bits and the same failures."""
 
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -141,3 +142,33 @@ def test_a_failure_in_python_comes_through(with_c: pytest.MonkeyPatch) -> None:
 def test_it_is_not_used_with_another_mujoco(built: Any, with_c: pytest.MonkeyPatch) -> None:
     with_c.setattr(built, "MUJOCO", built.MUJOCO + 1)
     assert plant()._advance is None
+
+
+LIST_EXTENSIONS = """
+import runpy, setuptools
+setuptools.setup = lambda **given: print("extensions:", len(given["ext_modules"]))
+runpy.run_path("setup.py", run_name="__main__")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("wanted", "is_there", "count"), [("auto", False, 0), ("", True, 0), ("auto", True, None)])
+def test_the_package_is_compiled_where_that_is_possible(
+    wanted: str, is_there: bool, count: int | None, tmp_path: Path
+) -> None:
+    for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml"):
+        shutil.copy(SOURCE.parents[1] / name, tmp_path)
+    for path in [SOURCE.parents[1] / "scripts", *SOURCE.parents[1].glob("wam_*")]:
+        (tmp_path / path.name).symlink_to(path)
+    path = str(Path(shutil.which(COMPILER) or "").parent) if is_there else str(tmp_path)
+    environment = {**os.environ, "PATH": path, "WAM_COMPILE": wanted, "PYTHONPATH": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", LIST_EXTENSIONS],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = int(done.stdout.rpartition("extensions: ")[2])
+    assert found == count if count is not None else found > 1

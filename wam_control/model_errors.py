@@ -104,6 +104,14 @@ class ModelErrors:
         self._waiting.clear()
         self._since = self._contact = self._hold = 0.0
 
+    def learn(self, other: "ModelErrors") -> None:
+        """Take over what another one has learned."""
+        self.errors, self.covariance = other.errors.copy(), other.covariance.copy()
+        self.noise, self.size, self.beyond = other.noise.copy(), other.size, other.beyond
+        self._at, self._of_pose, self._rested = other._at, other._of_pose, other._rested
+        elsewhere = other._elsewhere
+        self._elsewhere = None if elsewhere is None else (elsewhere[0].copy(), elsewhere[1].copy())
+
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
         effects = seen.effects

@@ -145,6 +145,15 @@ class MomentumObserver:
         self.seen: Observation | None = None
         self.is_ready = False
 
+    def learn(self, other: "MomentumObserver") -> None:
+        """Take over what another one of the same parameters has learned and keeps at a reset."""
+        self._errors.learn(other._errors)
+        self._velocity.learn(other._velocity)
+        if self._load is not None and other._load is not None:
+            self._load.mass, self._load.sd = other._load.mass, other._load.sd
+        self._motors.learn(other._motors)
+        self._joints.learn(other._joints)
+
     def observe(self, state: State, dt: float) -> bool:
         """Take one sample.
 

@@ -1,6 +1,5 @@
 """Run the contact estimator on a recording: what it reports of each contact, and between contacts."""
 
-import copy
 import math
 from collections.abc import Iterator, Sequence
 from itertools import takewhile
@@ -183,8 +182,7 @@ def replay(configuration: Configuration, name: str, recording: DriveRecording, s
             if touch.begin + START_AFTER <= time < touch.begin + START_AFTER + START_WITHIN:
                 if number not in trials:
                     cold = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
-                    trials[number] = copy.deepcopy(estimator), cold
-                    trials[number][0].reset()
+                    trials[number] = estimator.restarted_copy(), cold
                 for trial in trials[number]:
                     trial.observe(state, None, dt)
                 if i % outer == 0:
