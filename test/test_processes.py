@@ -564,12 +564,66 @@ def test_wrong_ros_arguments_are_said_without_a_traceback(
     assert "Traceback" not in stack.said()
 
 
-def test_record_writes_the_bag_that_was_asked_for(started: Any, tmp_path: Path, ros: Any) -> None:
-    stack = started("-m", "wam_cli.main", "record", "--name", "mine", "--directory", str(tmp_path / "here"))
-    wait(lambda: list(tmp_path.glob("here/mine/*.mcap")), f"the bag; {stack.said()}")
-    stack.process.send_signal(signal.SIGINT)
-    wait(lambda: stack.process.poll() is not None, "the end", soon())
-    assert (tmp_path / "here" / "mine" / "metadata.yaml").is_file(), stack.said()
+OWN = """
+from wam_description.parameters import Nothing
+from wam_description.topics import JOINT_STATE, Topic
+from wam_description.wiring import Input, reaction
+
+
+class Echo:
+    name, parameters = "echo", Nothing
+    topics = (Topic("echo", JOINT_STATE, "outer", "the torques of gravity, N m", "joints"),)
+
+    def __init__(self, shared, own):
+        pass
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+    def step(self, inputs):
+        return {"echo": inputs["gravity_effort"]}
+"""
+
+
+@pytest.mark.parametrize("mode", ["realtime", "lockstep"])
+def test_record_takes_mode_and_nodes_from_the_running_stack(
+    mode: str, started: Any, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    (tmp_path / "own_echo.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    configured = Configuration.load(packaged("wam")).with_nodes("own_echo:Echo").with_values({"timing.mode": mode})
+    path = os.pathsep.join([str(ROOT), str(tmp_path)])
+    with Composition(configured, "left", domain_id) as composition:
+        words = ("--name", "mine", "--directory", str(tmp_path / "bags"), "--namespace", "left")
+        stack = started("-m", "wam_cli.main", "record", *words, PYTHONPATH=path)
+        begin = time.monotonic()
+        composition.spin(lambda: recorded(stack) > 400_000 or time.monotonic() - begin > LONG)
+        assert recorded(stack) > 400_000, stack.said()
+        stack.process.send_signal(signal.SIGINT)
+        composition.spin(lambda: stack.process.poll() is not None or time.monotonic() - begin > LONG)
+    assert stack.process.returncode == 0, stack.said()
+    nodes = "driver, transform, velocity_loop, gravity, force_loop, contact_estimator, echo"
+    assert stack.said().startswith(f"the stack in /left runs in {mode}: {nodes}\n")
+    bag = read(tmp_path / "bags" / "mine")
+    assert bag.metadata["recording"]["mode"] == mode
+    assert (bag.first_ns > 10**18) is (mode == "realtime"), "a time of day, or one of the arm's"
+    assert bag.counts["/left/echo"] > 0
+    assert b"/left/echo:" in bag.attachments["parameters.yaml"]
+
+
+def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr("wam_ros.call.PATIENCE", 0.2)
+    code, _, err = command(capfd, "record", "--directory", str(tmp_path / "bags"))
+    assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
+    assert err == "wam record: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
+
+
+def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) -> None:
+    code, _, err = command(capsys, "record", "--set", "timing.mode=realtime")
+    assert code == 1
+    assert "--set timing.mode has no effect here: the running stack has its own" in err
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf"])
@@ -690,9 +744,9 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     patience = 4.0  # s; each of the six nodes would wait as long
     monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", patience)
     configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
-    listener = started("-m", "wam_cli.main", "record", "--name", "outside")
     begin = time.monotonic()
     with Composition(configured, domain_id=domain_id) as composition:
+        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
         composition.spin(lambda: recorded(listener) > 400_000 or time.monotonic() - begin > LONG)
         assert recorded(listener) > 400_000, listener.said()
         listener.process.send_signal(signal.SIGSTOP)

@@ -326,6 +326,54 @@ def test_a_bag_that_cannot_be_made_stops_the_node_before_it_starts(ros: Any, tmp
         recorder(ros, tmp_path, name="../bag")
 
 
+def by_hand(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
+    """A recorder that is not among the nodes of the stack."""
+    return recorder(ros, directory, nodes=("driver", "gravity"), **choices)
+
+
+@pytest.mark.parametrize(
+    ("mode", "nodes", "difference"),
+    [
+        ("realtime", ["driver", "gravity"], "node driver runs in realtime, and this recorder in lockstep"),
+        ("lockstep", ["driver", "my:Own"], "node driver and this recorder do not both have gravity, my:Own"),
+        ("lockstep", ["gravity", "driver", "recorder"], ""),
+    ],
+)
+def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
+    mode: str, nodes: list[str], difference: str, ros: Any, tmp_path: Path
+) -> None:
+    driver = ros.node("driver")
+    driver.declare_parameter("timing.mode", mode)
+    driver.declare_parameter("nodes", nodes)
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    states = publisher(driver, "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") and "driver" in node.parameters_of_nodes.found)
+    node.attend()
+    advice = "; start the recorder with 'wam record', which takes both from the running stack"
+    assert node.failure == (difference and difference + advice)
+
+
+def test_a_recorder_to_which_nothing_came_ends_with_the_reason(
+    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr("wam_ros.recorder_node.SILENCE", 0.1)
+    node, printed = by_hand(ros, tmp_path), ""
+
+    def is_reported() -> bool:
+        nonlocal printed
+        printed += capfd.readouterr().err
+        return "no message for 0.1 s: no stack runs here; Ctrl-C ends the recording" in printed
+
+    ros.wait(is_reported)
+    ros.remove(node)
+    assert (
+        node.failure
+        == f"{tmp_path / 'bag'} is empty: no message came; start the stack with 'wam up' before the recorder"
+    )
+
+
 def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) -> None:
     ros.remove(recorder(ros, tmp_path, name=""))
     (path,) = tmp_path.glob("wam_2*")
@@ -607,6 +655,38 @@ def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(t
     machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
     machine.finish()
     assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
+
+
+@pytest.mark.parametrize(("number", "begin"), [(1, 0), (6001, 6_000_000_000)])
+def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
+    number: int, begin: int, tmp_path: Path
+) -> None:
+    """Its duration, and with that its rates, would count from the start of the run."""
+    rows = {f"/wam/{name}": BY_NAME[name] for name in ("robot_description", "status", "motor_states")}
+    offered = {name: qos(row) for name, row in rows.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: "driver", "/wam")
+    machine.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
+    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
+    for k in range(3):
+        machine.receive("/wam/motor_states", serialize_message(state(6_000_000_000 + k, 0.0)), 1, 1, number + k)
+    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 4)
+    machine.finish()
+    topics = read(tmp_path / "bag").topics
+    assert topics["/wam/robot_description"].log_time_ns.tolist() == [begin]
+    assert topics["/wam/status"].log_time_ns.tolist() == [begin, begin]
+    assert topics["/wam/motor_states"].log_time_ns.tolist() == [6_000_000_000 + k for k in range(3)]
+    assert contents(tmp_path / "bag").first == begin
+
+
+def test_a_run_without_a_stamp_is_recorded_at_its_start(tmp_path: Path) -> None:
+    rows = {f"/wam/{name}": BY_NAME[name] for name in ("status", "motor_states")}
+    offered = {name: qos(row) for name, row in rows.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: "driver", "/wam")
+    for number in range(1, 2001):  # the arm is paused
+        machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
+    machine.finish()
+    assert set(read(tmp_path / "bag").topics["/wam/status"].log_time_ns.tolist()) == {0}
+    assert contents(tmp_path / "bag").topics["/wam/status"].messages == 2000
 
 
 def test_topics_without_a_stamp_are_taken_first(ros: Any, tmp_path: Path) -> None:

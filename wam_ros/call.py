@@ -13,6 +13,9 @@ from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from wam_description.arm import Shared
+from wam_description.nodes import NODES
+from wam_description.parameters import build_part
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
@@ -28,6 +31,7 @@ ATTEMPTS: Final = 20
 SET_ATTEMPTS: Final = 3  # the guard of the force loop takes its time over new gains
 WAITING: Final = 100  # messages that may wait for a slow terminal
 DISCOVERY: Final = 2.0  # s, after which no more of a stack comes
+MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
 START: Final = "start the stack with 'wam up'"
 
 
@@ -98,6 +102,32 @@ class CalledStack:
 
         self._wait(is_answered, f"no node '{node}' answers", partial(self._nodes_without, node))
         return requested.found[node]
+
+    def shared(self) -> Shared:
+        """The shared parameters of the stack, as its driver has them; of another node next to a driver without them.
+
+        Raises
+        ------
+        NoAnswerError
+            where no node answers that has them.
+        ParameterError
+            where they are those of another version.
+        """
+        requested = RemoteParameters(self.node, NODES)
+        first = math.inf
+
+        def found() -> list[dict[str, Any]]:
+            return [requested.found[name] for name in NODES if MODE in requested.found.get(name, {})]
+
+        def is_answered() -> bool:
+            nonlocal first
+            requested.ask()
+            if found():
+                first = min(first, time.monotonic())
+            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > DISCOVERY
+
+        self._wait(is_answered, f"no node of a stack in {self.node.get_namespace()} answers")
+        return build_part(Shared, found()[0])
 
     def _nodes_without(self, node: str) -> list[str]:
         """The nodes of the stack, none where this one is among them."""

@@ -15,6 +15,7 @@ from wam_description.topics import EVERY_NODE, Topic
 
 _MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
 _MOST_PUBLISHERS: Final = 64  # publishers counted separately in one topic
+_MOST_HELD: Final = 1000  # messages that wait for the time at which the recording begins
 _LATEST: Final = 2**63 - 1  # ns; log times of a bag
 _LONGEST_NAME: Final = 200  # bytes of a publisher's name
 _NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
@@ -123,7 +124,9 @@ class Recorder:
     topics : rows of the interface table, by the full name under which each is recorded.
     mode : 'realtime': log time is the reception and publish time the sending, both of the system
         clock.  'lockstep': both are the stamp in the message, or for a message without one the
-        last stamp of the same publisher (0 before its first), so that no wall clock is in the bag.
+        last stamp of the same publisher, so that no wall clock is in the bag.  Before its first it is
+        0 in a recording from the start of the run; in one that begins later it is the first stamp of
+        all, and no latched message, which may be older, has an earlier one.
     qos : what each topic's publishers offer, by full name.
     sender : finds the only publisher of a topic.
     namespace : of the arm, by which its nodes are named in /diagnostics.
@@ -144,10 +147,14 @@ class Recorder:
         self._lockstep = mode == "lockstep"
         self._stamps: dict[str, int] = {}
         self._newest = 0  # stamp of all, ns
+        self._begin = 0  # no log time is before it, ns
+        self._held: list[tuple[_Channel, str, bytes, int]] | None = []  # until the begin is known
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
             self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, ""))
+        if not self._lockstep or all(topic.latched for topic in topics.values()):
+            self._held = None
 
     def announce(self, node: str, name: str, total: int) -> None:
         """Take the number of messages that a node reports as published on a topic, by its full name."""
@@ -169,25 +176,41 @@ class Recorder:
             return
         publisher = channel.publisher_of(data)
         channel.numbering(publisher).add(number)
+        self._received += 1
+        if self._held is not None:
+            stamp = 0 if channel.topic.latched else channel.stamp_of(data)
+            if not stamp and len(self._held) < _MOST_HELD:
+                self._held.append((channel, publisher, data, number))
+                return
+            self._begin_at(stamp if stamp and number > 1 else 0)  # before the first one of a publisher nothing was
+        self._write(channel, publisher, data, received, sent, number)
+
+    def _begin_at(self, begin: int) -> None:
+        """Write what came before the first stamp of a message that is not latched."""
+        held, self._held, self._begin, self._newest = self._held or [], None, begin, begin
+        for channel, publisher, data, number in held:
+            self._write(channel, publisher, data, 0, 0, number)
+
+    def _write(self, channel: _Channel, publisher: str, data: bytes, received: int, sent: int, number: int) -> None:
         if self._lockstep:
             stamp = channel.stamp_of(data)
             if stamp == 0 and channel.topic.is_numbers:  # sent by hand without a stamp: it came with the newest state
                 stamp = self._newest
             self._newest = max(self._newest, stamp or 0)
+            is_free = stamp is None or channel.topic.latched  # of the time at which it came
             if stamp is None:
-                stamp = self._stamps.get(publisher, 0)
+                stamp = self._stamps.get(publisher, self._begin)
             else:
                 self._stamps[publisher] = stamp
                 if len(self._stamps) > _MOST_PUBLISHERS * len(self._channels):
                     del self._stamps[next(iter(self._stamps))]
-            received = sent = stamp
-        self._received += 1
+            received = sent = max(stamp, self._begin) if is_free else stamp
         if not (0 <= received <= _LATEST and 0 <= sent <= _LATEST):  # anybody can send such a stamp
             received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
         if self.failure:
             return
         try:
-            self._bag.write(name, data, received, sent, number)
+            self._bag.write(channel.name, data, received, sent, number)
         except RecordingError as error:
             self._fail(error)
 
@@ -224,6 +247,8 @@ class Recorder:
         ----------
         unfinished : nodes that ended without their final count.
         """
+        if self._held is not None:
+            self._begin_at(0)
         values = {"mode": "lockstep" if self._lockstep else "realtime"}
         if unfinished:
             values[UNFINISHED] = ", ".join(unfinished)

@@ -16,7 +16,7 @@ from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, parameter, values
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
-from wam_description.topics import BY_NAME, Topic
+from wam_description.topics import BY_NAME, EVERY_NODE, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
@@ -31,6 +31,7 @@ from wam_ros.tolerance import TolerantNode
 EVERY = "*"
 DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
 LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
+SILENCE = 5.0  # s without any message, after which a recorder that was started by hand reports it
 MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
 
@@ -61,6 +62,7 @@ class RecorderNode(TolerantNode):
         require_name(self, "recorder")
         shared, own = declare(self, RecorderParameters)
         self._own_parameters = {**values(shared), **values(own)}
+        self._mode, self._listed = shared.timing.mode, frozenset(shared.nodes)
         self._arm = shared.arm.name
         self._required = own.required
         name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
@@ -75,6 +77,7 @@ class RecorderNode(TolerantNode):
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
+        self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
         stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
@@ -92,6 +95,11 @@ class RecorderNode(TolerantNode):
         self._attached = ""
         self._dropped = 0
         self._failed = False
+        self._differing: dict[
+            str, str
+        ] = {}  # how each node runs otherwise than this recorder takes it to, '' if it does not
+        self._heard = self._heard_before = 0  # messages of others, recorded or not
+        self._heard_at, self._is_silent = time.monotonic(), False
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DRAIN_PERIOD, self._drain, clock=steady)
         self.create_timer(0.1, self.attend, clock=steady)
@@ -111,8 +119,21 @@ class RecorderNode(TolerantNode):
 
     @property
     def failure(self) -> str:
-        """Why the bag is incomplete, '' if it is not."""
-        return self.recorder.failure
+        """Why the bag is incomplete or has wrong times, '' if neither."""
+        return self.recorder.failure or self._wrong or self._empty
+
+    @property
+    def _wrong(self) -> str:
+        """How nodes run otherwise than this recorder takes them to, and what to do."""
+        listed = "; ".join(filter(None, self._differing.values()))
+        return listed and f"{listed}; start the recorder with 'wam record', which takes both from the running stack"
+
+    @property
+    def _empty(self) -> str:
+        """That no message of the stack has come to a recorder that was started by hand; '' where one has."""
+        if self._ends_last or self._heard:
+            return ""
+        return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised; a recorder that fails in this way may lack messages."""
@@ -153,7 +174,9 @@ class RecorderNode(TolerantNode):
         """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""
         self.recorder.flush()
         self._warn()
+        self._look_for_messages()
         self.parameters_of_nodes.ask()
+        self._compare()
         if self.ready or self.parameters_of_nodes.missing or self._unmatched():
             return
         self._attach_parameters()  # now, so that a killed recorder leaves them
@@ -178,6 +201,29 @@ class RecorderNode(TolerantNode):
             self._dropped = dropped
             so_far = (count._replace(lost_at_end=0) for count in self.recorder.counts())  # it may still come
             self.get_logger().warning(f"the recorder was too slow: {summary(so_far)}")
+
+    def _compare(self) -> None:
+        """Report each node of the stack that has another mode or list of nodes than this recorder was given."""
+        for node, given in self.parameters_of_nodes.found.items():
+            if node in self._differing:
+                continue
+            mode, listed = given.get("timing.mode", self._mode), frozenset(given.get("nodes", self._listed))
+            others = listed.symmetric_difference(self._listed) - {RecorderInterface.name}
+            found = [f"node {node} runs in {mode}, and this recorder in {self._mode}"] * (mode != self._mode)
+            found += [f"node {node} and this recorder do not both have {', '.join(sorted(others))}"] * bool(others)
+            self._differing[node] = "; ".join(found)
+            if found:
+                self.get_logger().error(self._wrong)
+
+    def _look_for_messages(self) -> None:
+        """Report once that nothing comes, to a recorder that was started by hand and may wait for nobody."""
+        now = time.monotonic()
+        if self._heard != self._heard_before:
+            self._heard_before, self._heard_at, self._is_silent = self._heard, now, False
+        elif not (self._is_silent or self._ends_last) and now - self._heard_at > SILENCE:
+            self._is_silent = True
+            why = "the stack has ended, or is paused" if self._heard else "no stack runs here"
+            self.get_logger().warning(f"no message for {SILENCE:g} s: {why}; Ctrl-C ends the recording")
 
     def _report(self) -> None:
         state = self._state("recording")
@@ -217,6 +263,7 @@ class RecorderNode(TolerantNode):
                     arrived.append((info["source_timestamp"], name, data, received, number))
         arrived.sort(key=itemgetter(0))
         for sent, name, data, received, number in arrived:
+            self._heard += name not in self._own_topics
             self.recorder.receive(name, data, received, sent, number)
             if name == self._diagnostics_name:
                 self._take_totals(data)
