@@ -509,6 +509,60 @@ def silent_after(node: Any, steps: int) -> Any:
     return Silent
 
 
+class Inner:
+    """Commands the joints, which is of the outer rate, in answer to each motor state."""
+
+    name, parameters, waits = "inner", Nothing, False
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self._timing = shared.timing
+
+    @reaction(Input("motor_states", "position"), outputs=("joint_velocity_command",))
+    def step(self, inputs: Inputs) -> Outputs:
+        is_left_out = self.waits and not self._timing.is_outer(inputs.stamp)
+        return {} if is_left_out else {"joint_velocity_command": State([], [0.0] * 4, [])}
+
+
+class Thinned(Inner):
+    """The same once per outer period."""
+
+    @reaction(Input("motor_states", "position"), outputs=("joint_velocity_command",), thinned=True)
+    def step(self, inputs: Inputs) -> Outputs:
+        return super().step(inputs)
+
+
+class Waiting(Inner):
+    """The same, which leaves the command out between the outer periods."""
+
+    waits = True
+
+
+def test_a_topic_of_the_outer_rate_between_two_outer_periods_is_refused_with_the_node_that_returned_it() -> None:
+    """Four of five of these commands were dropped by the nodes that take them."""
+    wam, steps = without(Configuration.load(packaged("wam")), "force_loop"), [ScenarioStep("wait", 0.1)]
+    text = "node 'inner' returned an unusable joint_velocity_command: it is of the outer rate, .* write thinned=True"
+    with pytest.raises(UnusableOutput, match=text):
+        Simulation(wam, steps, {"inner": Inner}).play()
+    for kind in (Thinned, Waiting):
+        run = Simulation(wam, steps, {"inner": kind})
+        assert run.play() == ""
+        stamps = [[row.stamp for row in run.rows[name]] for name in ("joint_velocity_command", "joint_states")]
+        assert stamps[0] == stamps[1] != []
+
+
+def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
+    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Inner"]
+    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.safety.fault)
+        assert driver.driver.safety.fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
+
+
 @pytest.mark.parametrize("steps", [0, 50, 300])
 def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
     steps: int,

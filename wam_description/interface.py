@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
-from wam_description.defects import Check, output_check
+from wam_description.defects import Check, UnusableOutput, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError, meant
 from wam_description.signals import BASE
@@ -16,6 +16,10 @@ from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
 NEARLY = 0.8  # of the letters
+BETWEEN = (
+    "it is of the outer rate, and this step of each {} is between two outer periods, so that no node would use it; "
+    "write thinned=True in @reaction, or return it only where shared.timing.is_outer(inputs.stamp)"
+)
 TOGETHER = 0.7  # of the age of the oldest: topics of this age have stopped with it, younger ones are only late
 
 
@@ -192,18 +196,41 @@ class Interface:
         unused = getattr(node, "unused", ())
         for reaction in declaration.reactions:
             used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
-            synchroniser = self._synchroniser(reaction, used)
+            synchroniser, work = self._synchroniser(reaction, used), self._work(declaration, node, reaction)
             for item in (reaction.trigger, *used):
                 arrays = item.arrays if self.topics[item.topic].side else WHOLE
-                work, essential = getattr(node, reaction.method), self.essential(reaction)
-                feeds[item.topic].append(Feed(synchroniser, arrays, work, essential))
+                feeds[item.topic].append(Feed(synchroniser, arrays, work, self.essential(reaction)))
         return feeds
 
     def _synchroniser(self, reaction: Reaction, used: list[Input]) -> Synchroniser:
-        trigger = reaction.trigger.topic
-        is_outer = reaction.thinned or self.topics[trigger].rate != "inner"
         specs = {item.topic: self._spec(item) for item in used}
-        return Synchroniser(self._timing, trigger, specs, is_outer, reaction.thinned)
+        is_outer = self._is_outer(reaction)
+        return Synchroniser(self._timing, reaction.trigger.topic, specs, is_outer, reaction.thinned)
+
+    def _is_outer(self, reaction: Reaction) -> bool:
+        """Whether a reaction steps once per outer period."""
+        return reaction.thinned or self.topics[reaction.trigger.topic].rate != "inner"
+
+    def _work(self, declaration: Declaration, node: Any, reaction: Reaction) -> Callable[[Inputs], Outputs]:
+        """The step; of a node of your own, one that refuses topics of the outer rate between two outer periods.
+
+        The nodes that take them use those of the outer periods alone.
+        """
+        work: Callable[[Inputs], Outputs] = getattr(node, reaction.method)
+        outer = [name for name in reaction.outputs if name in self.topics and self.topics[name].rate == "outer"]
+        if not outer or self._is_outer(reaction) or is_packaged(declaration):
+            return work
+        timing = self._timing
+
+        def checked(inputs: Inputs) -> Outputs:
+            outputs = work(inputs)
+            if not timing.is_outer(inputs.stamp):
+                for name in outer:
+                    if name in outputs:
+                        raise UnusableOutput(declaration.name, name, BETWEEN.format(reaction.trigger.topic))
+            return outputs
+
+        return checked
 
     def _spec(self, item: Input) -> InputSpec:
         delay = max(self._timing.outer_delay if item.delayed else 0, item.answers)
