@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,12 +26,21 @@ from wam_control.scenario import (
 )
 from wam_control.scenario_node import ScenarioNode
 from wam_control.scenario_settings import Setting
+from wam_control.task import AxisKind, TaskAxis, TaskCommand
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError
+from wam_description.parameters import ParameterError, tunable
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, ZERO, Contact, State
 from wam_description.synchroniser import Inputs
+from wam_description.wiring import Input, Outputs, reaction
 from wam_sim.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class TunableParameters:
+    stride: float = tunable("a live number of a controller of one's own")
+
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 SHARED = CONFIGURATION.shared
@@ -580,6 +590,17 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
     assert left(short, 1.5) > left(short, 3.9) + 0.1
 
 
+PRESSING = TaskAxis(AxisKind.FORCE, -1, "outer_link", 0.28, (0.0, 0.0, -1.0), 5.0)
+
+
+def task(*axes: TaskAxis, frame: str = "base") -> ScenarioStep:
+    return ScenarioStep("go", 1.0, task=TaskCommand(frame, axes))
+
+
+def setting(node: str, name: str, value: Any) -> ScenarioStep:
+    return ScenarioStep("go", 1.0, settings=(Setting(node, name, value),))
+
+
 @pytest.mark.parametrize(
     ("step", "text"),
     [
@@ -608,13 +629,75 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
             ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, (0.0, 600.0, 0.0), 0.0, 1.0)),
             "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
         ),
+        (task(PRESSING._replace(cover="hand")), "axis 1: cover is 'hand'; allowed: inner_link"),
+        (task(PRESSING._replace(position=2.0)), "axis 1: contact_position is 2.0 m; allowed: 0 to"),
+        (task(PRESSING._replace(value=math.nan)), "axis 1: value is nan; it must be a finite number"),
+        (task(PRESSING._replace(value=cast(Any, "five"))), "axis 1: value is 'five'; it must be a finite number"),
+        (task(PRESSING._replace(direction=ZERO)), "axis 1: along is .*; give a direction that is not zero"),
+        (task(PRESSING._replace(kind=cast(Any, "force"))), "axis 1: kind is 'force'; give an AxisKind"),
+        (task(PRESSING._replace(stiffness=10.0)), "axis 1: stiffness and damping belong to an impedance"),
+        (task(PRESSING, TaskAxis(AxisKind.POSITION, 9)), "axis 2: joint is 9; allowed: -1 to 3"),
+        (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is to be at 9.0 rad; allowed"),
+        (task(PRESSING, frame="hand"), "frame is 'hand'; allowed: base, inner_link"),
+        (
+            task(PRESSING._replace(kind=AxisKind.POSITION), frame="outer_link"),
+            "turns with it; command positions in the",
+        ),
+        (task(), "the task has no axes; give at least one, or no task"),
+        (setting("force_loop", "posture_gian", 1.0), "no parameter 'posture_gian' that may change .* 'posture_gain'"),
+        (setting("force_loop", "posture_gain", -1.0), "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed"),
+        (setting("driver", "seed", 3), "set, driver: it has no parameter 'seed' that may change while it runs"),
+        (
+            setting("velocity_loop", "proportional_gain", 1.0),
+            "unknown key 'velocity_loop'; allowed: driver, force_loop",
+        ),
+        (ScenarioStep("go", 1.0, settings=cast(Any, ("posture_gain",))), "settings has 'posture_gain'; give Setting"),
     ],
 )
 def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, text: str) -> None:
-    with pytest.raises(ParameterError, match=f"^step 2: .*{text}"):
+    with pytest.raises(ParameterError, match=f"^step 2[:,] .*{text}"):
         Scenario([ScenarioStep("fine", 1.0), step], SHARED)
     with pytest.raises(ParameterError, match=text):
         Simulation(CONFIGURATION, [ScenarioStep("fine", 1.0), step])
+
+
+def test_what_a_step_made_in_python_sets_has_the_types_of_a_file(tmp_path: Path) -> None:
+    made = setting("driver", "effects.added_coulomb_friction", [1, 0, 0, 0])
+    body = {"name": "go", "seconds": 1.0, "set": {"driver": {"effects": {"added_coulomb_friction": [1, 0, 0, 0]}}}}
+    (read,) = load(write(tmp_path, {"steps": [body]}), SHARED)
+    (taken,) = Scenario([made], SHARED).steps
+    assert taken == read
+    assert str(taken) == str(read), "1 and 1.0 are equal, and ROS takes only one of them"
+
+
+def test_what_a_step_made_in_python_sets_has_to_fit_the_other_values_of_its_node() -> None:
+    """It ended the run in the step that set it."""
+    text = "the scenario, step 2: set, driver: .*added_coulomb_friction"
+    with pytest.raises(ParameterError, match=text):
+        Simulation(
+            CONFIGURATION, [ScenarioStep("wait", 1.0), setting("driver", "effects.added_coulomb_friction", [0.5])]
+        )
+
+
+def test_a_step_made_in_python_sets_the_parameters_of_a_controller_that_takes_the_place_of_the_force_loop() -> None:
+    class Tunable:
+        name, parameters = "force_loop", TunableParameters
+
+        def __init__(self, shared: Shared, own: TunableParameters) -> None:
+            self.own = own
+
+        def tune(self, own: TunableParameters) -> None:
+            self.own = own
+
+        @reaction(Input("joint_states", "position"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    sections = {**CONFIGURATION.sections, "force_loop": {"stride": 1.0}}
+    steps = [setting("force_loop", "stride", 2.0)._replace(seconds=0.1)]
+    run = Simulation(CONFIGURATION._replace(sections=sections, written=""), steps, {"force_loop": Tunable})
+    assert run.play() == ""
+    assert run.nodes["force_loop"].own.stride == 2.0
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """A scenario: the steps of a task as data, played at the outer rate."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -11,10 +11,10 @@ import yaml
 from wam_control.contact_position import torque_of_position
 from wam_control.motion import GoalMotion, LineMotion, PostureMotion
 from wam_control.posture_watch import BEHIND, CAUGHT_UP
-from wam_control.scenario_settings import Setting, require_settings, settings_of
+from wam_control.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
 from wam_control.scenario_values import known, number, numbers, require_list
 from wam_control.task import AxisKind, TaskCommand
-from wam_control.task_text import task_of_text, torque_task
+from wam_control.task_text import require_task, task_of_text, torque_task
 from wam_description import yaml_text
 from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration, packaged
@@ -163,6 +163,11 @@ class Scenario:
     steps : at least one.
     shared : of the arm, for motions that have limits; the values of the steps are checked against it as those of a
         file are.
+    controllers : node classes by name that take the place of those in `shared.nodes`, for what the steps set.
+
+    Attributes
+    ----------
+    steps : as they are played.
 
     Raises
     ------
@@ -170,13 +175,13 @@ class Scenario:
         names the step and the value that is not allowed.
     """
 
-    def __init__(self, steps: Sequence[ScenarioStep], shared: Shared | None = None) -> None:
+    def __init__(
+        self, steps: Sequence[ScenarioStep], shared: Shared | None = None, controllers: Mapping[str, Any] = NONE
+    ) -> None:
         require(len(steps) > 0, "the scenario has no steps")
         if shared is not None:
-            for i, step in enumerate(steps):
-                _require_step(f"step {i + 1}", step, shared)
-            steps = [s._replace(push=_on_axis(s.push, shared.arm)) if s.push else s for s in steps]
-        self._steps, self._shared = list(steps), shared
+            steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(steps)]
+        self.steps, self._shared = list(steps), shared
         self._motion: Motion | None = None
         self._rate: tuple[float, ...] = ()
         self._index = -1
@@ -201,7 +206,7 @@ class Scenario:
         else:
             self._elapsed += dt
             begins = self._advance(q, contact)
-        step = self._steps[self._index]
+        step = self.steps[self._index]
         self._rate = ()
         if self._motion is not None and not self.done:
             self._posture, rate = self._motion.at(self._elapsed)
@@ -228,9 +233,9 @@ class Scenario:
 
     def _begin(self, index: int, q: Sequence[float]) -> None:
         """Begin a step; where its motion is not possible, the scenario fails before it moves."""
-        before = self._steps[self._index] if self._index >= 0 else None
+        before = self.steps[self._index] if self._index >= 0 else None
         self._index, self._elapsed = index, 0.0
-        step = self._steps[index]
+        step = self.steps[index]
         if before is not None and before.presses and (step.moves or not step.presses):
             self._posture = list(q)
         try:
@@ -240,7 +245,7 @@ class Scenario:
 
     def _advance(self, q: Sequence[float], contact: Contact) -> bool:
         """Go on to the next step if this one is over; whether a request may be due."""
-        step = self._steps[self._index]
+        step = self.steps[self._index]
         if self.done:
             return False
         detected = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
@@ -254,7 +259,7 @@ class Scenario:
             return True
         if self._motion is not None and not detected:
             self._posture = self._motion.at(step.seconds).position
-        if self._index + 1 == len(self._steps):
+        if self._index + 1 == len(self.steps):
             self.done = True
             return False
         self._begin(self._index + 1, q)
@@ -499,6 +504,13 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     return step
 
 
+def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any]) -> ScenarioStep:
+    """A step made in Python, with values as those of a file have them."""
+    _require_step(where, step, shared)
+    step = step._replace(settings=checked_settings(where, step.settings, shared, controllers))
+    return step._replace(push=_on_axis(step.push, shared.arm)) if step.push else step
+
+
 def _require_one(where: str, keys: Sequence[str]) -> None:
     require(len(keys) <= 1, f"{where}: {' and '.join(keys)} are given; give one of them")
 
@@ -526,6 +538,7 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     moves = [key for key, given in zip(MOTIONS, (step.posture, step.trajectory, step.tip), strict=True) if given]
     forces = ["force"] * (step.force != NO_FORCE)
     if step.task is not None:
+        require_task(where, step.task, arm)
         are_torques = all(axis.kind is AxisKind.FORCE and axis.joint >= 0 for axis in step.task.axes)
         forces.append("torque" if are_torques else "task")
     _require_one(where, moves)

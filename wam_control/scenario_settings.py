@@ -1,14 +1,17 @@
 """Live parameters that a step of a scenario sets, checked against their declarations before anything moves."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
 
 from wam_control.scenario_values import known
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_description.parameters import ParameterError, build, checked, fields, flatten, meant, require
+from wam_description.wiring import declaration
 
+NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
 
 
@@ -20,8 +23,15 @@ class Setting(NamedTuple):
     value: float | int | bool | str | tuple[float | int | bool | str, ...]
 
 
-def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
+def settings_of(where: str, body: Any, shared: Shared, controllers: Mapping[str, Any] = NONE) -> Iterator[Setting]:
     """Those of a step: each is a live parameter of its node, with a value of its type and range.
+
+    Parameters
+    ----------
+    where : what begins a refusal: file and step.
+    body : values by parameter, by node.
+    shared : lists the nodes.
+    controllers : node classes by name that take the place of those in `shared.nodes`, or come on top.
 
     Raises
     ------
@@ -31,7 +41,7 @@ def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
     known(where + ", set", body, TUNABLE, ())
     for node, values in body.items():
         require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
-        live = {field.name: field for field in fields(_parameter_class(where, node, shared)) if field.live}
+        live = {field.name: field for field in fields(_parameter_class(where, node, shared, controllers)) if field.live}
         for name, value in flatten(values).items():
             has = meant(name, live).strip() or f"it has: {', '.join(sorted(live)) or 'none'}"
             require(
@@ -44,7 +54,22 @@ def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
                 raise ParameterError(f"{where}: set, {node}: {error}") from None
 
 
-def require_settings(where: str, settings: Sequence[Sequence[Setting]], configuration: Configuration) -> None:
+def checked_settings(
+    where: str, settings: Sequence[Setting], shared: Shared, controllers: Mapping[str, Any] = NONE
+) -> tuple[Setting, ...]:
+    """Settings of a step made in Python as those of a file, or refused as those; arguments of `settings_of`."""
+    for one in settings:
+        require(isinstance(one, Setting), f"{where}: settings has {one!r}; give Setting(node, name, value)")
+    found = (settings_of(where, {node: {name: value}}, shared, controllers) for node, name, value in settings)
+    return tuple(one for of_one in found for one in of_one)
+
+
+def require_settings(
+    where: str,
+    settings: Sequence[Sequence[Setting]],
+    configuration: Configuration,
+    controllers: Mapping[str, Any] = NONE,
+) -> None:
     """Refuse settings, those of each step, that do not fit the other values that their node has by then.
 
     What a class of parameters refuses itself is refused; where it has a method `require_fit`, with the arm.
@@ -62,16 +87,18 @@ def require_settings(where: str, settings: Sequence[Sequence[Setting]], configur
             present[setting.name] = setting.value
         for node in dict.fromkeys(setting.node for setting in of_step):
             try:
-                own = build(_parameter_class(where, node, shared), sections[node])
+                own = build(_parameter_class(where, node, shared, controllers), sections[node])
                 getattr(own, "require_fit", lambda arm: None)(shared.arm)
             except ParameterError as error:
                 raise ParameterError(f"{where}, step {i + 1}: set, {node}: {error}") from None
 
 
-def _parameter_class(where: str, node: str, shared: Shared) -> Any:
+def _parameter_class(where: str, node: str, shared: Shared, controllers: Mapping[str, Any]) -> Any:
     """Of the node of this name: that of the package, or one of your own, 'module:Class'."""
+    if node in controllers:
+        return declaration(controllers[node]).parameter_class
     entries = [node] if node in shared.nodes else [entry for entry in shared.nodes if ":" in entry]
     for entry in entries:
-        if (declaration := declared(entry)).name == node:
-            return declaration.parameter_class
+        if (found := declared(entry)).name == node:
+            return found.parameter_class
     raise ParameterError(f"{where}: set, {node}: no node is named so; nodes: {', '.join(shared.nodes)}")

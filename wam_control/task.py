@@ -220,8 +220,12 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
     return axis
 
 
-def checked_task(task: TaskCommand) -> TaskCommand:
+def checked_task(task: TaskCommand, where: str = "") -> TaskCommand:
     """A task as it is, or refused where it has positions along axes that turn with a link.
+
+    Parameters
+    ----------
+    where : what begins a refusal: file and step; '' for a message.
 
     Raises
     ------
@@ -231,7 +235,8 @@ def checked_task(task: TaskCommand) -> TaskCommand:
     for axis in task.axes:
         if task.frame != BASE and axis.joint < 0 and _is_held(axis):
             raise ParameterError(
-                f"{axis.name} is in the frame of {task.frame}, which turns with it; command positions in the base frame"
+                f"{where}{': ' * bool(where)}{axis.name} is in the frame of {task.frame}, which turns with it; "
+                "command positions in the base frame"
             )
     return task
 

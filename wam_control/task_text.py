@@ -53,7 +53,45 @@ def task_of_text(where: str, body: Any, arm: Arm) -> TaskCommand:
         place = f"{where}, axis {i + 1}"
         require(isinstance(one, Mapping), f"{place} is {one!r}; it must be a mapping")
         found += _line(place, one, frame, arm) if "line" in one else [_axis(place, one, rotation, arm)]
-    return checked_task(TaskCommand(frame, tuple(found)))
+    return checked_task(TaskCommand(frame, tuple(found)), where)
+
+
+def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
+    """Refuse a task that was made in Python for what one of a file is refused.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the axis and the value that is not allowed.
+    """
+    require(isinstance(task, TaskCommand), f"{where}: task is {task!r}; give a TaskCommand")
+    require(task.frame in (BASE, *arm.covers.names), _no_frame(where, task.frame, arm))
+    require(len(task.axes) > 0, f"{where}: the task has no axes; give at least one, or no task")
+    for i, axis in enumerate(task.axes):
+        _require_axis(f"{where}, axis {i + 1}", axis, arm)
+    checked_task(task, where)
+
+
+def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
+    """Refuse what no axis of a file can have, then what is not allowed."""
+    require(isinstance(axis, TaskAxis), f"{where} is {axis!r}; give a TaskAxis")
+    require(isinstance(axis.kind, AxisKind), f"{where}: kind is {axis.kind!r}; give an AxisKind")
+    for key in ("rate", "stiffness", "damping"):
+        number(where, key, getattr(axis, key))
+    if axis.value is not None:
+        number(where, "value", axis.value)
+    joints = arm.joints.names
+    require(axis.joint in range(-1, len(joints)), f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}")
+    if axis.joint < 0:
+        _cover(where, axis.cover, arm)
+        if axis.position is not None:
+            number(where, "contact_position", axis.position)
+        _direction(where, axis.direction)
+    checked(where, axis, arm)
+
+
+def _no_frame(where: str, given: Any, arm: Arm) -> str:
+    return f"{where}: frame is {given!r}; allowed: {', '.join((BASE, *arm.covers.names))}"
 
 
 def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
@@ -63,8 +101,7 @@ def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
         known(f"{where}, frame", given, ("of", "rpy"), ("of", "rpy"))
         angles = numbers(where, "rpy", given["rpy"], 3)
         given = given["of"]
-    frames = (BASE, *arm.covers.names)
-    require(given in frames, f"{where}: frame is {given!r}; allowed: {', '.join(frames)}, or of one of them with rpy")
+    require(given in (BASE, *arm.covers.names), f"{_no_frame(where, given, arm)}, or of one of them with rpy")
     return given, pin.rpy.rpyToMatrix(*angles)
 
 

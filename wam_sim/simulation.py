@@ -12,7 +12,7 @@ from typing import Any
 from wam_control.contact_estimator import ContactEstimate
 from wam_control.reaction_status import stated
 from wam_control.scenario import FORCE_LOOP, Scenario, ScenarioStep
-from wam_description.arm import Shared
+from wam_control.scenario_settings import require_settings
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
@@ -83,7 +83,8 @@ class Simulation:
         require_sections(configuration.sections, shared.nodes)
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
-                self._connect(name, declaration, shared, configuration, steps)
+                more = (self._scenario(configuration, dict(controllers or {})),) if name == SCENARIO else ()
+                self._connect(name, declaration, configuration, more)
         self._motors = len(shared.arm.motors.names)
         has_sensors = "joint_sensors" in self._interface.topics
         self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
@@ -91,18 +92,18 @@ class Simulation:
             self.listen(STATUS, lambda stamp, status: self._reasons.append((stamp, stated(status))), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
+    def _scenario(self, configuration: Configuration, controllers: Mapping[str, Any]) -> Scenario:
+        """What is to be played; what it sets has to fit the other values of its node."""
+        scenario = Scenario(self._steps, configuration.shared, controllers)
+        require_settings("the scenario", [step.settings for step in scenario.steps], configuration, controllers)
+        return scenario
+
     def _connect(
-        self,
-        name: str,
-        declaration: Declaration,
-        shared: Shared,
-        configuration: Configuration,
-        steps: Sequence[ScenarioStep],
+        self, name: str, declaration: Declaration, configuration: Configuration, more: Sequence[Scenario]
     ) -> None:
         kind = declaration.parameter_class
         own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        more = (Scenario(steps, shared),) if name == SCENARIO else ()
-        node = declaration.make(shared, own, *more)
+        node = declaration.make(configuration.shared, own, *more)
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
         feeds = self._interface.feeds(declaration, node)
