@@ -25,7 +25,7 @@ from wam_cli.main import main
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_control.gravity_node import GravityNode
 from wam_control.scenario import load
-from wam_description.configuration import Configuration
+from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError, build
@@ -344,11 +344,14 @@ def test_a_wrong_bag_is_refused(bag: str, text: str) -> None:
 
 
 def test_nothing_of_somebody_elses_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    own, steps = tmp_path / "own.yaml", tmp_path / "steps.yaml"
+    own, steps, above = tmp_path / "own.yaml", tmp_path / "steps.yaml", tmp_path / "above.yaml"
     own.write_text("base: wam\n")
+    above.write_text("base: own.yaml\n")
     steps.write_text("steps: []\n")
     for words, reason in (
         (["bag", "--config", str(own), "--write", str(own)], "is the configuration itself"),
+        (["bag", "--config", str(above), "--write", str(own)], f"own.yaml is a base of the configuration {above}"),
+        (["bag", "--write", str(packaged("wam"))], "is the configuration itself"),
         (["--excite", str(steps), "--only-write"], "is another file; give a new one"),
     ):
         with pytest.raises(SystemExit) as ended:

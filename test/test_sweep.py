@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import subprocess
 import sys
 import warnings
@@ -215,15 +216,44 @@ def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
     [
         ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
         (("scenario:script=a,b",), "the scenario is that of --scenario"),
+        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs of a sweep are in Python"),
+        (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
+        ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
     ],
 )
 def test_an_axis_that_would_not_be_used_is_refused(
     axes: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["sweep", str(tmp_path / "s.csv"), *(word for axis in axes for word in ("--vary", axis))])
+        main(["sweep", str(tmp_path / "s.csv"), *(axis if axis[0] == "-" else f"--vary={axis}" for axis in axes)])
     assert ended.value.code
-    assert words in capsys.readouterr().err
+    assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("own.yaml", "FILE .*own.yaml is the configuration itself; give another file"),
+        ("base.yaml", "FILE .*base.yaml is a base of the configuration .*own.yaml; give another file"),
+        ("steps.yaml", "FILE .*steps.yaml is read by this command; give another file"),
+    ],
+)
+def test_a_sweep_does_not_write_over_what_it_reads(
+    target: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    texts = {
+        "base.yaml": "base: testbed\n",
+        "own.yaml": "base: base.yaml\n",
+        "steps.yaml": "steps:\n  - {name: wait, seconds: 0.01}\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    command = ["sweep", str(tmp_path / target), "--config", str(tmp_path / "own.yaml"), "--workers", "1", "--fresh"]
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--scenario", str(tmp_path / "steps.yaml"), "--vary", f"{GAIN}=0.004"])
+    assert ended.value.code == 1
+    assert re.search(words, capsys.readouterr().err)
+    assert {name: (tmp_path / name).read_text() for name in texts} == texts
 
 
 def test_runs_with_a_node_of_ones_own_are_computed_again(

@@ -392,8 +392,8 @@ def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
 
 
 def script_file(script: str) -> Path:
-    """The file of a scenario: a path that ends in '.yaml', or the name of one that comes with the package."""
-    return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
+    """The file of a scenario: a path that ends in '.yaml' or '.yml', or the name of one that comes with the package."""
+    return Path(script) if script.endswith((".yaml", ".yml")) else packaged(script, "scenario")
 
 
 def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:

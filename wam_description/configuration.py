@@ -190,6 +190,24 @@ class Configuration(NamedTuple):
         return True
 
 
+def files_of(path: str | Path) -> list[Path]:
+    """The files that a configuration is read from: its own, then its base, the base of that and so on.
+
+    Raises
+    ------
+    ParameterError
+        as `Configuration.load`.
+    """
+    Configuration.load(path)  # each of them is a file that can be read
+    found: list[Path] = []
+    name: Path | None = Path(path)
+    while name is not None:
+        found.append(name)
+        tree = _tree(name, name.read_text(encoding="utf-8"))
+        name = _base(name, tree[BASE], ()) if isinstance(tree, dict) and BASE in tree else None
+    return found
+
+
 def option_values(texts: Iterable[str]) -> dict[str, Any]:
     """Parameters and values as an option gives them, for `Configuration.with_values`; each '[node:]parameter=value'.
 

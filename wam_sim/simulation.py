@@ -27,6 +27,9 @@ from wam_sim.bus import Bus, Rows, of_node
 from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
 
 SCENARIO = "scenario"
+WITHOUT_EFFECT = frozenset(  # in a direct run: it is in lockstep, as fast as it can, and no node is a process
+    {"timing.mode", "timing.real_time_factor", "timing.fifo_priority", "timing.niceness", "driver:late_periods"}
+)
 
 
 def _warn(node: str, status: NodeStatus) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
-from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.configuration import Configuration, files_of, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.page import PORT
 from wam_sim.batch import executor
@@ -105,10 +105,32 @@ def take_values(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def configuration_file(given: argparse.Namespace) -> Path:
+    """The file of the configuration that --config names."""
+    name: str = given.config
+    return Path(name) if name.endswith((".yaml", ".yml")) else packaged(name)
+
+
+def refuse_source(given: argparse.Namespace, option: str, file: Path, *others: Path) -> None:
+    """Refuse, before the work, to write over what it reads: the configuration, one that this builds on, other files.
+
+    Raises
+    ------
+    ValueError
+        which names the file, and what to do.
+    """
+    configuration, *bases = (one.resolve() for one in files_of(configuration_file(given)))
+    if file.resolve() == configuration:
+        raise ValueError(f"{option} {file} is the configuration itself; give another file, which may build on it")
+    if file.resolve() in bases:
+        raise ValueError(f"{option} {file} is a base of the configuration {given.config}; give another file")
+    if file.resolve() in [one.resolve() for one in others]:
+        raise ValueError(f"{option} {file} is read by this command; give another file")
+
+
 def configuration_of(given: argparse.Namespace) -> Configuration:
     """The configuration that --config names."""
-    name: str = given.config
-    loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
+    loaded = Configuration.load(configuration_file(given))
     values = getattr(given, "values", [])
     return loaded.with_values(option_values(values)) if values else loaded
 
@@ -277,6 +299,7 @@ def evaluation_of(given: argparse.Namespace) -> Configuration:
         at_least("--seed", seed, 0)
     if given.write:
         writable_file("--write", given.write)
+        refuse_source(given, "--write", given.write)
     return configuration_of(given)
 
 

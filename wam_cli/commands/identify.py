@@ -17,6 +17,7 @@ from wam_bag.bag import read
 from wam_cli.commands import (
     at_least,
     configuration_of,
+    refuse_source,
     take_arm,
     take_configuration,
     writable_directory,
@@ -99,8 +100,8 @@ def run(given: argparse.Namespace) -> int:
 
 def _refuse_loss(given: argparse.Namespace) -> None:
     """Refuse to write over the configuration that is read, or over a scenario that is somebody's own."""
-    if given.write is not None and Path(given.config).resolve() == given.write.resolve():
-        raise ValueError(f"--write {given.write} is the configuration itself; give another file, which builds on it")
+    if given.write is not None:
+        refuse_source(given, "--write", given.write)
     if given.excite is not None and given.excite.exists():
         text = given.excite.read_text(encoding="utf-8", errors="replace")
         if text.strip() and not text.startswith(HEADING):

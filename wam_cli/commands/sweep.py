@@ -15,17 +15,19 @@ from wam_cli.commands import (
     at_least,
     batch_of,
     configuration_of,
+    refuse_source,
     take_batch,
     take_configuration,
     writable_file,
     writable_picture,
 )
-from wam_control.scenario import load
+from wam_control.scenario import load, script_file
 from wam_description import yaml_text
-from wam_description.configuration import LONGEST, packaged
+from wam_description.configuration import LONGEST, option_values
 from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
 from wam_sim.batch import results
+from wam_sim.simulation import WITHOUT_EFFECT
 from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
@@ -72,16 +74,26 @@ def run(given: argparse.Namespace) -> int:
     writable_file("FILE", given.file)
     if given.picture:
         writable_picture("--picture", given.picture)
+    for option, file in (("FILE", given.file), ("--picture", given.picture)):
+        if file:
+            refuse_source(given, option, file, *([] if given.experiment else [_scenario_file(given)]))
     axes: list[Axis] = given.vary
-    _refuse_idle(axes)
+    _refuse_idle(given, axes)
     sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
     failed = sum((_of_experiment if given.experiment else _of_scenario)(given, axes, sets))
     print(f"{len(sets)} sets, {failed} failed, in {given.file}")
     return int(failed == len(sets))
 
 
-def _refuse_idle(axes: list[Axis]) -> None:
-    """Refuse an axis whose values would stand in the table without having been used."""
+def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
+    """Refuse an axis whose values would stand in the table without having been used, and such values of --set."""
+    for option, given_names in (("--set", option_values(given.values)), ("--vary", [axis.name for axis in axes])):
+        for name in given_names:
+            if name in WITHOUT_EFFECT:
+                raise ValueError(
+                    f"{option} {name} has no effect: the runs of a sweep are in Python without ROS, in lockstep and as "
+                    "fast as they can; leave it out, and play 'wam demo' with each of its values"
+                )
     names = [axis.name for axis in axes]
     for name in names:
         if names.count(name) > 1:
@@ -90,12 +102,14 @@ def _refuse_idle(axes: list[Axis]) -> None:
             raise ValueError(f"--vary {name}: a run of a sweep has no such node; the scenario is that of --scenario")
 
 
+def _scenario_file(given: argparse.Namespace) -> Path:
+    return script_file(given.scenario or SCENARIO)
+
+
 def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
     """Which sets failed; a row of the table for each."""
     configuration = configuration_of(given)
-    name: str = given.scenario or SCENARIO
-    path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
-    runs = points(configuration, load(path, configuration.shared), axes, sets)
+    runs = points(configuration, load(_scenario_file(given), configuration.shared), axes, sets)
     with batch_of(given) as batch:
         is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
         found = sweep(runs, batch.executor, None if is_own else batch.folder, batch.report)
