@@ -4,10 +4,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state, status
 
+from wam_bag.bag import read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.contents import contents
+from wam_bag.cut import Cut, cut
+from wam_bag.losses import losses
 from wam_cli.main import main
+from wam_description.configuration import SHARED, Configuration, packaged
+from wam_description.topics import BY_NAME
+from wam_description.yaml_text import parameter_text
+from wam_ros.qos import qos
+from wam_sim.recorded_parameters import recorded_parameters
 
 MESSAGES = {"/left": 30, "/right": 40}
 JOINTS, MOTORS = ([f"{name}{i}" for i in (1, 2, 3, 4)] for name in ("joint", "motor"))
@@ -78,3 +90,54 @@ def test_without_a_choice_the_other_arms_are_named(
     assert "this is /left alone; other arms in this bag: --namespace right" in printed
     _, refused = ended(capsys, name, bag, *options, "--namespace", "middle")
     assert "has no arm in the namespace /middle; its arms: /left, /right" in refused
+
+
+def merged(parts: list[Path], file: Path) -> Path:
+    """One file of several, as other tools make it: every record of each."""
+    with file.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start(profile="ros2")
+        for part in parts:
+            with part.open("rb") as source:
+                reader = make_reader(source)
+                channels: dict[int, int] = {}
+                for schema, channel, message in reader.iter_messages():
+                    assert schema is not None
+                    if channel.id not in channels:
+                        number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                        more = channel.message_encoding, number, channel.metadata
+                        channels[channel.id] = writer.register_channel(channel.topic, *more)
+                    times = message.log_time, message.data, message.publish_time, message.sequence
+                    writer.add_message(channels[channel.id], *times)
+                for item in reader.iter_attachments():
+                    writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+                for record in reader.iter_metadata():
+                    writer.add_metadata(record.name, record.metadata)
+        writer.finish()
+    return file
+
+
+def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: Path) -> None:
+    """The parameters and the counts of the arm that came first were lost."""
+    sections, files = Configuration.load(packaged("wam")).sections, []
+    for namespace, mass in (("left", 1.0), ("right", 2.0)):
+        with BagWriter(tmp_path / namespace) as bag:
+            own = {**sections[SHARED], **sections["driver"], "arm.payload": mass}
+            bag.add_topic(f"/{namespace}/contact/in_contact", "std_msgs/msg/Bool", qos(BY_NAME["contact/in_contact"]))
+            bag.write(f"/{namespace}/contact/in_contact", b"\0\1\0\0\1", 1, 1, 1)
+            bag.attach("parameters.yaml", "application/yaml", parameter_text({f"/{namespace}/driver": own}).encode())
+            bag.metadata("recording", {"mode": "lockstep", f"/{namespace}/contact/in_contact driver dropped": "3"})
+        files.append(tmp_path / namespace / f"{namespace}_0.mcap")
+    both = merged(files, tmp_path / "both.mcap")
+    bag_of_both = read(both)
+    for namespace, mass in (("/left", 1.0), ("/right", 2.0)):
+        assert recorded_parameters(bag_of_both, namespace).node("driver")["arm.payload"] == mass
+    of_third = recorded_parameters(bag_of_both, "/third")
+    assert of_third.problem == (
+        "parameters.yaml in the bag has no parameters of the arm /third; it has those of /left, /right"
+    )
+    lost = losses(both, bag_of_both.metadata, bag_of_both.attachments, bag_of_both.counts)
+    assert sorted(lost.dropped) == [f"/{arm}/contact/in_contact from driver" for arm in ("left", "right")]
+    assert contents(both).attachments["parameters.yaml"] == len(bag_of_both.attachments["parameters.yaml"])
+    part = cut(both, tmp_path / "part", Cut(0, 10, None))
+    assert read(part).attachments == bag_of_both.attachments

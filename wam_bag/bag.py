@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from mcap.records import Channel
+from mcap.records import Attachment, Channel
 
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
 from wam_bag.cdr import Decoder
@@ -30,7 +30,7 @@ from wam_bag.columns import (
     TableColumns,
     WrenchColumns,
 )
-from wam_bag.contents import merge
+from wam_bag.contents import add_attachments, merge
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.message_groups import Times
@@ -152,7 +152,7 @@ def read(
         )
     collectors: dict[str, Collector] = {}
     counts: Counter[str] = Counter()
-    attachments: dict[str, bytes] = {}
+    attachments: dict[str, Attachment] = {}
     metadata: dict[str, dict[str, str]] = {}
     for file in files(Path(path)):
         with opened(file) as mcap:
@@ -170,13 +170,14 @@ def read(
             for channel in mcap.channels.values():
                 if is_selected(channel.topic, topics):
                     _collector(collectors, mcap, channel, (begin_ns, end_ns))
-            attachments.update({item.name: item.data for item in mcap.attachments()})
+            add_attachments(attachments, mcap.attachments())
             merge(metadata, mcap.metadata())
     if not may_lack:
         _check_has(path, topics, counts)
     columns = _Topics({t: found.columns(f"{path}, topic {t}") for t, found in sorted(collectors.items())})
     types = {topic: found.type for topic, found in collectors.items()}
-    return Bag(Path(path), columns, types, attachments, metadata, dict(counts))
+    data = {name: item.data for name, item in attachments.items()}
+    return Bag(Path(path), columns, types, data, metadata, dict(counts))
 
 
 def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channel, times: tuple[int, int]) -> Collector:

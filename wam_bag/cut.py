@@ -11,6 +11,7 @@ from mcap.records import Attachment, Channel, Schema
 
 from wam_bag import safe_yaml
 from wam_bag.bag_file import TopicPart, files, is_selected, opened, parts
+from wam_bag.contents import add_attachments
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import HEAD
@@ -110,7 +111,7 @@ def _read(source: Path, part: Cut) -> _Taken:
             for channel in file.channels.values():
                 if is_selected(channel.topic, part.topics):
                     _define(file, channel, taken)
-            taken.attachments.update({item.name: item for item in file.attachments()})
+            add_attachments(taken.attachments, file.attachments())
             taken.metadata.update({name: values for name, values in file.metadata().items() if name != OWN})
     return taken
 

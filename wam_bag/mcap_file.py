@@ -210,9 +210,12 @@ class McapFile:
         return [parsed(Opcode.ATTACHMENT, self.content(record)) for record in self._attachments]
 
     def metadata(self) -> dict[str, dict[str, str]]:
-        """Metadata records by name."""
-        found = [parsed(Opcode.METADATA, self.content(record)) for record in self._metadata]
-        return {record.name: record.metadata for record in found}
+        """Metadata records by name; the entries of several of one name are put together, as those of merged bags."""
+        found: dict[str, dict[str, str]] = {}
+        for record in self._metadata:
+            one = parsed(Opcode.METADATA, self.content(record))
+            found.setdefault(one.name, {}).update(one.metadata)
+        return found
 
     def has_all_definitions(self) -> bool:
         """Whether every channel that the file counts, and its schema, is known without reading chunks."""

@@ -148,7 +148,7 @@ class Recorder:
         self._stamps: dict[str, int] = {}
         self._newest = 0  # stamp of all, ns
         self._begin = 0  # no log time is before it, ns
-        self._held: list[tuple[_Channel, str, bytes, int]] | None = []  # until the begin is known
+        self._held: list[tuple[_Channel, str, bytes, int]] | None = []  # until its start is known
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])

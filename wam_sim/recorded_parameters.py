@@ -131,6 +131,10 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
     except (ValueError, TypeError, LookupError, AttributeError) as error:
         reason = " ".join(str(error).split())
         return RecordedParameters(str(bag.path), {}, digest, f"{ATTACHMENT} in the bag cannot be read: {reason}", ())
+    if not recorded and tree:
+        there = ", ".join(sorted({str(name).rpartition("/")[0] for name in tree}))
+        problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
+        return RecordedParameters(str(bag.path), {}, digest, problem, ())
     found = {node: _completed(node, recorded) for node in recorded}
     notes = (
         _note(
