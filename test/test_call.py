@@ -6,12 +6,15 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 import yaml
 from conftest import LONG
 
 from wam_cli.commands.call import _wrench, arguments
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.wiring import Call
 from wam_ros.call import CalledStack
@@ -93,6 +96,29 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
         refused = here.request(Call("nosuch", "tare")).message
     assert refused.startswith("no service /wam/nosuch/tare within ")
     assert {"driver", "force_loop"} <= set(refused.partition("; there are ")[2].split(", "))
+
+
+def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another_node(
+    ros: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`wam record` needs them, and a real driver need not have them."""
+    monkeypatch.setattr("wam_ros.call.PATIENCE", LONG)
+    driver = ros.node("driver")
+    driver.declare_parameter("serial", "WAM7")
+    node = subprocess.Popen([*WAM, "node", "gravity", "-r", "__ns:=/wam", "-p", "timing.mode:=realtime"])
+
+    def shared() -> Shared:
+        with CalledStack("wam") as stack:
+            return stack.shared()
+
+    try:
+        with ThreadPoolExecutor() as threads:
+            found = threads.submit(shared)
+            ros.wait(found.done)
+        assert found.result().timing.mode == "realtime"
+    finally:
+        node.terminate()
+        node.wait(LONG)
 
 
 @pytest.mark.parametrize(
