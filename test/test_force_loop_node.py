@@ -146,7 +146,7 @@ def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: An
 
     set_gain(0.1)
     ros.wait(lambda: "velocity_loop uses servo.* that are not accepted here" in feeder.facts()[0].message)
-    assert feeder.facts()[0].level == DiagnosticStatus.WARN
+    assert feeder.facts()[0].level == DiagnosticStatus.ERROR  # the driver brakes: nothing guards these gains
     set_gain(1.05)
     feeder.feed_until(lambda: "domain I" in feeder.facts()[0].message)
     assert feeder.loop.node._loop._servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]

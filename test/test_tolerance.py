@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
+from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -115,7 +115,6 @@ def test_no_bytes_on_any_topic_end_a_node(ros: Any, tmp_path: Path) -> None:
     nodes = [make(ros, tmp_path, name, names, recorder__directory=str(tmp_path / "bags")) for name in names]
     sender = ros.node("sender")
     publishers = {row.name: sender.create_publisher(message_type(row), row.name, qos(row)) for row in TOPICS}
-    publishers["/parameter_events"] = sender.create_publisher(ParameterEvent, "/parameter_events", 10)
     ros.wait(lambda: all(one.get_subscription_count() for one in publishers.values()))
     chance = random.Random(SEED)
     for one in publishers.values():

@@ -298,7 +298,7 @@ class DriverNode(TolerantNode):
             return self.driver.disable()
         if self.driver.safety.mode is Mode.ENABLED:
             return self.driver.enable("")
-        if self.awaited:
+        if self.awaited and not self._ports.problem:  # which may be why nodes are not connected
             return Answer(False, f"refused: not connected yet: {self.awaited}; start what is missing, then enable")
         faults = {node: fault for node, fault in sorted(self._ports.faults.items()) if fault}
         if problem := self._ports.problem:

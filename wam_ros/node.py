@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
 from wam_description.interface import Feed, Interface, declared, is_packaged
 from wam_description.parameters import ParameterError
@@ -27,7 +28,7 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
-from wam_ros.parameters import declare, follow_other, follow_together
+from wam_ros.parameters import Follower, declare, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import run
@@ -66,16 +67,26 @@ class AdaptedNode(TolerantNode):
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
             live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
-        follow_together(self, live, self._report_change)
+        follow_together(self, live, self._report_live)
         followed: Followed | None = getattr(self.node, "follows", None)
-        if followed:
-            group = getattr(shared, followed.group)
-            follow_other(
-                self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn, self._report_change
-            )
+        self._follower: Follower | None = None
         interface = Interface(shared, started_by_hand=declaration)
         self._checks = interface.checks(declaration)
-        self._ports = Ports(self, declaration, shared, interface)
+        self._ports = ports = Ports(self, declaration, shared, interface)
+        if owned:
+            ports.live = live_facts(getattr(shared, owned), f"{owned}.")
+        if followed:
+            group = followed.group
+            self._follower = follower = Follower(
+                followed.node,
+                group,
+                getattr(shared, group),
+                self.node.retune,
+                lambda reason: ports.set_problem(f"parameters {group}", reason),
+                self._report_change,
+            )
+            if followed.node in interface.declarations:  # it is not ready before it has those values
+                ports.waits = lambda: not follower.has_heard
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
         self._asking = False
         self._service_clients: dict[tuple[str, Any], Any] = {}  # by name and type
@@ -84,7 +95,7 @@ class AdaptedNode(TolerantNode):
         self._interface, self._since, self._is_enabled = interface, 0, False
         self._synchronisers: set[Synchroniser] = set()
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
-        self._ports.watch_peers(self._take_status)
+        ports.watch_peers(self._take_status, followed.node if followed else "")
         for topic, feeds in interface.feeds(declaration, self.node).items():
             self._connect(topic, feeds)
         for name in getattr(self.node, "services", ()):
@@ -180,6 +191,8 @@ class AdaptedNode(TolerantNode):
                 self._since = status.since
                 for synchroniser in self._synchronisers:
                     synchroniser.discard_commands(status.since)
+        if self._follower is not None:
+            self._follower.hear(status)
         take_status = getattr(self.node, "take_status", None)
         if take_status and (outputs := take_status(status)):
             self._publish(status.stamp, outputs)
@@ -251,10 +264,11 @@ class AdaptedNode(TolerantNode):
     def _report_change(self, values: Mapping[str, Any]) -> None:
         self._ports.report_change(self._worked, values)
 
-    def _warn(self, reason: str) -> None:
-        """Report that the node works with parameters of another one that it does not accept."""
-        self._ports.set_status(NodeStatus(Level.WARN, reason))
-        self.get_logger().warning(reason)
+    def _report_live(self, values: Mapping[str, Any]) -> None:
+        """Report live parameters that were set here; with them the node may accept what it follows."""
+        self._report_change(values)
+        if self._follower is not None:
+            self._follower.settle()
 
     def _report_refusals(self, inputs: Inputs) -> None:
         """Report each refused message once."""

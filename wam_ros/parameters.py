@@ -3,20 +3,17 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    ParameterEvent,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_parameter_events
 
+from wam_bag.printable import printable
+from wam_description.agreement import with_facts
 from wam_description.arm import Shared
 from wam_description.parameters import Field, ParameterError, build, fields, listed, values
+from wam_description.signals import NodeStatus
 from wam_description.wiring import raised
+from wam_ros.messages import LONGEST_REASON
 
 T = TypeVar("T")
 OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
@@ -131,44 +128,70 @@ def follow_together(
     node.add_on_set_parameters_callback(changed)
 
 
-def follow_other(
-    node: Node,
-    other: str,
-    group: T,
-    take: Any,
-    prefix: str,
-    refuse: Callable[[str], None],
-    report: Callable[[Mapping[str, Any]], None],
-) -> None:
-    """Take the live changes of shared parameters at another node of the same namespace.
+class Follower:
+    """Takes the live values of shared parameters of another node, as the status of that one has them.
 
     Parameters
     ----------
     other : name of that node.
+    name : of the group of these parameters.
     group : the present parameter object.
     take : called with the new parameter object; it may raise ParameterError, though the other node uses it.
-    prefix : what the names of these parameters begin with.
-    refuse : called with the reason where `take` does not accept what the other node uses.
+    refuse : called with the reason why the other node's values are not in use here, with '' where they are.
     report : called with the values that have been taken, by name.
+
+    Attributes
+    ----------
+    has_heard : whether any status of the other node has come.
     """
-    state = {"group": group}
 
-    def changed(event: ParameterEvent) -> None:
-        if event.node != f"{node.get_namespace().rstrip('/')}/{other}":
+    def __init__(
+        self,
+        other: str,
+        name: str,
+        group: Any,
+        take: Callable[[Any], None],
+        refuse: Callable[[str], None],
+        report: Callable[[Mapping[str, Any]], None],
+    ) -> None:
+        self._other, self._name, self._used, self._take = other, name, group, take
+        self._heard, self._problem, self.has_heard = group, "", False
+        self._refuse, self._report = refuse, report
+
+    def hear(self, status: NodeStatus) -> None:
+        """Take the values in the status of a node, where they are new; that of any other node is ignored."""
+        if status.node != self._other:
             return
-        given = {found.name: _plain(Parameter.from_parameter_msg(found)) for found in event.changed_parameters}
-        present = _updated(state["group"], given, prefix, lambda new: None)
-        if present is state["group"]:
-            return
-        state["group"] = present
+        self.has_heard = True
         try:
-            take(present)
-        except ParameterError as error:
-            refuse(f"{other} uses {prefix}* that are not accepted here: {error}")
-        else:
-            report({name: value for name, value in given.items() if name.startswith(prefix)})
+            heard = with_facts(self._heard, f"{self._name}.", status.facts)
+        except ParameterError as error:  # no node of ours reports such values
+            self._refuse(f"{self._other} reports {self._name}.* that cannot be read: {_why(error)}")
+            return
+        if heard != self._heard:
+            self._heard = heard
+            self.settle()
+        self._refuse(self._problem)
 
-    node.create_subscription(ParameterEvent, "/parameter_events", changed, qos_profile_parameter_events)
+    def settle(self) -> None:
+        """Take the values that the other node uses, where this one does not use them yet."""
+        self._problem = ""
+        if self._heard != self._used:
+            try:
+                self._take(self._heard)
+            except Exception as error:
+                if not isinstance(error, ParameterError):  # of a node of one's own, which may have taken a part
+                    self._used = None
+                self._problem = f"{self._other} uses {self._name}.* that are not accepted here: {_why(error)}"
+            else:
+                before = values(self._used) if self._used is not None else {}
+                self._used, present = self._heard, values(self._heard)
+                self._report({f"{self._name}.{key}": v for key, v in present.items() if before.get(key) != v})
+        self._refuse(self._problem)
+
+
+def _why(error: Exception) -> str:
+    return printable(str(error) if isinstance(error, ParameterError) else raised(error), LONGEST_REASON)
 
 
 def _updated(own: T, given: Mapping[str, Any], prefix: str, take: Any) -> T:

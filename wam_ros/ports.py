@@ -13,6 +13,7 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from wam_bag.printable import printable
+from wam_description.agreement import DIGESTS, digests, disagreement
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.parameters import listed
@@ -69,6 +70,7 @@ class Ports:
     counts : steps and whatever else the node counts, for the diagnostics.
     refusals : refused messages by topic.
     facts : further values for the diagnostics.
+    live : present values of the shared parameters that the node owns, as facts of its status.
     faults : present fault of each other node, '' where it has none.
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
     session : of the driver that this node follows, 0 before it is known.
@@ -90,6 +92,8 @@ class Ports:
         self._changed_after, self._change_number = -1, 0
         self._changed: dict[str, str] = {}
         self._status = self._plain = WAITING
+        self._digests = digests(shared)
+        self.live: dict[str, str] = {}
         self.takes_problem: Callable[[str], None] | None = None
         self.waits: Callable[[], bool] = lambda: False
         self._wanted: NodeStatus | None = None
@@ -259,9 +263,16 @@ class Ports:
         if stamp != self._changed_after:
             self._changed_after, self._changed = stamp, {CHANGES: str(self._change_number + 1)}
             self._change_number += 1
-        self._changed |= {f"{self._name}:{name}": str(listed(value)) for name, value in values.items()}
+        texts = {name: str(listed(value)) for name, value in values.items()}
+        self._changed |= {f"{self._name}:{name}": text for name, text in texts.items()}
+        self.live |= {name: text for name, text in texts.items() if name in self.live}
+        self._status = self._with_shared(self._status)
         status = self._status._replace(stamp=stamp, facts={**self._status.facts, **self._changed})
         self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
+
+    def _with_shared(self, status: NodeStatus) -> NodeStatus:
+        """A status of this node with what the others compare and take of its shared parameters."""
+        return status._replace(node=self._name, facts={**status.facts, DIGESTS: self._digests, **self.live})
 
     def follow(self, session: int, awaited: Collection[str]) -> None:
         """Report that this node follows another session of the driver, and which topics it lacks for its next step."""
@@ -291,7 +302,7 @@ class Ports:
         problem = self.problem if self.takes_problem is None else ""
         if problem:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
-        status = status._replace(node=self._name, session=status.session or self.session)
+        status = self._with_shared(status._replace(session=status.session or self.session))
         if status != self._status:
             if self.shared.timing.mode == "lockstep" or status.session != self._status.session:
                 # only the last status is kept: a recording, and a driver that is followed, lack none
@@ -344,8 +355,16 @@ class Ports:
                 f"ends before all listeners took the last messages of {', '.join(late)}: one is very slow, or gone"
             )
 
-    def watch_peers(self, take: Callable[[NodeStatus], None]) -> None:
-        """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`."""
+    def watch_peers(self, take: Callable[[NodeStatus], None], followed: str = "") -> None:
+        """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`.
+
+        A node that has to brake does so where another one was started with other shared parameters.
+
+        Parameters
+        ----------
+        take : called with each status of a node of the bring-up.
+        followed : node whose status it is called with, too, where the bring-up lacks that node.
+        """
         self._absent = set(self.interface.names) - {self._name}
 
         def receive(message: Any) -> None:
@@ -353,10 +372,13 @@ class Ports:
             is_peer = status.node in self.interface.declarations and status.node != self._name
             if is_peer:
                 self.faults[status.node] = status.fault
+                if self.takes_problem is not None:
+                    reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
+                    self.set_problem(f"parameters of {status.node}", reason)
             if status.connected:
                 self._absent.discard(status.node)
                 self._inform()
-            if is_peer:
+            if is_peer or status.node == followed:
                 take(status)
 
         self.listen(STATUS, receive)

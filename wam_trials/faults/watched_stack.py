@@ -6,10 +6,8 @@ from collections.abc import Callable, Collection
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
@@ -34,7 +32,6 @@ IDLE: Final = 0.25  # s of work that a second of waiting counts as
 REST: Final = 0.2  # s of work after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
-EVENTS: Final = "/parameter_events"
 SECOND: Final = 1_000_000_000
 
 
@@ -276,15 +273,15 @@ class WatchedStack:
 
     def type_of(self, topic: str) -> Any:
         """Message class of a topic."""
-        return ParameterEvent if topic == EVENTS else message_type(self.interface.topics[topic])
+        return message_type(self.interface.topics[topic])
 
     def qos_of(self, topic: str) -> Any:
         """Quality of service of a topic."""
-        return qos_profile_parameter_events if topic == EVENTS else qos(self.interface.topics[topic])
+        return qos(self.interface.topics[topic])
 
     def taken_topics(self) -> list[str]:
         """Topics that a node takes."""
-        return [EVENTS, *(name for name in self.interface.topics if self.interface.subscribers(name))]
+        return [name for name in self.interface.topics if self.interface.subscribers(name)]
 
     def own_publisher(self, topic: str, chance: Any) -> Publisher | None:
         """A publisher that belongs to the stack: that of the node which publishes the topic, or of the commander."""
@@ -296,7 +293,7 @@ class WatchedStack:
     def foreign_publisher(self, topic: str) -> Publisher:
         """A second publisher, matched; `remove` destroys it."""
         publisher = self.node.create_publisher(self.type_of(topic), topic, self.qos_of(topic))
-        wanted = 1 + len(self.interface.subscribers(topic)) if topic != EVENTS else 1
+        wanted = 1 + len(self.interface.subscribers(topic))
         self.wait(lambda: publisher.get_subscription_count() >= wanted, 1.0)
         return publisher
 

@@ -1,0 +1,248 @@
+"""Nodes that were started apart: the driver brakes where they work with other shared parameters than itself."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import RosWorld
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.parameter import Parameter
+from test_loss import Stack
+from test_nodes import SIX, WAM, changed, make
+
+from wam_description.agreement import DIGESTS, OF_ONE_PROCESS, digests, disagreement, live_facts, with_facts
+from wam_description.arm import Servo, Shared
+from wam_description.parameters import ParameterError, fields, listed, values
+from wam_description.topics import BY_NAME
+from wam_driver.safety import Mode
+from wam_ros.messages import diagnostic_status
+from wam_ros.ports import READY
+from wam_ros.qos import qos
+
+OWN = digests(WAM.shared)
+SERVO = WAM.shared.servo
+SOFT = [0.1 * gain for gain in SERVO.proportional_gain]  # the guard of the force loop does not accept it
+HEAVY = {"arm.payload": 1.5}
+MANY = {"arm.payload": 1.5, "ages.command": 0.3, "motion.speed": 0.3, "motion.jerk": 9.0, "timing.dither_cycle": 8}
+
+
+def started_with(other: dict[str, Any]) -> str:
+    """Digests of a node that was started with other values than the packaged ones."""
+    return digests(WAM.with_values(other).shared)
+
+
+@pytest.mark.parametrize(
+    ("other", "names"),
+    [
+        (HEAVY, "another arm.payload than"),
+        ({"arm.gravity": [0.0, 0.0, -9.8]}, "another arm.gravity than"),
+        ({"arm.joints.upper": [2.6, 1.9, 2.7, 3.0]}, "another arm.joints.upper than"),
+        ({"timing.mode": "realtime"}, "another timing.mode than"),
+        ({"disturbance_force_limit": 7.0}, "another disturbance_force_limit than"),
+        (MANY, "another timing.dither_cycle, ages.command, arm.payload and 2 more than"),
+    ],
+)
+def test_a_node_that_was_started_with_other_values_is_named_with_them(other: dict[str, Any], names: str) -> None:
+    reason = disagreement("gravity", OWN, started_with(other))
+    assert reason == f"gravity was started with {names} the driver; start all nodes with the same configuration"
+
+
+def test_what_concerns_one_process_or_changes_while_nodes_run_may_differ() -> None:
+    other = {
+        "nodes": ["driver"], "timing.niceness": 0, "timing.fifo_priority": 1, "timing.timeout": 9.0,
+        "timing.real_time_factor": 0.5, "servo.proportional_gain": SOFT,
+    }  # fmt: skip
+    assert other.keys() > OF_ONE_PROCESS
+    for name, value in other.items():
+        assert listed(values(WAM.shared)[name]) != value, name
+        assert disagreement("gravity", OWN, started_with({name: value})) == "", name
+
+
+def test_every_other_shared_parameter_is_compared() -> None:
+    compared = [field.name for field in fields(Shared) if field.name not in {*OF_ONE_PROCESS, *values(SERVO, "servo.")}]
+    assert len(OWN) == 3 * (1 + len(compared))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["?", OWN[:-3], OWN + "abc", "AAA" + OWN[3:], "\x00" * len(OWN), "é" * 100_000],
+    ids=["short", "fewer", "more", "other names", "zeros", "long"],
+)
+def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> None:
+    assert disagreement("gravity", OWN, text) == (
+        "gravity is of another version of wam_stack than the driver; start all nodes with the same version"
+    )
+
+
+def test_a_node_without_digests_is_not_compared() -> None:
+    assert disagreement("gravity", OWN, "") == ""
+
+
+def test_live_values_in_a_status_are_read_bit_for_bit() -> None:
+    given = Servo((0.1 + 0.2, 1e-17, 1.0 / 3.0, 5e8), (0.0, 7.0, 1e9, 2.0 / 3.0))
+    assert with_facts(SERVO, "servo.", live_facts(given, "servo.")) == given
+    assert with_facts(SERVO, "servo.", {"integral_gain": "[1.0]", "mode": "braked"}) == SERVO
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "soft", "[0.1, nan]", "[NaN]", "[Infinity]", "[1e999]", "[-1.0]", "0.1", '["0.1"]', "[" * 100_000],
+    ids=["empty", "word", "word in a list", "NaN", "infinity", "large", "negative", "number", "text", "deep"],
+)
+def test_live_values_in_a_status_that_cannot_be_are_refused(text: str) -> None:
+    with pytest.raises(ParameterError):
+        with_facts(SERVO, "servo.", {"servo.integral_gain": text})
+
+
+class Apart(Stack):
+    """The six nodes in this process, some of them started with other values; nobody has enabled the arm."""
+
+    def __init__(self, ros: RosWorld, folder: Path, others: dict[str, dict[str, Any]]) -> None:
+        self.ros, self.folder = ros, folder
+        self.values = {"timing__mode": "lockstep", "timing__real_time_factor": 0.0}
+        self.nodes = {name: self.made(name, **others.get(name, {})) for name in SIX}
+
+    def made(self, name: str, **other: Any) -> Any:
+        """A node with other values than the rest."""
+        return make(self.ros, self.folder, name, "/wam", changed(SIX, **self.values, **other))
+
+    def restart(self, name: str) -> None:
+        """End a node and start it with the values of the rest."""
+        self.ros.remove(self.nodes[name])
+        self.nodes[name] = self.made(name)
+
+    def refusal(self) -> str:
+        """Why the driver refuses to release the brakes, once all nodes are connected, also after a fault."""
+        node = self.nodes["driver"]
+        self.ros.wait(lambda: node._started and not node._ports.absent, what="all nodes")
+        self.driver.reset_fault()
+        answer = node._enable(type("Request", (), {"data": True}))
+        assert not answer.success
+        assert self.driver.safety.mode is not Mode.ENABLED
+        return str(answer.message)
+
+    def set(self, name: str, **given: Any) -> None:
+        """Set live parameters of a node, which accepts them."""
+        parameters = [Parameter(key.replace("__", "."), value=value) for key, value in given.items()]
+        result = self.nodes[name].set_parameters_atomically(parameters)
+        assert result.successful, result.reason
+
+    def force_servo(self) -> Servo:
+        """Gains of the velocity loop with which the guard of the force loop assesses."""
+        found: Servo = self.nodes["force_loop"].node._loop._servo
+        return found
+
+    def problem(self) -> str:
+        """Why the force loop lets the driver brake."""
+        return str(self.nodes["force_loop"]._ports.problem)
+
+
+def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_until_it_is_started_again(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    stack = Apart(ros, tmp_path, {"gravity": HEAVY})
+    assert stack.refusal() == (
+        "refused: gravity was started with another arm.payload than the driver; "
+        "start all nodes with the same configuration"
+    )
+    stack.restart("gravity")
+    ros.wait(lambda: not stack.nodes["driver"]._ports.problem, what="the same parameters")
+    stack.enable()
+
+
+def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: RosWorld, tmp_path: Path) -> None:
+    sensorless = {
+        "arm.joint_sensors": False, "force_loop:feedback": "contact_estimate", "force_loop:force_gain": [0.01],
+    }  # fmt: skip
+    stack = Apart(ros, tmp_path, {"force_loop": sensorless})
+    driver = stack.nodes["driver"]
+    ros.wait(lambda: driver._ports.problem, what="the status of the force loop")
+    answer = driver._enable(type("Request", (), {"data": True}))
+    assert "force_loop was started with another arm.joint_sensors than the driver" in answer.message
+
+
+def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_the_arm_braked(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
+    assert stack.refusal().startswith("refused: force_loop: velocity_loop uses servo.* that are not accepted here: ")
+    assert stack.force_servo() == SERVO
+    stack.set("velocity_loop", servo__proportional_gain=list(SERVO.proportional_gain))
+    ros.wait(lambda: not stack.problem(), what="acceptable gains")
+    stack.enable()
+    stack.set("velocity_loop", servo__proportional_gain=SOFT)
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert stack.fault.startswith("force_loop: velocity_loop uses servo.* that are not accepted here: ")
+
+
+def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
+    ros.wait(stack.problem, what="gains that are not accepted")
+    stack.set("force_loop", guard__mode="warn")
+    assert stack.force_servo().proportional_gain == tuple(SOFT)
+    assert stack.problem() == ""
+
+
+def test_a_follower_that_is_started_again_takes_the_live_gains(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Apart(ros, tmp_path, {})
+    stiffer = [1.05 * gain for gain in SERVO.proportional_gain]
+    stack.set("velocity_loop", servo__proportional_gain=stiffer)
+    ros.wait(lambda: stack.force_servo().proportional_gain == tuple(stiffer), what="the live gains")
+    stack.restart("force_loop")
+    assert stack.force_servo() == SERVO
+    ros.wait(lambda: stack.force_servo().proportional_gain == tuple(stiffer), what="the live gains after the start")
+
+
+def test_a_follower_is_not_ready_before_it_has_heard_the_values_of_the_other_node(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    configured = changed(["velocity_loop", "force_loop"])
+    velocity, force = (make(ros, tmp_path, name, "/wam", configured) for name in ("velocity_loop", "force_loop"))
+    looks: list[int] = []
+    waits, velocity._ports.waits = force._ports.waits, lambda: True  # it publishes no status
+    force._ports.waits = lambda: looks.append(1) or waits()
+    ros.wait(lambda: len(looks) > 2, what="all connections of the force loop")
+    assert not force._ports.ready
+    velocity._ports.waits = lambda: False
+    ros.wait(lambda: force._ports.ready, what="the status of the velocity loop")
+
+
+def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: RosWorld, tmp_path: Path) -> None:
+    force = make(ros, tmp_path, "force_loop", "/wam", changed(["force_loop"]))
+    forger = ros.node("forger").create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
+    ros.wait(forger.get_subscription_count, what="a listener")
+
+    def send(text: str) -> None:
+        status = READY._replace(node="velocity_loop", facts={"servo.integral_gain": text})
+        forger.publish(diagnostic_status(status, "wam"))
+
+    send("[0.8, soft]")
+    ros.wait(lambda: force._ports.problem, what="a problem")
+    assert force._ports.problem.startswith("velocity_loop reports servo.* that cannot be read: JSONDecodeError: ")
+    send(str(list(SERVO.integral_gain)))
+    ros.wait(lambda: not force._ports.problem, what="values that can be read")
+
+
+def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Apart(ros, tmp_path, {})
+    stack.enable()
+    driver = stack.nodes["driver"]
+    other = ros.node("other").create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
+    ros.wait(lambda: other.get_subscription_count() >= len(SIX), what="listeners")
+
+    def send(node: str, text: str) -> None:
+        status = READY._replace(node=node, session=driver._session.number, facts={DIGESTS: text})
+        other.publish(diagnostic_status(status, "wam"))
+
+    send("stranger", started_with(HEAVY))
+    stack.wait_periods(500)
+    assert stack.driver.safety.mode is Mode.ENABLED, "of no node of the bring-up"
+    send("gravity", started_with(HEAVY))
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    text = "gravity was started with another arm.payload than the driver"
+    assert stack.fault.startswith(text)
+    assert stack.driver.currents == [0.0] * 4
+    assert text in stack.refusal()
+    send("gravity", driver._ports._digests)
+    ros.wait(lambda: not driver._ports.problem, what="the same parameters")
+    stack.enable()

@@ -1,0 +1,83 @@
+"""Whether nodes that were started apart work with the same shared parameters, by what their statuses have of them."""
+
+import base64
+import json
+import zlib
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from wam_description.arm import Shared
+from wam_description.parameters import ParameterError, build, fields, listed, values
+
+T = TypeVar("T")
+
+DIGESTS = "shared parameters"  # fact in the status of a node: `digests` of what it was started with
+OF_ONE_PROCESS = frozenset(
+    {"nodes", "timing.niceness", "timing.fifo_priority", "timing.timeout", "timing.real_time_factor"}
+)  # nothing that a node computes depends on them
+NAMED = 3  # parameters
+_LENGTH = 3  # characters of 6 bits each: two values have the same digest in one of 260 000 cases
+
+
+def digests(shared: Shared) -> str:
+    """A digest of the names of the compared parameters, then one of the value of each; of three characters.
+
+    Compared are those that cannot change while a node runs, apart from those of one process.
+    """
+    present, names = values(shared), _compared()
+    return "".join([_digest(names), *(_digest(listed(present[name])) for name in names)])
+
+
+def disagreement(node: str, own: str, other: str) -> str:
+    """Why the driver has to brake for what a node was started with, '' where it has no reason.
+
+    Parameters
+    ----------
+    node : name of the node.
+    own, other : `digests` of the driver and of the node; there is no reason in an empty one.
+    """
+    if not other or other == own:
+        return ""
+    names = _compared()
+    if len(other) != len(own) or _part(other, 0) != _part(own, 0):
+        return f"{node} is of another version of wam_stack than the driver; start all nodes with the same version"
+    different = [name for i, name in enumerate(names, start=1) if _part(own, i) != _part(other, i)]
+    more = f" and {len(different) - NAMED} more" if len(different) > NAMED else ""
+    return (
+        f"{node} was started with another {', '.join(different[:NAMED])}{more} than the driver; "
+        "start all nodes with the same configuration"
+    )
+
+
+def live_facts(group: Any, prefix: str) -> dict[str, str]:
+    """Present values of live shared parameters, which are numbers, as facts of a status, by their full names."""
+    return {f"{prefix}{name}": str(listed(value)) for name, value in values(group).items()}
+
+
+def with_facts(group: T, prefix: str, facts: Mapping[str, str]) -> T:
+    """A group of live shared parameters with the values that the facts of a status have of it.
+
+    Raises
+    ------
+    ParameterError
+        for a value that is none of such a parameter.
+    """
+    present = values(group)
+    try:
+        given = {name: json.loads(facts[prefix + name]) for name in present if prefix + name in facts}
+    except (ValueError, RecursionError) as error:
+        raise ParameterError(f"{type(error).__name__}: {error}") from None
+    return build(type(group), {**present, **given})
+
+
+def _compared() -> list[str]:
+    return [field.name for field in fields(Shared) if not field.live and field.name not in OF_ONE_PROCESS]
+
+
+def _digest(value: Any) -> str:
+    number = zlib.crc32(repr(value).encode())
+    return base64.b64encode(number.to_bytes(4, "big")).decode()[:_LENGTH]
+
+
+def _part(text: str, i: int) -> str:
+    return text[i * _LENGTH : (i + 1) * _LENGTH]
