@@ -154,7 +154,7 @@ class Broken:
         ports = self._ports
         self._whole_publish, self._whole_write, self._whole_status = ports.publish, self.bus.write, ports.publish_status
         ports.publish, self.bus.write, ports.publish_status = self._send, self._write, self._send_status
-        ports.takes_problem = lambda reason: None if self.defect == "claims" else self._trip(reason)
+        ports.takes_problem = lambda reason: None if self.defect in ("claims", "agreement") else self._trip(reason)
 
     def _send(self, topic: str, stamp: int, value: Any) -> None:
         change = {

@@ -111,6 +111,10 @@ REQUIREMENTS: Final = {
         "two publishers of motor_current_command are a fault that names the topic",
         "count the publishers of the topic in every status period",
     ),
+    "agreement": Requirement(
+        "brakes, and refuses enable, while the statuses of two nodes have different values of `shared parameters`",
+        "compare them as text, with those of your own node where it has them: nodes of two configurations run",
+    ),
     "end": Requirement(
         "ended by SIGTERM it brakes first and reports that",
         "disable and publish the status before the node is destroyed",

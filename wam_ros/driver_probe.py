@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
+from wam_description.agreement import DIGESTS
 from wam_description.arm import Shared
 from wam_description.driver_contract import REPLY, SERVICES
 from wam_description.rigid_body import RigidBody
@@ -151,9 +152,15 @@ class DriverProbe(Node):
     def _take_report(self, message: Any) -> None:
         self.diagnostics |= {status.name for status in message.status}
 
-    def report(self, fault: str = "") -> None:
-        """Publish a status of this node: ready, or with a fault."""
-        status = READY._replace(node="velocity_loop", session=max(self._session, 0), fault=fault)
+    def report(self, fault: str = "", node: str = "velocity_loop", started_with: str = "") -> None:
+        """Publish a status of this node, or of another one: ready, or with a fault.
+
+        Parameters
+        ----------
+        started_with : digests of its shared parameters (`wam_description.agreement`).
+        """
+        facts = {DIGESTS: started_with} if started_with else {}
+        status = READY._replace(node=node, session=max(self._session, 0), fault=fault, facts=facts)
         if fault:
             status = status._replace(level=Level.ERROR, message=fault)
         self._status.publish(diagnostic_status(status, self._shared.arm.name))

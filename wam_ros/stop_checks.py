@@ -109,6 +109,19 @@ def _claims(bench: DriverBench) -> str:
         bench.probe.watch(3 * SETTLE)
 
 
+def _agreement(bench: DriverBench) -> str:
+    probe = bench.probe
+    bench.enable()
+    probe.report(node="transform", started_with="one")
+    probe.watch(SETTLE)
+    probe.report(started_with="another")
+    if wrong := bench.in_mode("fault"):
+        return wrong
+    probe.ask("reset_fault")
+    done, text = probe.ask("enable", True)
+    return f"enable is done: '{text}'" if done else ""
+
+
 def _end(bench: DriverBench) -> str:
     if bench.end is None:
         raise Untested("the driver runs already; give its command with --driver")
@@ -142,6 +155,7 @@ STOP_CHECKS: dict[str, Check] = {
     "discard": _discard,
     "peers": _peers,
     "claims": _claims,
+    "agreement": _agreement,
     "end": _end,
     "session": _session,
 }
