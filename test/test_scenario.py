@@ -528,6 +528,21 @@ def test_a_posture_that_the_force_loop_cannot_follow_is_refused(
     load_for(CONFIGURATION.with_values({"nodes": held, "force_loop:joint_speed_limit": 0.1}), str(path))
 
 
+@pytest.mark.slow
+def test_the_arm_is_behind_a_posture_at_the_end_of_its_step_as_the_documentation_has_it() -> None:
+    def behind(seconds: float, gain: float) -> float:
+        goal = (1.0, -0.6, 0.0, 0.5)
+        steps = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("turn", seconds, goal)]
+        run = Simulation(CONFIGURATION.with_values({"force_loop:posture_gain": gain}), steps)
+        assert not run.play()
+        return abs(run.rows["sim/joint_states"][-1].values[0] - goal[0])
+
+    gain = CONFIGURATION.sections["force_loop"]["posture_gain"]
+    assert behind(2.0, gain) == pytest.approx(0.01, abs=0.002)
+    assert behind(1.0, gain) > 0.04
+    assert behind(2.0, 0.5 * gain) > 0.04
+
+
 TURNED = [1.0, -0.6, 0.0, 0.5]
 SLOWLY = {"force_loop:joint_speed_limit": 0.3}
 
