@@ -1,7 +1,7 @@
 """Cable circuits of the plant as MuJoCo simulates them: creep, slack, torque and tension."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class CableCircuits:
         self._nominal = self._circuits = arm.circuits
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         self._pull = data.qfrc_spring[:n]
+        self._pulls = self._pull.tolist
         self._stretch_rate = data.ten_velocity[: 2 * n : 2]
         # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
         # loose one beyond the first
@@ -81,6 +82,21 @@ class CableCircuits:
                 self._slack_ends[4 * i + 1] -= more
                 self._slack_ends[4 * i + 2] += more
 
+    @property
+    def after_step(self) -> Callable[[Sequence[int], Sequence[float]], bool] | None:
+        """What has to follow each step, `follow` or as much of it as there is to do; None for nothing."""
+        return self.follow if self._friction_counts else self._creep if self.depends_on_torque else None
+
+    def _creep(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
+        """`follow` where slack strands do not count: without looking for them 1 % of a step less."""
+        ends = self._slack_ends
+        for (i, rate, _), way, speed, pull in zip(self.each, direction, speeds, self._pulls()):  # noqa: B905
+            if way:
+                crept = rate * (speed if speed >= 0.0 else -speed) * pull
+                ends[i] -= crept
+                ends[i + 1] -= crept
+        return False
+
     def follow(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
 
@@ -96,7 +112,7 @@ class CableCircuits:
         """
         ends, is_slack = self._slack_ends, False
         for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
-            self.each, direction, speeds, self._pull.tolist()
+            self.each, direction, speeds, self._pulls()
         ):
             if way:
                 crept = rate * (speed if speed >= 0.0 else -speed) * pull  # half the time of abs()

@@ -102,13 +102,6 @@ class DryFriction:
         by_shaft = zip(self.direction, self._static, self._dynamic, strict=True)
         self.levels = [moving if way else stuck for way, stuck, moving in by_shaft]
 
-    def remains(self, velocity: Sequence[float]) -> bool:
-        """Whether every shaft remains stuck, or in motion in its direction, at these velocities, rad/s."""
-        for speed, low, high in zip(velocity, self._low, self._high):  # noqa: B905, SIM110 - cost 3 % of a step
-            if not low < speed < high:
-                return False
-        return True
-
     def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
         """Bring `levels` and `elastic` up to date for the next step.
 

@@ -121,6 +121,9 @@ class Plant:
         is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
         shared = self._surfaces.laws, self._friction, self._circuits, self._pushes
         self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
+        # to look them up in each step costs 3 % of it
+        bounds, after_step = (*self._friction.bounds, self._friction.direction), self._circuits.after_step
+        self._in_steps = model, data, self._pushes, self._movers, self._qvel.tolist, *bounds, after_step
         self._rest()
         require_free_start(self.model, self.data, arm, world)
         self._kept = self._position.tolist(), self._plastic.tolist()
@@ -251,12 +254,15 @@ class Plant:
         if self._advance is not None:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
             return
-        model, data, pushes, movers = self.model, self.data, self._pushes, self._movers
-        friction, velocities = self._friction, self._qvel.tolist
-        remains, follow = friction.remains, self._circuits.follow if self._circuits.depends_on_torque else None
+        model, data, pushes, movers, velocities, lows, highs, direction, after_step = self._in_steps
         velocity = before = velocities()
         for _ in range(count):
-            if not (self._is_set and remains(velocity)):
+            if self._is_set:
+                for speed, low, high in zip(velocity, lows, highs):  # noqa: B905 - stuck, or in motion as before
+                    if not low < speed < high:
+                        self._set_friction()
+                        break
+            else:
                 self._set_friction()
             for mover in movers:
                 mover.lead(data.time)
@@ -270,7 +276,7 @@ class Plant:
             if pushes:
                 self._applied.fill(0.0)
             velocity = velocities()
-            if follow is not None and follow(friction.direction, velocity):
+            if after_step is not None and after_step(direction, velocity):
                 self._is_set = False
         self._velocity = before
 
