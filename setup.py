@@ -57,6 +57,7 @@ COMPILED = (
     "wam_driver/loads.py",
     "wam_driver/plant.py",
     "wam_driver/sensors.py",
+    "wam_ros/wire.py",
     "wam_sim/bus.py",
     "wam_sim/simulation.py",
 )
