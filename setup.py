@@ -56,6 +56,7 @@ COMPILED = (
     "wam_driver/limit_watch.py",
     "wam_driver/loads.py",
     "wam_driver/plant.py",
+    "wam_driver/safety.py",
     "wam_driver/sensors.py",
     "wam_ros/wire.py",
     "wam_sim/bus.py",
@@ -80,7 +81,7 @@ def extensions():
     if mujoco is None or mujoco.origin is None:
         sys.exit(f"WAM_COMPILE needs the headers of MuJoCo: {COMPILE}")
     given = ["--config-file", "pyproject.toml", "--ignore-missing-imports"]  # stubs are for `make lint`
-    found = mypycify([*COMPILED, *given], opt_level="2", multi_file=True, target_dir="build/mypyc")
+    found = mypycify([*COMPILED, *given], opt_level="3", multi_file=True, target_dir="build/mypyc")
     headers = Path(mujoco.origin).parent / "include"
     found.append(Extension("wam_driver.fast_steps", ["wam_driver/fast_steps.c"], include_dirs=[str(headers)]))
     for extension in found:
