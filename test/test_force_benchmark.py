@@ -405,3 +405,7 @@ def test_a_value_that_every_task_sets_itself_is_refused(capsys: pytest.CaptureFi
     with pytest.raises(SystemExit, match="1"):
         main(given)
     assert "use_joint_sensors has no effect here: each scenario sets it" in capsys.readouterr().err
+    for of in ("force", "contact", "robustness"):
+        with pytest.raises(SystemExit, match="1"):
+            main(["evaluate", of, "--set", "timing.mode=realtime"])
+        assert "--set timing.mode has no effect: the runs are in Python" in capsys.readouterr().err

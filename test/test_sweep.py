@@ -216,7 +216,7 @@ def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
     [
         ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
         (("scenario:script=a,b",), "the scenario is that of --scenario"),
-        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs of a sweep are in Python"),
+        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs are in Python"),
         (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
         ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
     ],

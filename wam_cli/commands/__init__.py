@@ -8,7 +8,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
@@ -300,7 +300,26 @@ def evaluation_of(given: argparse.Namespace) -> Configuration:
     if given.write:
         writable_file("--write", given.write)
         refuse_source(given, "--write", given.write)
+    require_effect("--set", option_values(given.values))
     return configuration_of(given)
+
+
+def require_effect(option: str, names: Iterable[str]) -> None:
+    """Refuse parameters that do nothing in runs without ROS.
+
+    Raises
+    ------
+    ValueError
+        which names the first one and what to do.
+    """
+    from wam_sim.simulation import WITHOUT_EFFECT
+
+    for name in names:
+        if name in WITHOUT_EFFECT:
+            raise ValueError(
+                f"{option} {name} has no effect: the runs are in Python without ROS, in lockstep and as fast as they "
+                "can; leave it out, and play 'wam demo' with each of its values"
+            )
 
 
 def at_least(option: str, value: float, low: float) -> None:

@@ -8,11 +8,13 @@ from wam_cli.commands import (
     at_least,
     configuration_of,
     refuse_overridden,
+    require_effect,
     take_configuration,
     take_executor,
     writable_directory,
     writable_file,
 )
+from wam_description.configuration import option_values
 from wam_experiments.force_benchmark.evaluation import ForceTrial, evaluate
 from wam_experiments.force_benchmark.figure import figure
 from wam_experiments.force_benchmark.page import details, page, report, required
@@ -70,6 +72,7 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _trials(given: argparse.Namespace) -> list[ForceTrial]:
+    require_effect("--set", option_values(given.values))
     numbers, base = given.only or range(given.tasks), configuration_of(given)
     if given.values:
         drawn = [draw(base.shared.arm, given.seed, number) for number in numbers]

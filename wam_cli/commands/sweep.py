@@ -16,6 +16,7 @@ from wam_cli.commands import (
     batch_of,
     configuration_of,
     refuse_source,
+    require_effect,
     take_batch,
     take_configuration,
     writable_file,
@@ -27,7 +28,6 @@ from wam_description.configuration import LONGEST, option_values
 from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
 from wam_sim.batch import results
-from wam_sim.simulation import WITHOUT_EFFECT
 from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
@@ -88,12 +88,7 @@ def run(given: argparse.Namespace) -> int:
 def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
     """Refuse an axis whose values would stand in the table without having been used, and such values of --set."""
     for option, given_names in (("--set", option_values(given.values)), ("--vary", [axis.name for axis in axes])):
-        for name in given_names:
-            if name in WITHOUT_EFFECT:
-                raise ValueError(
-                    f"{option} {name} has no effect: the runs of a sweep are in Python without ROS, in lockstep and as "
-                    "fast as they can; leave it out, and play 'wam demo' with each of its values"
-                )
+        require_effect(option, given_names)
     names = [axis.name for axis in axes]
     for name in names:
         if names.count(name) > 1:
