@@ -58,6 +58,10 @@ def test_what_concerns_one_process_or_changes_while_nodes_run_may_differ() -> No
         assert disagreement("gravity", OWN, started_with({name: value})) == "", name
 
 
+def test_zero_is_zero_whatever_its_sign() -> None:
+    assert disagreement("gravity", started_with({"arm.payload": 0.0}), started_with({"arm.payload": -0.0})) == ""
+
+
 def test_every_other_shared_parameter_is_compared() -> None:
     compared = [field.name for field in fields(Shared) if field.name not in {*OF_ONE_PROCESS, *values(SERVO, "servo.")}]
     assert len(OWN) == 3 * (1 + len(compared))
@@ -148,6 +152,17 @@ def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_unt
     stack.restart("gravity")
     ros.wait(lambda: not stack.nodes["driver"]._ports.problem, what="the same parameters")
     stack.enable()
+
+
+def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Apart(ros, tmp_path, {})
+    ros.remove(stack.nodes["driver"])
+    fewer = changed([name for name in SIX if name != "gravity"], **stack.values)
+    stack.nodes["driver"] = make(ros, tmp_path, "driver", "/wam", fewer)
+    ros.remove(stack.nodes["gravity"])
+    stack.nodes["gravity"] = stack.made("gravity", **HEAVY)
+    ros.wait(lambda: stack.nodes["driver"]._ports.problem, what="the status of gravity")
+    assert "gravity was started with another arm.payload than the driver" in stack.refusal()
 
 
 def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: RosWorld, tmp_path: Path) -> None:

@@ -50,6 +50,12 @@ def test_a_misspelt_command_is_answered_with_the_one_that_was_meant(capsys: pyte
     assert "no 'contct'; did you mean 'contact'?" in said(capsys, "evaluate", "contct")[2]
 
 
+def test_an_abbreviated_option_is_no_other_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["up", "--name", "left"])  # of `wam demo` and `wam record`; it was taken for --namespace
+    assert "unrecognized arguments: --name left" in capsys.readouterr().err
+
+
 def test_the_american_spelling_is_the_same_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert ALIASES == {"analyze": "analyse"}
     code, out, _ = said(capsys, "analyze", str(ROOT / "bags" / "sample" / "creep"), "--quiet")

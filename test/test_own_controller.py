@@ -1,6 +1,7 @@
 """A user's own controller, named in the configuration, runs in the simulation, over topics and in a replay."""
 
 import dataclasses
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -118,6 +119,7 @@ class Arrays:
     topics = (
         Topic("strength", WRENCH, "outer", "of the torques, N m", ""),
         Topic("rows", TABLE, "outer", "the same", columns=("torque",)),
+        Topic("taken_by_nobody", JOINT_STATE, "outer", "the same", "joints"),
     )
     kind: Any = staticmethod(np.array)
 
@@ -125,7 +127,7 @@ class Arrays:
 
     @reaction(
         Input("joint_states", "velocity"),
-        outputs=("joint_velocity_command", "joint_effort_command", "strength", "rows"),
+        outputs=("joint_velocity_command", "joint_effort_command", "strength", "rows", "taken_by_nobody"),
     )
     def step(self, inputs: Inputs) -> Outputs:
         torques = self.kind([-3.0 * v for v in inputs["joint_states"].velocity])
@@ -134,6 +136,7 @@ class Arrays:
             "joint_effort_command": State(self.kind([]), self.kind([]), torques),
             "strength": Wrench("base", self.kind([0.0, 0.0, sum(torques)]), self.kind([0.0] * 3)),
             "rows": Table("base", self.kind([[torque] for torque in torques])),
+            "taken_by_nobody": State(self.kind([]), self.kind([math.nan] * 4), torques),
         }
 
 
@@ -165,6 +168,32 @@ def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(configured: Configur
     assert [run.play() for run in runs] == ["", ""]
     assert np.abs([row.values for row in runs[0].rows["joint_effort_command"]]).max() > 0.01, "zeros would show nothing"
     assert repr(runs[0].rows) == repr(runs[1].rows), "as text, in which NaN equals NaN"
+
+
+@pytest.mark.parametrize(
+    ("output", "text"),
+    [
+        (
+            {"joint_effort_command": State([], [], [float("nan")] * 4)},
+            "returned an unusable joint_effort_command: effort of",
+        ),
+        (
+            {"nowhere": None},
+            "node 'damping' returned the topic 'nowhere'; its reactions declare joint_velocity_command",
+        ),
+    ],
+)
+def test_what_a_node_answers_to_a_status_is_looked_at_in_a_direct_run(
+    output: dict[str, Any], text: str, configured: Configuration, tmp_path: Path
+) -> None:
+    class Answering(Lists):
+        def take_status(self, status: NodeStatus) -> Outputs:
+            return output
+
+    own = {"nodes": [node for node in configured.shared.nodes if ":" not in node]}
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    with pytest.raises(ValueError, match=text):
+        Simulation(configured.with_values(own), steps, {"damping": Answering}).play()
 
 
 class Misspelt:

@@ -418,6 +418,26 @@ def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
         }
 
 
+def test_the_times_of_a_lockstep_recording_are_not_those_of_another_arm(tmp_path: Path) -> None:
+    def diagnostics(name: str, stamp: int) -> bytes:
+        message = DiagnosticArray(header=header(stamp, ""), status=[DiagnosticStatus(name=name)])
+        return bytes(serialize_message(message))
+
+    rows = [BY_NAME["/diagnostics"], BY_NAME["motor_states"]]
+    with BagWriter(tmp_path / "bag") as bag:
+        profiles = {row.name: qos(row) for row in rows}
+        machine = Recorder(bag, {row.name: row for row in rows}, "lockstep", profiles, lambda name: "driver", "/left")
+        machine.receive("/diagnostics", diagnostics("right: driver", 1_795_558_389_219_000_000), 0, 0, 7)
+        machine.receive("motor_states", bytes(serialize_message(state(5_000_000, 0.1))), 0, 0, 1)
+        machine.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
+        machine.receive("/diagnostics", diagnostics("right: gravity", 1_795_558_390_219_000_000), 0, 0, 30)
+        machine.receive("motor_states", bytes(serialize_message(state(7_000_000, 0.1))), 0, 0, 2)
+        assert machine.dropped() == 0
+    times = sorted(message.log_time for message in recovered(next((tmp_path / "bag").glob("*.mcap"))))
+    assert times[-1] == 7_000_000
+    assert len(times) == 5
+
+
 def fill_disk(bag: BagWriter) -> None:
     """Let every further write end as on a full disk."""
     with Path("/dev/full").open("wb") as full:

@@ -652,6 +652,8 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
         (task(PRESSING._replace(kind=cast(Any, "force"))), "axis 1: kind is 'force'; give an AxisKind"),
         (task(PRESSING._replace(stiffness=10.0)), "axis 1: stiffness and damping belong to an impedance"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, 9)), "axis 2: joint is 9; allowed: -1 to 3"),
+        (task(PRESSING, TaskAxis(AxisKind.POSITION, cast(Any, 2.0))), "axis 2: joint is 2.0; allowed: -1 to 3, a wh"),
+        (task(PRESSING._replace(joint=1)), "axis 1: joint is 1, cover 'outer_link', direction .*; give a joint, or a"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is to be at 9.0 rad; allowed"),
         (task(PRESSING, frame="hand"), "frame is 'hand'; allowed: base, inner_link"),
         (

@@ -238,7 +238,8 @@ def _parser(command: Any) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"wam_stack {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, text in COMMANDS.items():
-        own = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        # an abbreviation would be another option: --name is none of `wam up`, and --namespace is
+        own = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False)
         if command is not None and command.__name__.endswith(f".{name}"):
             command.arguments(own)
     return parser

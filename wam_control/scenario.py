@@ -509,8 +509,22 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
 def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any]) -> ScenarioStep:
     """A step made in Python, with values as those of a file have them."""
     _require_step(where, step, shared)
-    step = step._replace(settings=checked_settings(where, step.settings, shared, controllers))
-    return step._replace(push=_on_axis(step.push, shared.arm)) if step.push else step
+    force, torque = (_floats(vector) for vector in step.force[1:])
+    step = step._replace(
+        settings=checked_settings(where, step.settings, shared, controllers),
+        force=step.force._replace(force=force, torque=torque),
+        tip=step.tip and _floats(step.tip),
+        posture=_floats(step.posture),
+    )
+    if not step.push:
+        return step
+    push = step.push._replace(force=_floats(step.push.force), aside=step.push.aside and _floats(step.push.aside))
+    return step._replace(push=_on_axis(push, shared.arm))
+
+
+def _floats(values: Sequence[float]) -> Any:
+    """The numbers of a vector as a tuple, whatever sequence they were given in."""
+    return tuple(map(float, values))
 
 
 def _require_one(where: str, keys: Sequence[str]) -> None:

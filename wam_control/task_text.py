@@ -81,8 +81,18 @@ def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
     if axis.value is not None:
         number(where, "value", axis.value)
     joints = arm.joints.names
-    require(axis.joint in range(-1, len(joints)), f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}")
-    if axis.joint < 0:
+    is_whole = isinstance(axis.joint, int) and not isinstance(axis.joint, bool)
+    require(
+        is_whole and axis.joint in range(-1, len(joints)),
+        f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}, a whole number",
+    )
+    if axis.joint >= 0:
+        require(
+            axis.cover == "" and not any(axis.direction),
+            f"{where}: joint is {axis.joint}, cover {axis.cover!r}, direction {axis.direction}; give a joint, or a "
+            "link and a direction",
+        )
+    else:
         _cover(where, axis.cover, arm)
         if axis.position is not None:
             number(where, "contact_position", axis.position)

@@ -75,8 +75,15 @@ def _compared() -> list[str]:
 
 
 def _digest(value: Any) -> str:
-    number = zlib.crc32(repr(value).encode())
+    number = zlib.crc32(repr(_unsigned(value)).encode())
     return base64.b64encode(number.to_bytes(4, "big")).decode()[:_LENGTH]
+
+
+def _unsigned(value: Any) -> Any:
+    """The same with 0.0 for -0.0, which equals it."""
+    if isinstance(value, list | tuple):
+        return [_unsigned(one) for one in value]
+    return value + 0.0 if isinstance(value, float) else value
 
 
 def _part(text: str, i: int) -> str:

@@ -47,11 +47,30 @@ def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence
             defect = look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
             if not defect:
                 return _AS_TAKEN[topic.type](value)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             defect = f"{value} does not hold numbers: {error}"
         raise UnusableOutput(node, topic.name, defect)
 
     return check
+
+
+def conversion(node: str, topic: Topic) -> Check:
+    """What makes an output that no other node takes into lists and tuples of floats; NaN, too, is a value there.
+
+    Parameters
+    ----------
+    node : its name.
+    topic : row of the table of topics, of one of the types that carry numbers.
+    """
+
+    def convert(value: Any) -> Any:
+        try:
+            return _AS_TAKEN[topic.type](value)
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
+            defect = f"{value!r} does not hold the numbers of a {_KINDS[topic.type].__name__}: {error}"
+        raise UnusableOutput(node, topic.name, defect)
+
+    return convert
 
 
 def _floats(values: Sequence[float]) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
-from wam_description.defects import Check, UnusableOutput, output_check
+from wam_description.defects import Check, UnusableOutput, conversion, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError, meant
 from wam_description.signals import BASE
@@ -165,7 +165,7 @@ class Interface:
         )
 
     def checks(self, declaration: Declaration) -> dict[str, Check]:
-        """What looks at an output of a node of your own, by topic, where another node takes it; see `output_check`.
+        """What each output of a node of your own goes through, by topic: see `output_check`, if another node takes it.
 
         The nodes of the stack are not looked at: the simulation would be slower by a twentieth.
         """
@@ -176,7 +176,9 @@ class Interface:
             taken = [item.arrays for one in self.declarations.values() for item in one.taken if item.topic == name]
             taken += ["effort" for one in self.declarations.values() if name in one.listens]  # the driver, currents
             topic = self.topics.get(name)
-            if topic is not None and topic.is_numbers and taken:
+            if topic is not None and topic.is_numbers and not taken:
+                found[name] = conversion(declaration.name, topic)
+            elif topic is not None and topic.is_numbers:
                 names = self._arm.motors.names if topic.side == "motors" else self._arm.joints.names
                 frames = (BASE, *self._arm.covers.names)
                 found[name] = output_check(declaration.name, topic, names, frames, needed_arrays(taken))

@@ -19,8 +19,7 @@ parameters in that section, or 'module:Class' where its import takes long.  What
 
 tune(own) : take new live parameters, or refuse them with ParameterError.
 owns : name of a group of shared parameters that are live at this node, taken by ``retune(group)``.
-follows : a `Followed` group of shared parameters of another node; its values there come to ``retune(group)``, too, at
-    the start and at each change, and the driver brakes while that refuses them.
+follows : a `Followed` group of parameters of another node; its values there go to ``retune(group)``, or the arm brakes.
 take_status(status) : called with the `NodeStatus` that any other node reports; it may return outputs.
 services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
 requests : list of `Call` and `SetParameters`, filled by steps; made in order before the step's outputs are published.

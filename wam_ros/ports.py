@@ -16,6 +16,7 @@ from wam_bag.printable import printable
 from wam_description.agreement import DIGESTS, digests, disagreement
 from wam_description.arm import Shared
 from wam_description.interface import Interface
+from wam_description.nodes import NODES
 from wam_description.parameters import listed
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
@@ -372,9 +373,10 @@ class Ports:
             is_peer = status.node in self.interface.declarations and status.node != self._name
             if is_peer:
                 self.faults[status.node] = status.fault
-                if self.takes_problem is not None:
-                    reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
-                    self.set_problem(f"parameters of {status.node}", reason)
+            # a node of the stack that this bring-up does not list answers all the same
+            if self.takes_problem is not None and (is_peer or status.node in NODES.keys() - {self._name}):
+                reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
+                self.set_problem(f"parameters of {status.node}", reason)
             if status.connected:
                 self._absent.discard(status.node)
                 self._inform()

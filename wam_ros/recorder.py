@@ -86,11 +86,16 @@ class _Channel:
         self.topic = topic
         self.name = name
         self.publisher_of = _publisher_reader(topic, partial(sender, name), arm)
+        self._arm = arm if topic.type == _NODE_DIAGNOSTICS else ""
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
         self.totals: dict[str, int] = {}  # published by each node that has announced it
         self._first_totals: dict[str, int] = {}
         self._is_shared = topic.name in EVERY_NODE
+
+    def is_foreign(self, data: bytes) -> bool:
+        """Whether a message is that of another arm or program on a topic that all share, with stamps of its own."""
+        return bool(self._arm) and not _first_status_text(data).startswith(self._arm)
 
     def announce(self, node: str, total: int) -> None:
         """A node has published so many messages on this topic."""
@@ -124,7 +129,8 @@ class Recorder:
     topics : rows of the interface table, by the full name under which each is recorded.
     mode : 'realtime': log time is the reception and publish time the sending, both of the system
         clock.  'lockstep': both are the stamp in the message, or for a message without one the
-        last stamp of the same publisher, so that no wall clock is in the bag.  Before its first it is
+        last stamp of the same publisher, so that no wall clock is in the bag; what another arm or program
+        sends on /diagnostics has the newest stamp of all.  Before its first it is
         0 in a recording from the start of the run; in one that begins later it is the first stamp of
         all, and no latched message, which may be older, has an earlier one.
     qos : what each topic's publishers offer, by full name.
@@ -174,11 +180,11 @@ class Recorder:
         channel = self._channels.get(name)
         if channel is None:
             return
-        publisher = channel.publisher_of(data)
-        channel.numbering(publisher).add(number)
+        publisher, is_foreign = channel.publisher_of(data), channel.is_foreign(data)
+        channel.numbering(publisher).add(0 if is_foreign else number)  # of several nodes, with numbers of their own
         self._received += 1
         if self._held is not None:
-            stamp = 0 if channel.topic.latched else channel.stamp_of(data)
+            stamp = 0 if channel.topic.latched or is_foreign else channel.stamp_of(data)
             if not stamp and len(self._held) < _MOST_HELD:
                 self._held.append((channel, publisher, data, number))
                 return
@@ -194,7 +200,8 @@ class Recorder:
     def _write(self, channel: _Channel, publisher: str, data: bytes, received: int, sent: int, number: int) -> None:
         if self._lockstep:
             stamp = channel.stamp_of(data)
-            if stamp == 0 and channel.topic.is_numbers:  # sent by hand without a stamp: it came with the newest state
+            is_unstamped = stamp == 0 and channel.topic.is_numbers  # sent by hand
+            if is_unstamped or channel.is_foreign(data):  # it came with the newest state
                 stamp = self._newest
             self._newest = max(self._newest, stamp or 0)
             is_free = stamp is None or channel.topic.latched  # of the time at which it came
@@ -306,32 +313,36 @@ def _publisher_reader(topic: Topic, sender: Callable[[], str], arm: str) -> Call
     sender : finds the only publisher of any other topic, once a message has come.
     """
     if topic.type == _NODE_STATUS:
-        return lambda data: _node_name(data, 5)
+        return lambda data: _node_of(_text(data, 5))
     if topic.type == _NODE_DIAGNOSTICS:
-        return lambda data: _first_status_name(data, arm)
+        return lambda data: _node_of(_first_status_text(data).removeprefix(arm))
     found = cache(sender)
     return lambda data: found()
 
 
-def _first_status_name(data: bytes, arm: str) -> str:
+def _first_status_text(data: bytes) -> str:
+    """Name of the first status of a message of /diagnostics, '' where it has none."""
     try:
         (frame,) = struct.unpack_from("<I", data, 12)
         position = _aligned(16 + frame)
         (count,) = struct.unpack_from("<I", data, position)
     except struct.error:
-        return "?"
-    return _node_name(data, position + 5, arm) if count else "?"
+        return ""
+    return _text(data, position + 5) if count else ""
 
 
-def _node_name(data: bytes, position: int, arm: str = "") -> str:
+def _text(data: bytes, position: int) -> str:
     try:
         position = _aligned(position)
         (length,) = struct.unpack_from("<I", data, position)
     except struct.error:
-        return "?"
+        return ""
     end = position + 3 + min(length, _LONGEST_NAME)
-    name = printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
-    return name.removeprefix(arm).split(":")[0].split("/")[0].strip() or "?"
+    return printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
+
+
+def _node_of(name: str) -> str:
+    return name.split(":")[0].split("/")[0].strip() or "?"
 
 
 def _aligned(position: int) -> int:

@@ -280,6 +280,7 @@ def _run(
         for topic, found in interface.feeds(declaration, node).items()
     }
     published: dict[str, list[TopicValue]] = {}
+    checks = interface.checks(declaration)
     rows = [interface.topics[topic] for topic in feeds]
     for topic, stamp, value in _messages(bag, namespace, rows, shared):
         for put, taken, work in feeds[topic]:
@@ -293,7 +294,8 @@ def _run(
                     getattr(node, change.method)(change.parameters)
                 for name, output in work(inputs).items():
                     if name in interface.topics and interface.topics[name].is_numbers:
-                        published.setdefault(name, []).append(flat(interface.topics[name], inputs.stamp, output))
+                        answer = checks[name](output) if name in checks else output
+                        published.setdefault(name, []).append(flat(interface.topics[name], inputs.stamp, answer))
     return published
 
 
