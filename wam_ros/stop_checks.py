@@ -115,11 +115,14 @@ def _agreement(bench: DriverBench) -> str:
     probe.report(node="transform", started_with="one")
     probe.watch(SETTLE)
     probe.report(started_with="another")
-    if wrong := bench.in_mode("fault"):
-        return wrong
-    probe.ask("reset_fault")
-    done, text = probe.ask("enable", True)
-    return f"enable is done: '{text}'" if done else ""
+    try:
+        if wrong := bench.in_mode("fault"):
+            return wrong
+        probe.ask("reset_fault")
+        done, text = probe.ask("enable", True)
+        return f"enable is done: '{text}'" if done else ""
+    finally:
+        probe.report(node="transform")  # as the velocity loop is right again for the next row
 
 
 def _end(bench: DriverBench) -> str:
