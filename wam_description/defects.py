@@ -42,16 +42,10 @@ def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence
         TABLE: lambda value: table_defect(value, topic.columns, frames),
     }[topic.type]
 
-    def check(value: Any) -> Any:
-        try:
-            defect = look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
-            if not defect:
-                return _AS_TAKEN[topic.type](value)
-        except (TypeError, ValueError, OverflowError) as error:
-            defect = f"{value} does not hold numbers: {error}"
-        raise UnusableOutput(node, topic.name, defect)
+    def defect(value: Any) -> str:
+        return look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
 
-    return check
+    return _converting(node, topic, defect)
 
 
 def conversion(node: str, topic: Topic) -> Check:
@@ -62,15 +56,21 @@ def conversion(node: str, topic: Topic) -> Check:
     node : its name.
     topic : row of the table of topics, of one of the types that carry numbers.
     """
+    return _converting(node, topic, lambda value: "")
 
-    def convert(value: Any) -> Any:
+
+def _converting(node: str, topic: Topic, defect_of: Callable[[Any], str]) -> Check:
+    convert = _AS_TAKEN[topic.type]
+
+    def check(value: Any) -> Any:
         try:
-            return _AS_TAKEN[topic.type](value)
+            if not (defect := defect_of(value)):
+                return convert(value)
         except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            defect = f"{value!r} does not hold the numbers of a {_KINDS[topic.type].__name__}: {error}"
+            defect = f"{value} does not hold numbers: {error}"
         raise UnusableOutput(node, topic.name, defect)
 
-    return convert
+    return check
 
 
 def _floats(values: Sequence[float]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from wam_description.defects import Check
 from wam_description.interface import Feed, is_packaged
 from wam_description.signals import Point, State, Table, Wrench
-from wam_description.synchroniser import Inlet, Inputs, OutOfTime
+from wam_description.synchroniser import Inlet, OutOfTime
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs, mask
 
@@ -38,6 +38,7 @@ class Bus:
             for name, topic in topics.items()
         }
         self._rows: Rows = {}
+        self._outlets: dict[str, _Outlets] = {}  # by node
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
@@ -54,19 +55,24 @@ class Bus:
         feeds : its reactions to each topic.
         checks : what each output goes through, by topic; see `output_check`.
         """
-        outlets = _Outlets(declaration)
+        outlets = self._outlets[declaration.name] = _Outlets(declaration)
         for name in declaration.outputs:
-            outlets[name] = self._routes.setdefault(name, _Route()).publish
+            outlets[name] = _checked(self._routes.setdefault(name, _Route()).publish, checks.get(name))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
             outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route()).publish
         # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
         inlet = _inlet if is_packaged(declaration) else _masked_inlet
         for topic, found in feeds.items():
-            reactions = [(inlet(feed, topic), _checked(feed.work, checks)) for feed in found]
+            reactions = [(inlet(feed, topic), feed.work) for feed in found]
             if len(reactions) > 1:
                 self._routes[topic].takers.append((_together(reactions), _outputs, outlets))
             else:
                 self._routes[topic].takers.extend((*reaction, outlets) for reaction in reactions)
+
+    def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
+        """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
+        for name, output in outputs.items():
+            self._outlets[node][name](stamp, output)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
@@ -205,16 +211,9 @@ def _masked_inlet(feed: Feed, topic: str) -> Inlet:
     return inlet if masked is None else lambda stamp, value: inlet(stamp, masked(value))
 
 
-def _checked(work: Work, checks: Mapping[str, Check]) -> Work:
-    """A step whose outputs are as others take them; an unusable one is refused."""
-    if not checks:
-        return work
-
-    def step(inputs: Inputs) -> Outputs:
-        outputs = work(inputs)
-        return {name: checks[name](output) if name in checks else output for name, output in outputs.items()}
-
-    return step
+def _checked(publish: _Outlet, check: Check | None) -> _Outlet:
+    """What publishes values as others take them; an unusable one is refused."""
+    return publish if check is None else lambda stamp, value: publish(stamp, check(value))
 
 
 def _together(reactions: Sequence[tuple[Inlet, Work]]) -> Callable[[int, Any], list[_Done]]:

@@ -281,10 +281,4 @@ class Simulation:
         status = self.driver_status
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):
-                outputs: Outputs = node.take_status(status) or {}
-                declaration = self._interface.declarations[node_name]
-                declaration.require_declared(outputs)
-                checks = self._interface.checks(declaration) if outputs else {}
-                for name, output in outputs.items():
-                    usable = checks[name](output) if name in checks else output
-                    self._bus.publish(of_node(node_name, name), status.stamp, usable)
+                self._bus.publish_of(node_name, status.stamp, node.take_status(status) or {})

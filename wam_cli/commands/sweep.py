@@ -87,9 +87,9 @@ def run(given: argparse.Namespace) -> int:
 
 def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
     """Refuse an axis whose values would stand in the table without having been used, and such values of --set."""
-    for option, given_names in (("--set", option_values(given.values)), ("--vary", [axis.name for axis in axes])):
-        require_effect(option, given_names)
     names = [axis.name for axis in axes]
+    require_effect("--set", option_values(given.values))
+    require_effect("--vary", names)
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
