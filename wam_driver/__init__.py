@@ -19,6 +19,7 @@
 - dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of all that a cover can touch
+- reach: whether anything can be touched at all
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
 - pusher: hands that follow a moving link and press on it

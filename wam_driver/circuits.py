@@ -22,7 +22,7 @@ class CableCircuits:
     ----------
     depends_on_torque : True if `follow` has anything to do.
     is_slack : True if a strand is slack and friction depends on the tension.
-    each : of each circuit the first slack end between its strands, creep in a step per speed and torque, and the
+    each : of each circuit the two slack ends between its strands, creep in a step per speed and torque, and the
         torque, N m, above which friction depends on the tension; it remains the same list, which the steps in C read.
     """
 
@@ -45,12 +45,17 @@ class CableCircuits:
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
         self._damping = np.array([circuit.damping for circuit in arm.circuits])
         self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
-        self.each: list[tuple[int, float, float]] = []
+        self.each: list[tuple[int, int, float, float]] = []
         self._prepare()
 
     def _prepare(self) -> None:
         self.each[:] = [
-            (4 * i + 1, loss, 2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf)
+            (
+                4 * i + 1,
+                4 * i + 2,
+                loss,
+                2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf,
+            )
             for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
         ]
 
@@ -85,17 +90,21 @@ class CableCircuits:
     @property
     def after_step(self) -> Callable[[Sequence[int], Sequence[float]], bool] | None:
         """What has to follow each step, `follow` or as much of it as there is to do; None for nothing."""
-        return self.follow if self._friction_counts else self._creep if self.depends_on_torque else None
+        return self.follow if self._friction_counts else self._creeping() if self.depends_on_torque else None
 
-    def _creep(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
-        """`follow` where slack strands do not count: without looking for them 1 % of a step less."""
-        ends = self._slack_ends
-        for (i, rate, _), way, speed, pull in zip(self.each, direction, speeds, self._pulls()):  # noqa: B905
-            if way:
-                crept = rate * (speed if speed >= 0.0 else -speed) * pull
-                ends[i] -= crept
-                ends[i + 1] -= crept
-        return False
+    def _creeping(self) -> Callable[[Sequence[int], Sequence[float]], bool]:
+        """`follow` where slack strands do not count; what each step would look up again costs 1 % of it."""
+        each, ends, pulls = self.each, self._slack_ends, self._pulls
+
+        def creep(direction: Sequence[int], speeds: Sequence[float]) -> bool:
+            for (first, second, rate, _), way, speed, pull in zip(each, direction, speeds, pulls()):  # noqa: B905
+                if way:
+                    crept = rate * (speed if speed >= 0.0 else -speed) * pull
+                    ends[first] -= crept
+                    ends[second] -= crept
+            return False
+
+        return creep
 
     def follow(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
@@ -111,13 +120,13 @@ class CableCircuits:
             `is_slack`.
         """
         ends, is_slack = self._slack_ends, False
-        for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
+        for (first, second, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
             self.each, direction, speeds, self._pulls()
         ):
             if way:
                 crept = rate * (speed if speed >= 0.0 else -speed) * pull  # half the time of abs()
-                ends[i] -= crept
-                ends[i + 1] -= crept
+                ends[first] -= crept
+                ends[second] -= crept
             if not -most <= pull <= most:
                 is_slack = True
         self.is_slack = is_slack

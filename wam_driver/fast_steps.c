@@ -95,12 +95,12 @@ static int follow(const Plant *plant, int *slack) {
     PyObject *circuit = PyList_GET_ITEM(plant->each, i);
     const double pull = plant->data->qfrc_spring[i];
     if (PyObject_IsTrue(PyList_GET_ITEM(plant->direction, i))) {
-      const double crept = PyFloat_AS_DOUBLE(number(circuit, 1)) * fabs(plant->data->qvel[i]) * pull;
+      const double crept = PyFloat_AS_DOUBLE(number(circuit, 2)) * fabs(plant->data->qvel[i]) * pull;
       mjtNum *ends = plant->data->plastic + PyLong_AsLong(number(circuit, 0));
       ends[0] -= crept;
       ends[1] -= crept;
     }
-    found |= fabs(pull) > PyFloat_AS_DOUBLE(number(circuit, 2));
+    found |= fabs(pull) > PyFloat_AS_DOUBLE(number(circuit, 3));
   }
   const int same = found == *slack;
   *slack = found;

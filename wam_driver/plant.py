@@ -14,7 +14,7 @@ from struct import Struct
 
 import mujoco
 import numpy as np
-from mujoco import mj_step1, mj_step2
+from mujoco import mj_step, mj_step1, mj_step2
 
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
@@ -123,7 +123,8 @@ class Plant:
         self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
         # to look them up in each step costs 3 % of it
         bounds, after_step = (*self._friction.bounds, self._friction.direction), self._circuits.after_step
-        self._in_steps = model, data, self._pushes, self._movers, self._qvel.tolist, *bounds, after_step
+        touching = self._pushes, self._surfaces.may_touch, self._movers
+        self._in_steps = model, data, *touching, self._qvel.tolist, *bounds, after_step
         self._rest()
         require_free_start(self.model, self.data, arm, world)
         self._kept = self._position.tolist(), self._plastic.tolist()
@@ -251,10 +252,14 @@ class Plant:
         count : number of steps with this torque.
         """
         self._write_torque(0, *torque)
-        if self._advance is not None:
+        if self._advance is None:
+            self._velocity = self._advance_in_python(count)
+        else:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
-            return
-        model, data, pushes, movers, velocities, lows, highs, direction, after_step = self._in_steps
+
+    def _advance_in_python(self, count: int) -> list[float]:
+        """Advance by steps with the torque that is set; velocities of rotors and joints before the last, rad/s."""
+        model, data, pushes, may_touch, movers, velocities, lows, highs, direction, after_step = self._in_steps
         velocity = before = velocities()
         for _ in range(count):
             if self._is_set:
@@ -267,18 +272,21 @@ class Plant:
             for mover in movers:
                 mover.lead(data.time)
             before = velocity
-            mj_step1(model, data)
-            if pushes:
-                self._loads.apply_pushes()
-            if data.ncon:
-                self._surfaces.apply()
-            mj_step2(model, data)
-            if pushes:
-                self._applied.fill(0.0)
+            if may_touch or pushes:
+                mj_step1(model, data)
+                if pushes:
+                    self._loads.apply_pushes()
+                if data.ncon:
+                    self._surfaces.apply()
+                mj_step2(model, data)
+                if pushes:
+                    self._applied.fill(0.0)
+            else:  # nothing to do between the halves
+                mj_step(model, data)
             velocity = velocities()
-            if after_step is not None and after_step(direction, velocity):
+            if after_step and after_step(direction, velocity):
                 self._is_set = False
-        self._velocity = before
+        return before
 
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""
