@@ -56,6 +56,12 @@ def test_a_value_is_the_same_to_the_bit_by_either_way(topic: Topic) -> None:
         assert repr(read(deserialize_message(data, kind))) == repr(value)
 
 
+@pytest.mark.parametrize("stamp", [0, 1, STAMP, 2**31 * 10**9 - 1])
+def test_the_clock_is_the_same_to_the_bit_by_either_way(stamp: int) -> None:
+    topic = BY_NAME["/clock"]
+    assert encoder(topic, SHARED)(stamp, None) == bytes(serialize_message(writer(topic, SHARED)(stamp, None)))
+
+
 def refusal(take: Any, argument: Any) -> str:
     try:
         return f"taken: {take(argument)!r}"

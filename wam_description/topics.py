@@ -18,6 +18,7 @@ JOINT_STATE, WRENCH, POINT = (
 TABLE = "sensor_msgs/msg/PointCloud2"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 BOOL, STRING = "std_msgs/msg/Bool", "std_msgs/msg/String"
+TIME = "rosgraph_msgs/msg/Clock"
 OF_OWN_NODES: Final = (JOINT_STATE, WRENCH, POINT, TABLE, TRAJECTORY, BOOL, STRING)  # types that a node may add
 RATES: Final = ("inner", "outer", "display", "latched", "1 Hz")
 SIDES: Final = ("motors", "joints")
@@ -316,7 +317,7 @@ TOPICS: Final = (
     Topic("robot_description", STRING, "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),
     Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "1 Hz", "counts, timing and refusals of each node"),
-    Topic("/clock", "rosgraph_msgs/msg/Clock", "outer", "time of the arm, strictly increasing"),
+    Topic("/clock", TIME, "outer", "time of the arm, strictly increasing"),
 )
 
 BY_NAME: Final = {topic.name: topic for topic in TOPICS}

@@ -26,6 +26,7 @@ from wam_description.topics import (
     POINT,
     STRING,
     TABLE,
+    TIME,
     TRAJECTORY,
     WRENCH,
     Topic,
@@ -267,7 +268,7 @@ def writer(topic: Topic, shared: Shared) -> Write:
         BOOL: lambda stamp, value: Bool(data=bool(value)),
         STRING: lambda stamp, value: String(data=value),
         "visualization_msgs/msg/MarkerArray": contact_markers,
-        "rosgraph_msgs/msg/Clock": lambda stamp, value: Clock(clock=header(stamp).stamp),
+        TIME: lambda stamp, value: Clock(clock=header(stamp).stamp),
     }
     if topic.type not in by_type:
         raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the output of a step")

@@ -1,4 +1,4 @@
-"""The fast path between bytes on the wire (CDR) and values, for the four types that carry numbers.
+"""The fast path between bytes on the wire (CDR) and values, for the four types that carry numbers and the clock.
 
 `wam_ros.messages` does the same through message objects; it is the reference, and whatever does not have
 the expected layout (another byte order, other names or their order, other arrays) goes through it, so that both
@@ -14,7 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_description.arm import Shared
 from wam_description.signals import BASE, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, TIME, WRENCH, Topic, columns_of
 from wam_ros.messages import Refused, message_type, reader, writer
 
 LITTLE_ENDIAN = b"\0\1\0\0"
@@ -54,6 +54,8 @@ def encoder(topic: Topic, shared: Shared) -> Encode:
         )
     if topic.type == TABLE:
         return lambda stamp, value: _table(topic.columns, stamp, value)
+    if topic.type == TIME:
+        return lambda stamp, value: HEAD.pack(LITTLE_ENDIAN, *divmod(stamp, SECOND))
     write = writer(topic, shared)
     return lambda stamp, value: bytes(serialize_message(write(stamp, value)))
 
