@@ -74,7 +74,7 @@ def test_every_other_shared_parameter_is_compared() -> None:
 )
 def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> None:
     assert disagreement("gravity", OWN, text) == (
-        "gravity is of another version of wam_stack than the driver; start all nodes with the same version"
+        "gravity was started with another version of wam_stack than the driver; start all nodes with the same version"
     )
 
 

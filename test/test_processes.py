@@ -759,6 +759,36 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     assert took < patience + min(soon(), 2.0 * patience)
 
 
+def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
+    started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is the only one that is kept: replaced before it is taken, it is a message that a recording lacks."""
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", 0.2)
+    configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
+    with Composition(configured, domain_id=domain_id) as composition:
+        published = composition.nodes["driver"]._ports._published
+
+        def spin_until(is_enough: Callable[[], bool], seconds: float) -> None:
+            end = time.monotonic() + seconds
+            composition.spin(lambda: is_enough() or time.monotonic() > end)
+
+        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+        spin_until(lambda: recorded(listener) > 40_000, LONG)
+        assert recorded(listener) > 40_000, listener.said()
+        listener.process.send_signal(signal.SIGSTOP)
+        spin_until(lambda: False, 0.2)
+        before = published["status"]
+        spin_until(lambda: False, 1.5)  # about 30 periods of the repetition
+        while_frozen = published["status"] - before
+        listener.process.send_signal(signal.SIGCONT)
+        spin_until(lambda: published["status"] > before + while_frozen + 10, LONG)
+        after = published["status"] - before - while_frozen
+    assert 1 <= while_frozen <= 3
+    assert after > 10
+
+
 def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
     from std_srvs.srv import Trigger
 

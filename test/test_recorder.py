@@ -37,6 +37,7 @@ from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_bag.message_layout import stamp_reader
+from wam_description.agreement import DIGESTS, digests
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
 from wam_description.signals import Level, NodeStatus
@@ -353,6 +354,35 @@ def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     node.attend()
     advice = "; start the recorder with 'wam record', which takes both from the running stack"
     assert node.failure == (difference and difference + advice)
+
+
+@pytest.mark.parametrize(
+    ("again", "found"),
+    [
+        ({}, ""),
+        ({"timing.real_time_factor": 0.5, "timing.niceness": -3}, ""),
+        ({"timing.mode": "realtime"}, "another timing.mode"),
+        ({"arm.name": "other", "arm.payload": 1.0, "timing.period": 0.002, "timing.outer_divisor": 4}, "and 1 more"),
+    ],
+)
+def test_a_node_that_is_started_again_otherwise_makes_the_bag_one_of_two_runs(
+    again: dict[str, Any], found: str, ros: Any, tmp_path: Path
+) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    configuration = Configuration.load(CONFIG)
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    for i, values in enumerate(({}, again, {})):
+        status = publisher(ros.node(f"status_{i}"), "status")
+        ros.wait(matched(status))
+        given = digests(configuration.with_values(values).shared)
+        status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "driver", facts={DIGESTS: given}), "wam"))
+        ros.wait(lambda i=i: received(node, "/wam/status") == i + 1)
+    assert found in node.failure
+    begin = "node driver was started again with "
+    end = f", and {tmp_path / 'bag'} has both runs; record each with a recorder of its own"
+    assert bool(found) is (node.failure.startswith(begin) and node.failure.endswith(end))
 
 
 def test_a_recorder_to_which_nothing_came_ends_with_the_reason(

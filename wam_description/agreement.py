@@ -16,6 +16,7 @@ OF_ONE_PROCESS = frozenset(
     {"nodes", "timing.niceness", "timing.fifo_priority", "timing.timeout", "timing.real_time_factor"}
 )  # nothing that a node computes depends on them
 NAMED = 3  # parameters
+OTHER_VERSION = "another version of wam_stack"
 _LENGTH = 3  # characters of 6 bits each: two values have the same digest in one of 260 000 cases
 
 
@@ -36,17 +37,22 @@ def disagreement(node: str, own: str, other: str) -> str:
     node : name of the node.
     own, other : `digests` of the driver and of the node; there is no reason in an empty one.
     """
-    if not other or other == own:
+    if not (found := difference(own, other)):
+        return ""
+    same = "version" if found == OTHER_VERSION else "configuration"
+    return f"{node} was started with {found} than the driver; start all nodes with the same {same}"
+
+
+def difference(one: str, other: str) -> str:
+    """Which parameters differ between two `digests`, in words; '' where none does, or where one is empty."""
+    if not (one and other) or one == other:
         return ""
     names = _compared()
-    if len(other) != len(own) or _part(other, 0) != _part(own, 0):
-        return f"{node} is of another version of wam_stack than the driver; start all nodes with the same version"
-    different = [name for i, name in enumerate(names, start=1) if _part(own, i) != _part(other, i)]
+    if len(other) != len(one) or _part(other, 0) != _part(one, 0):
+        return OTHER_VERSION
+    different = [name for i, name in enumerate(names, start=1) if _part(one, i) != _part(other, i)]
     more = f" and {len(different) - NAMED} more" if len(different) > NAMED else ""
-    return (
-        f"{node} was started with another {', '.join(different[:NAMED])}{more} than the driver; "
-        "start all nodes with the same configuration"
-    )
+    return f"another {', '.join(different[:NAMED])}{more}"
 
 
 def live_facts(group: Any, prefix: str) -> dict[str, str]:

@@ -95,7 +95,7 @@ class DriverNode(TolerantNode):
             ports.waits = lambda: bool(ports.absent) or self.time.settles()
             self._announce()  # in lockstep the first status goes to all peers
             self.create_timer(shared.timing.period, self.time.tick, clock=steady)
-            self.create_timer(STATUS_PERIOD, ports.repeat_status, clock=steady)
+            self.create_timer(STATUS_PERIOD, ports.repeat_taken_status, clock=steady)
             self.time.start()
 
     def destroy_node(self) -> None:

@@ -42,6 +42,7 @@ LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
+LONGEST_ON_ITS_WAY = 1.0  # s, for a status that is to be repeated
 LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
@@ -97,6 +98,7 @@ class Ports:
         self.live: dict[str, str] = {}
         self.takes_problem: Callable[[str], None] | None = None
         self.waits: Callable[[], bool] = lambda: False
+        self._repeated = time.monotonic()  # when the status was, on that clock
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
@@ -238,6 +240,16 @@ class Ports:
     def repeat_status(self) -> None:
         """Publish the present status once more, as a message may be lost on a loaded machine."""
         self._send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
+
+    def repeat_taken_status(self) -> None:
+        """`repeat_status`, but not over one that is still on its way: replaced, it would be a loss to a recorder.
+
+        One that a frozen node does not take holds up the others no longer than `LONGEST_ON_ITS_WAY`.
+        """
+        now = time.monotonic()
+        if now - self._repeated > LONGEST_ON_ITS_WAY or self._publishers[STATUS].wait_for_all_acked(Duration()):
+            self._repeated = now
+            self.repeat_status()
 
     def set_problem(self, concerned: str, reason: str) -> None:
         """State in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""

@@ -12,11 +12,12 @@ from rclpy.clock_type import ClockType
 from rclpy.serialization import deserialize_message
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
+from wam_description.agreement import DIGESTS, difference
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, parameter, values
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
-from wam_description.topics import BY_NAME, EVERY_NODE, Topic
+from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
@@ -77,6 +78,7 @@ class RecorderNode(TolerantNode):
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
+        self._status_name = self.resolve_topic_name(STATUS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
@@ -98,6 +100,8 @@ class RecorderNode(TolerantNode):
         self._differing: dict[
             str, str
         ] = {}  # how each node runs otherwise than this recorder takes it to, '' if it does not
+        self._digests: dict[str, str] = {}  # of the shared parameters with which each node ran first
+        self._two_runs = ""  # which node was started again with others
         self._heard = self._heard_before = 0  # messages of others, recorded or not
         self._heard_at, self._is_silent = time.monotonic(), False
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -120,7 +124,7 @@ class RecorderNode(TolerantNode):
     @property
     def failure(self) -> str:
         """Why the bag is incomplete or has wrong times, '' if neither."""
-        return self.recorder.failure or self._wrong or self._empty
+        return self.recorder.failure or self._wrong or self._two_runs or self._empty
 
     @property
     def _wrong(self) -> str:
@@ -164,6 +168,22 @@ class RecorderNode(TolerantNode):
                 self._unfinished.discard(node)
             elif self._ends_last:
                 self._unfinished.add(node)
+
+    def _take_status(self, data: bytes) -> None:
+        """Report a node that was started again with other shared parameters: the bag has two runs then."""
+        try:
+            status = read_status(deserialize_message(data, DiagnosticStatus))
+        except Exception:  # rclpy raises its own kinds for bytes that are no such message
+            return
+        given = status.facts.get(DIGESTS, "")
+        if not given or status.node not in self._nodes or self._two_runs:
+            return
+        if found := difference(self._digests.setdefault(status.node, given), given):
+            self._two_runs = (
+                f"node {status.node} was started again with {found}, and {self.bag.path} has both runs; "
+                "record each with a recorder of its own"
+            )
+            self.get_logger().error(self._two_runs)
 
     def _sender(self, name: str) -> str:
         """The node that publishes a topic, '' where there are several."""
@@ -267,6 +287,8 @@ class RecorderNode(TolerantNode):
             self.recorder.receive(name, data, received, sent, number)
             if name == self._diagnostics_name:
                 self._take_totals(data)
+            elif name == self._status_name:
+                self._take_status(data)
 
     def _attach_parameters(self) -> None:
         """Attach the known parameters, if these are more than were attached before."""
