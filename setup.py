@@ -66,12 +66,16 @@ COMPILE = "pip install -U mypy mujoco wheel 'setuptools>=68,<80' && WAM_COMPILE=
 CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets", "config/tasks")
 
 
+def is_compiler_there():
+    """Whether there is a C compiler, with the headers of Python."""
+    compiler = str(sysconfig.get_config_var("CC") or "cc").split()[0]
+    return bool(shutil.which(compiler)) and Path(sysconfig.get_path("include"), "Python.h").exists()
+
+
 def extensions():
     """C extensions of the modules that are compiled; none without WAM_COMPILE."""
     wanted = os.environ.get("WAM_COMPILE")
-    compiler = str(sysconfig.get_config_var("CC") or "cc").split()[0]
-    is_possible = shutil.which(compiler) and Path(sysconfig.get_path("include"), "Python.h").exists()
-    if not wanted or (wanted == "auto" and not is_possible):
+    if not wanted or (wanted == "auto" and not is_compiler_there()):
         return []
     try:
         from mypyc.build import mypycify
