@@ -682,3 +682,54 @@ def test_viscous_friction_of_few_speeds_has_the_error_of_an_uneven_dry_friction(
     assert found.viscous > 0.15
     assert abs(found.viscous - 0.05) < 3.0 * found.viscous_error
     assert found.dynamic_error < 0.05
+
+
+def repeated_move() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, velocity and angle of a motor that goes 0.12 rad quickly and returns slowly, eight times; 1 kHz."""
+    time = np.arange(8_000) / 1e3
+    phase = time % 1.0
+    out = 0.12 / 0.25 * math.pi / 2.0 * np.sin(math.pi * phase / 0.25)
+    back = -0.12 / 0.75 * math.pi / 2.0 * np.sin(math.pi * (phase - 0.25) / 0.75)
+    velocity = np.where(phase < 0.25, out, back)
+    return time, velocity, np.cumsum(velocity) / 1e3
+
+
+def test_viscous_friction_of_a_small_move_that_is_repeated_has_the_error_of_its_cogging() -> None:
+    """24 cycles a turn: the same angles return, and the cogging looks like viscous friction in each of them."""
+    time, velocity, angle = repeated_move()
+    waves = 9.1e-4 / math.sqrt(2.0) * np.column_stack([np.sin(24.0 * angle), np.cos(24.0 * angle)])
+    off = []
+    for phase in np.arange(8) * math.pi / 4.0:
+        torque = 0.0324 * np.sign(velocity) + 1e-4 * velocity + 9.1e-4 * np.sin(24.0 * angle + phase)
+        found = identify_friction(time, velocity, torque, rest=0.05, window=0.03, waves=waves)
+        off.append(abs(found.viscous - 1e-4) / found.viscous_error)
+    assert max(off) < 3.0, off
+    smooth = 0.0324 * np.sign(velocity) + 1e-4 * velocity
+    without, *added = (
+        identify_friction(time, velocity, torque, rest=0.05, window=0.03).viscous
+        for torque in (smooth, *(smooth + wave for wave in waves.T))
+    )
+    told = identify_friction(time, velocity, smooth, rest=0.05, window=0.03, waves=waves)
+    plain = identify_friction(time, velocity, smooth, rest=0.05, window=0.03).viscous_error
+    assert told.viscous_error == pytest.approx(math.hypot(plain, *(one - without for one in added)), rel=1e-3)
+    assert told.viscous_error > 1.005 * plain
+
+
+def test_repetitions_of_a_motion_do_not_lessen_the_error_of_what_the_law_leaves_out() -> None:
+    time, velocity, angle = repeated_move()
+    torque = 0.0324 * np.sign(velocity) + 1e-4 * velocity + 9.1e-4 * np.sin(24.0 * angle + 1.0)
+    every = identify_friction(time, velocity, torque, rest=0.05, window=0.03)
+    two = identify_friction(time[:2000], velocity[:2000], torque[:2000], rest=0.05, window=0.03)
+    assert every.viscous_error > 0.7 * two.viscous_error
+
+
+def test_dry_friction_is_not_halved_where_the_other_direction_was_left_out_as_outliers() -> None:
+    """A long slide and one short move back that does not fit: dry friction and offset looked the same, half each."""
+    time = np.arange(6_000) / 1e3
+    velocity = 0.1 + 0.05 * np.sin(1.7 * time)
+    velocity[5_900:] = -0.05
+    torque = 0.2093 * np.sign(velocity) + 0.05 * velocity + draws(3, len(time), 1e-5)
+    torque[5_900:] -= np.linspace(0.5, 3.0, 100)
+    found = identify_friction(time, velocity, torque, rest=0.002, window=0.03)
+    assert abs(found.dynamic - 0.2093) < 3.0 * found.dynamic_error < 0.05
+    assert math.isnan(found.offset)

@@ -32,6 +32,7 @@ FAINT = 3.0  # times the median order; smaller ripple is not reported
 SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
 UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable"
+MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
 DROWNED = 10.0  # times the torque of the cables; rotors that take more hide every loss
 IMPOSSIBLE = 3.0  # standard errors below zero
 
@@ -140,12 +141,35 @@ def _friction_of_motors(signals: TransmissionSignals, arm: Arm, effects: Effects
     free, found = signals.torque - signals.load, {}
     for i, name in enumerate(arm.motors.names):
         alone = _possible(
-            identify_friction(signals.time, signals.velocity[:, i], free[:, i], MOTOR_REST, WINDOW, signals.use)
+            identify_friction(
+                signals.time,
+                signals.velocity[:, i],
+                free[:, i],
+                MOTOR_REST,
+                WINDOW,
+                signals.use,
+                waves=_waves(signals.angle[:, i], name, effects),
+            )
         )
         cogging = effects.ripple(name) / math.sqrt(2.0) if effects else 0.0  # N m, rms
         static_error, dynamic_error = math.hypot(alone.static_error, cogging), math.hypot(alone.dynamic_error, cogging)
         found[name] = alone._replace(static_error=static_error, dynamic_error=dynamic_error)
     return found
+
+
+def _waves(angle: Numbers, shaft: str, effects: Effects | None) -> Numbers | None:
+    """Both quadratures of each configured ripple of a motor, (k, 2 w), N m, rms over phases that are not known."""
+    if effects is None:
+        return None
+    ripples = effects.ripples
+    every = zip(ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, strict=True)
+    own = [
+        ratio * amplitude / math.sqrt(2.0) * wave(cycles * ratio * angle)
+        for name, ratio, amplitude, cycles in every
+        if name == shaft
+        for wave in (np.sin, np.cos)
+    ]
+    return np.column_stack(own) if own else None
 
 
 def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
@@ -197,6 +221,9 @@ def _friction_section(
         for name, found in {**friction, **joints}.items()
         if name in seen
     ]
+    unsure = [one.name for one in findings if NOT_IDENTIFIABLE in one.note]
+    if unsure:
+        sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
     still = [name for name in {**friction, **joints} if name not in seen]
     if still:
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")

@@ -1,6 +1,7 @@
 """Friction of a motor or of a joint, identified from velocity and torque."""
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ CREEP = 0.5  # of the rise of static above dynamic friction: what creep at a spe
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
 UNEVEN = 0.003  # of dry friction, by which it changes with load and position: over few speeds that looks like viscous
 SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
+SHARE = 1e-3  # of a direction that the recording does not show, from which on a factor is not determined
+REPEATED = 0.15  # of length and speed, by which a motion that repeats another may differ from it
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
 
@@ -66,6 +69,7 @@ def identify_friction(
     window: float,
     use: Mask | None = None,
     load: Numbers | None = None,
+    waves: Numbers | None = None,
 ) -> Friction:
     """Identify torque = F_dynamic sgn(v) + b v + J a + c in motion, and F_static at the start of motion.
 
@@ -84,6 +88,9 @@ def identify_friction(
     use : (n,), samples that may be used; None for all.
     load : (n, k), torques of unknown size that also act, as those of a weight over the angle; None for none.  Their
         part is identified in motion and taken off.
+    waves : (n, k), N m, torques of which only the rms is known: each acts with a factor of unknown sign and about one,
+        as the two quadratures of a cogging over the angle.  What they can change is part of the errors of `dynamic`,
+        `viscous` and `inertia`; None for none.
 
     Returns
     -------
@@ -99,8 +106,10 @@ def identify_friction(
     gaps = np.flatnonzero(after_gaps(time))
     allowed[gaps] = allowed[gaps - 1] = False  # no window extends over them
     half = max(1, round(window / period / 2.0))
-    acting = np.empty((n, 0)) if load is None else np.where(allowed[:, np.newaxis], load, 0.0)
-    solution, errors, left = _in_motion(velocity, torque, acting, rest, half, period, allowed)
+    acting, unknown = (
+        np.empty((n, 0)) if each is None else np.where(allowed[:, np.newaxis], each, 0.0) for each in (load, waves)
+    )
+    solution, errors, left = _in_motion(velocity, torque, acting, unknown, rest, half, period, allowed)
     dynamic, viscous, inertia, offset = solution[:4]
     free = torque - acting @ np.nan_to_num(np.array(solution[4:])) - (0.0 if math.isnan(offset) else offset)
     statics = _breakaways(velocity, free, rest, 2 * half, allowed)
@@ -126,7 +135,14 @@ _UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0, _NAN
 
 
 def _in_motion(
-    velocity: Numbers, torque: Numbers, load: Numbers, rest: float, half: int, period: float, allowed: Mask
+    velocity: Numbers,
+    torque: Numbers,
+    load: Numbers,
+    waves: Numbers,
+    rest: float,
+    half: int,
+    period: float,
+    allowed: Mask,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Dynamic, viscous, inertia, offset and factors of the load by least squares, errors, rms and share of the rest."""
     nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, (math.nan, math.nan))
@@ -146,47 +162,70 @@ def _in_motion(
     acting = [np.convolve(column, triangle, "same")[rows] for column in load.T]
     columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows)), *acting])
     wanted = np.convolve(torque, triangle, "same")[rows]
-    solution, errors, left = _robust(columns, wanted, len(triangle), _halves(rows))
+    unknown = [np.convolve(wave, triangle, "same")[rows] for wave in waves.T]
+    disturbances = np.column_stack([np.empty((len(rows), 0)), *unknown])
+    solution, errors, left = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
     scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
     uneven = UNEVEN * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
     return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 
 def _robust(
-    columns: Numbers, wanted: Numbers, width: int, half: NDArray[np.int64]
+    columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: NDArray[np.int64]
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
     The averages of `width` samples overlap, so the errors count at most one sample in `width`, and fewer where what is
     left over is alike for longer.  What the law leaves out, such as creep of the cables, is similar within a motion and
     not noise: if the halves of motions, numbered by `half`, differ by more than the noise explains, their difference is
-    the error (jackknife).
+    the error (jackknife).  A factor that the samples which are left do not determine has an infinite error.  What
+    `waves`, (n, k), of unknown size would add to each factor is in its error: where the same angles return, neither the
+    rest of the fit nor the halves show it.
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
-    both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same
-    used = [i for i in range(columns.shape[1]) if scale[i] > 0.0 and (i != 3 or both)]
     keep = np.ones(len(wanted), dtype=np.bool_)
+    used = _distinct(columns)
     solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
         if int(np.sum(keep)) < FEWEST:
             break
-        a = columns[keep][:, used] / scale[used]
-        solution = np.linalg.lstsq(a, wanted[keep], rcond=None)[0]
+        used = _distinct(columns[keep])
+        solution = np.linalg.lstsq(columns[keep][:, used] / scale[used], wanted[keep], rcond=None)[0]
         rest = wanted - columns[:, used] / scale[used] @ solution
         middle = float(np.median(rest[keep]))
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
         keep = np.abs(rest - middle) <= max(JUMP * sd, 1e-12)
+    if _distinct(columns[keep]) != used:  # what was left out was all of one direction
+        used = _distinct(columns[keep])
+        solution = np.linalg.lstsq(columns[keep][:, used] / scale[used], wanted[keep], rcond=None)[0]
+        rest = wanted - columns[:, used] / scale[used] @ solution
     a = columns[keep][:, used] / scale[used]
     alike = max(float(width), _correlation_length(rest[keep]))
     freedom = max(len(a) / alike - len(used), FREEDOM)
     covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
     noisy = _few(freedom) * np.sqrt(np.diag(covariance))
+    noisy[_undetermined(a.T @ a)] = math.inf
     found, errors = np.full(len(scale), math.nan), np.full(len(scale), math.nan)
     found[used] = solution / scale[used]
     errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
+    errors[used] = np.hypot(errors[used], np.linalg.norm(np.linalg.pinv(a) @ waves[keep], axis=1) / scale[used])
     errors = np.hypot(errors, NEGLECTED * found)
     left = float(np.sqrt(np.mean(rest[keep] ** 2)))
     return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
+
+
+def _distinct(columns: Numbers) -> list[int]:
+    """Columns that are not zero, without the offset in one direction only: dry friction looks the same."""
+    both = bool(np.ptp(columns[:, 0]) > 0.0)
+    return [i for i in range(columns.shape[1]) if np.any(columns[:, i]) and (i != 3 or both)]
+
+
+def _undetermined(products: Numbers) -> Mask:
+    """Factors, (p,), that can change without any change of the fit of these normal equations, (p, p)."""
+    sizes = np.sqrt(np.maximum(np.diag(products), 1e-300))
+    values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
+    free = vectors[:, values < values[-1] / SINGULAR]
+    return np.asarray(np.any(np.abs(free) > SHARE, axis=1), np.bool_)
 
 
 def _correlation_length(rest: Numbers) -> float:
@@ -212,13 +251,20 @@ def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:
 
 
 def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) -> Numbers:
-    """Standard errors of the columns' factors from leaving out one half of a motion at a time.
+    """Standard errors of the columns' factors from leaving out one half of a motion at a time, and all that repeat it.
 
-    By the normal equations of all without those of the half: the time goes with the length of the recording.
+    What the law leaves out returns where a motion is repeated: as separate halves, repetitions would agree on it and
+    lessen the error.  By the normal equations of all without those left out: the time goes with the length of the
+    recording.
     """
     begins = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
-    parts = zip(np.split(columns, begins[1:]), np.split(wanted, begins[1:]), strict=True)
-    products, targets = (np.array(each) for each in zip(*((a.T @ a, a.T @ b) for a, b in parts), strict=True))
+    pieces = list(zip(np.split(columns, begins[1:]), np.split(wanted, begins[1:]), strict=True))
+    group = _repeated([(a[:, 0], a[:, 1]) for a, _ in pieces])
+    products = np.zeros((max(group) + 1, columns.shape[1], columns.shape[1]))
+    targets = np.zeros(products.shape[:2])
+    for g, (a, b) in zip(group, pieces, strict=True):
+        products[g] += a.T @ a
+        targets[g] += a.T @ b
     left, right = products.sum(axis=0) - products, targets.sum(axis=0) - targets
     is_known = np.linalg.cond(left) < SINGULAR
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
@@ -226,6 +272,33 @@ def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) ->
         return np.zeros(columns.shape[1])
     result: Numbers = _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
     return result
+
+
+def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
+    """Number of the first half that each half, of directions and velocities, repeats: as long, as fast, as it begins.
+
+    Two repeat each other if length, mean and first and last speed are alike; speeds are compared with the mean.
+    """
+    marks = np.array([_mark(direction[0], np.abs(velocity)) for direction, velocity in halves])
+    group = np.full(len(marks), -1)
+    for number, first in enumerate(_firsts(group)):
+        alike = np.all(np.abs(marks - marks[first]) < REPEATED, axis=1)
+        group[alike & (group < 0)] = number
+    found: list[int] = group.tolist()
+    return found
+
+
+def _firsts(group: NDArray[np.int64]) -> Iterator[int]:
+    """The first that has no number yet, until all have one."""
+    while (without := group < 0).any():
+        yield int(np.argmax(without))
+
+
+def _mark(direction: float, speed: Numbers) -> tuple[float, ...]:
+    """What is alike of two halves of motions that repeat each other."""
+    width, mean = max(1, len(speed) // 8), float(np.mean(speed))
+    ends = float(np.mean(speed[:width])) / mean, float(np.mean(speed[-width:])) / mean
+    return 9.0 * math.copysign(1.0, direction), math.log(len(speed)), math.log(mean), *ends
 
 
 def _few(freedom: float) -> float:
