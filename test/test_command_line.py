@@ -129,6 +129,23 @@ def test_nodes_that_do_not_fit_are_refused_before_the_demonstration_is_announced
     assert "two nodes of the configuration are named 'gravity'; list one of them" in err
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
+        ("force_loop:contact_cover=hand", "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+        ("driver:effects.added_coulomb_friction=[0.5]", "'effects.added_coulomb_friction' has 1 value; 4 names need 4"),
+    ],
+)
+def test_a_value_that_is_not_allowed_is_refused_before_the_demonstration_is_announced(
+    value: str, text: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = said(capsys, "demo", "--no-live", "--set", value)
+    assert (code, out) == (1, "")
+    assert text in err
+
+
 def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

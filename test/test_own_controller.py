@@ -15,12 +15,12 @@ from wam_bag.bag import JointColumns, read
 from wam_control.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.defects import UnusableOutput
+from wam_description.defects import UnusableOutput, conversion
 from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
 from wam_description.signals import ForceCommand, Level, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
-from wam_description.topics import JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
+from wam_description.topics import BY_NAME, JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
 from wam_description.wiring import Call, Input, Outputs, declaration, reaction
 from wam_sim.replay import replay
 from wam_sim.simulation import Simulation
@@ -484,7 +484,12 @@ class Careless(Echo):
         (State([], [], []), "effort has 0 values; send 4, one for each of joint1, joint2, joint3, joint4"),
         (State([], [0.0] * 3, [0.0] * 4), "velocity has 3 values; send 4, one for each of joint1"),
         ([0.0] * 4, "[0.0, 0.0, 0.0, 0.0] is no State; return one"),
-        (State([], [], ["a"] * 4), "does not hold numbers: "),  # type: ignore[list-item]
+        (State([], [], ["a"] * 4), "cannot be sent: effort has 'a'; return floats"),  # type: ignore[list-item]
+        (State([], [], [True] * 4), "cannot be sent: effort has True; return floats"),
+        (State([], [], np.full(4, True)), "cannot be sent: effort has np.True_; return floats"),  # type: ignore[arg-type]
+        (State([], [], b"abcd"), "cannot be sent: effort is b'abcd'; return a list of floats"),  # type: ignore[arg-type]
+        (State([], [], {1.0}), "cannot be sent: effort is {1.0}; return a list of floats"),  # type: ignore[arg-type]
+        (State([], [], None), "cannot be sent: effort is None; return a list of floats"),  # type: ignore[arg-type]
     ],
 )
 def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
@@ -499,6 +504,27 @@ def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
     with pytest.raises(UnusableOutput) as refusal:
         run.play()
     assert str(refusal.value).startswith("node 'careless' returned an unusable joint_effort_command: ")
+    assert text in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("topic", "given", "text"),
+    [
+        ("joint_effort_command", State([], [], "1234"), "effort is '1234'; return a list of floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", ([], [], [0.0]), "([], [], [0.0]) is no State; return one"),
+        ("force_command", Wrench("base", {1.0, 2.0, 3.0}, (0.0,) * 3), "force is {1.0, 2.0, 3.0}; return a list"),  # type: ignore[arg-type]
+        ("force_command", Wrench(b"base", (0.0,) * 3, (0.0,) * 3), "frame is b'base'; return a text"),  # type: ignore[arg-type]
+        ("task_command", Table("base", {(1.0,)}), "rows is {(1.0,)}; return a list of rows"),  # type: ignore[arg-type]
+        ("task_command", Table("base", [b"ab"]), "a row is b'ab'; return a list of floats"),  # type: ignore[arg-type]
+    ],
+)
+def test_an_output_that_no_other_node_takes_is_refused_where_it_holds_no_numbers(
+    topic: str, given: Any, text: str
+) -> None:
+    """It was published as other numbers than those that were returned, or in an order that nobody chose."""
+    with pytest.raises(UnusableOutput) as refusal:
+        conversion("careless", BY_NAME[topic])(given)
+    assert str(refusal.value).startswith(f"node 'careless' returned an unusable {topic}: ")
     assert text in str(refusal.value)
 
 

@@ -214,6 +214,24 @@ def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
     assert "waiting for the recorder to write the bag, " in capfd.readouterr().err
 
 
+def catches_sigterm(pid: int) -> bool:
+    status = Path("/proc", str(pid), "status").read_text()
+    return bool(int(status.split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1)
+
+
+@pytest.mark.parametrize("imports", [False, True])
+def test_a_recorder_that_is_told_to_end_before_it_has_a_bag_lacks_no_messages(
+    imports: bool, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    if imports:
+        wait(lambda: catches_sigterm(pid_of(processes, "recorder")), "the first import")
+    processes.stop()
+    assert (processes.bag_failure, processes.killed) == ("", [])
+    assert not list(tmp_path.glob("bags/*"))
+
+
 def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
     recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:

@@ -31,7 +31,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, tunable
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_CONTACT, ZERO, Contact, State
+from wam_description.signals import NO_CONTACT, ZERO, Contact, PathPoint, PosturePath, State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 from wam_sim.simulation import Simulation
@@ -612,6 +612,13 @@ def task(*axes: TaskAxis, frame: str = "base") -> ScenarioStep:
     return ScenarioStep("go", 1.0, task=TaskCommand(frame, axes))
 
 
+def path(given: PosturePath) -> ScenarioStep:
+    return ScenarioStep("go", 1.0, trajectory=given)
+
+
+NO_PART = ("outer_link", [1.0, 2.0], np.array(GOAL), {"newtons": 1.0}, True)
+
+
 def setting(node: str, name: str, value: Any) -> ScenarioStep:
     return ScenarioStep("go", 1.0, settings=(Setting(node, name, value),))
 
@@ -669,6 +676,30 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
             "unknown key 'velocity_loop'; allowed: driver, force_loop",
         ),
         (ScenarioStep("go", 1.0, settings=cast(Any, ("posture_gain",))), "settings has 'posture_gain'; give Setting"),
+        (
+            setting(cast(Any, ["driver"]), "posture_gain", 1.0),
+            "settings has .*; give Setting.*, node and name as texts",
+        ),
+        (setting("force_loop", cast(Any, None), 1.0), "settings has .*; give Setting.*, node and name as texts"),
+        (ScenarioStep("go", 1.0, settings=cast(Any, None)), r"settings is None; it must be a list of Setting\("),
+        (ScenarioStep("go", 1.0, settings=cast(Any, "")), "settings is ''; it must be a list of Setting"),
+        (ScenarioStep("go", 1.0, request=cast(Any, np.array(GOAL))), "request is array.*; allowed: enable, disable"),
+        *((ScenarioStep("go", 1.0, force=cast(Any, one)), r"force is .*; give a ForceCommand\(") for one in NO_PART),
+        (ScenarioStep("go", 1.0, force=cast(Any, None)), r"force is None; give a ForceCommand\(frame, force, torque"),
+        *((ScenarioStep("go", 1.0, push=cast(Any, one)), r"push is .*; give a Push\(cover, ") for one in NO_PART),
+        *((ScenarioStep("go", 1.0, chirp=cast(Any, one)), r"chirp is .*; give a Chirp\(") for one in NO_PART),
+        *((path(cast(Any, one)), r"trajectory is .*; give a PosturePath\(points\)") for one in NO_PART),
+        (path(PosturePath(cast(Any, None))), "points of the trajectory is None; it must be a list of PathPoint"),
+        (path(PosturePath(())), "the trajectory has no points; give at least one"),
+        (path(PosturePath(cast(Any, (tuple(GOAL),)))), r"point 1 of the trajectory is \(.*; give a PathPoint\("),
+        (path(PosturePath((PathPoint(tuple(GOAL), cast(Any, None)),))), "velocity is None; it must be a list of joint"),
+        (path(PosturePath((PathPoint(tuple(GOAL), (0.1,)),))), r"velocity is \(0.1,\); it must be a list of 4 numbers"),
+        (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.0, cast(Any, 3))), "aside is 3; it must be"),
+        (task(*(), frame=cast(Any, None)), "frame is None; allowed: base"),
+        (
+            ScenarioStep("go", 1.0, task=TaskCommand("base", cast(Any, None))),
+            "axes of the task is None; it must be a l",
+        ),
     ],
 )
 def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, text: str) -> None:
@@ -676,6 +707,23 @@ def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, t
         Scenario([ScenarioStep("fine", 1.0), step], SHARED)
     with pytest.raises(ParameterError, match=text):
         Simulation(CONFIGURATION, [ScenarioStep("fine", 1.0), step])
+
+
+@pytest.mark.parametrize(
+    ("steps", "text"),
+    [
+        (None, "steps is None; it must be a list of ScenarioStep"),
+        ((one for one in [ScenarioStep("go", 1.0)]), "steps is <generator .*; it must be a list of ScenarioStep"),
+        (ScenarioStep("go", 1.0), "step 1 is 'go'; give a ScenarioStep"),
+        ([ScenarioStep("go", 1.0), None], "step 2 is None; give a ScenarioStep"),
+        ([{"name": "go", "seconds": 1.0}], "step 1 is {'name': 'go', .*; give a ScenarioStep"),
+    ],
+)
+def test_steps_that_are_none_are_refused_by_number(steps: Any, text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        Scenario(steps)
+    with pytest.raises(ParameterError, match=text):
+        Simulation(CONFIGURATION, steps)
 
 
 def test_what_a_step_made_in_python_sets_has_the_types_of_a_file(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from wam_control.contact_position import torque_of_position
 from wam_control.motion import GoalMotion, LineMotion, PostureMotion
 from wam_control.posture_watch import BEHIND, CAUGHT_UP
 from wam_control.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
-from wam_control.scenario_values import known, number, numbers, require_list
+from wam_control.scenario_values import is_one_of, known, number, numbers, require_list, require_made
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_text import require_task, task_of_text, torque_task
 from wam_description import yaml_text
@@ -180,7 +180,10 @@ class Scenario:
     def __init__(
         self, steps: Sequence[ScenarioStep], shared: Shared | None = None, controllers: Mapping[str, Any] = NONE
     ) -> None:
+        require(isinstance(steps, Sequence), f"steps is {steps!r}; it must be a list of ScenarioStep")
         require(len(steps) > 0, "the scenario has no steps")
+        for i, step in enumerate(steps):
+            require(isinstance(step, ScenarioStep), f"step {i + 1} is {step!r}; give a ScenarioStep")
         if shared is not None:
             steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(steps)]
         self.steps, self._shared = list(steps), shared
@@ -534,10 +537,11 @@ def _require_one(where: str, keys: Sequence[str]) -> None:
 def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     """Refuse a step whose values cannot be, whether it is from a file or made in Python."""
     arm = shared.arm
+    _require_parts(where, step)
     require(
         isinstance(step.name, str) and step.name != "", f"{where}: name is {step.name!r}; it must be a text (quote it)"
     )
-    require(step.request in REQUESTS, f"{where}: request is {step.request!r}; allowed: enable, disable")
+    require(is_one_of(step.request, REQUESTS), f"{where}: request is {step.request!r}; allowed: enable, disable")
     seconds = number(where, "seconds", step.seconds)
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
     until = number(where, "until_force", step.until_force)
@@ -567,11 +571,33 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     if step.posture:
         _require_posture(where, step.posture, arm)
     if step.trajectory is not None:
-        for point in step.trajectory.points:
-            _require_posture(where, point.position, arm)
-            number(where, "times", point.time)
+        _require_trajectory(where, step.trajectory, arm)
     if step.push is not None:
         _require_push(where, step.push, shared, seconds)
+
+
+def _require_parts(where: str, step: ScenarioStep) -> None:
+    """Refuse a part of a step that is of another class."""
+    require_made(where, "force", step.force, ForceCommand)
+    for key, part, kind in (
+        ("push", step.push, Push),
+        ("chirp", step.chirp, Chirp),
+        ("trajectory", step.trajectory, PosturePath),
+    ):
+        if part is not None:
+            require_made(where, key, part, kind)
+
+
+def _require_trajectory(where: str, trajectory: PosturePath, arm: Arm) -> None:
+    require_list(where, "points of the trajectory", trajectory.points, "PathPoint")
+    require(len(trajectory.points) > 0, f"{where}: the trajectory has no points; give at least one")
+    for i, point in enumerate(trajectory.points):
+        require_made(where, f"point {i + 1} of the trajectory", point, PathPoint)
+        _require_posture(where, point.position, arm)
+        require_list(where, "velocity", point.velocity, "joint speeds")
+        if point.velocity:
+            numbers(where, "velocity", point.velocity, len(arm.joints.names))
+        number(where, "times", point.time)
 
 
 def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
@@ -604,7 +630,7 @@ def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
 
 def _frame(where: str, frame: Any, arm: Arm) -> str:
     frames = (BASE, *arm.covers.names)
-    require(frame in frames, f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
+    require(is_one_of(frame, frames), f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
     return str(frame)
 
 
@@ -656,7 +682,8 @@ def _on_axis(push: Push, arm: Arm) -> Push:
 
 
 def _require_place(where: str, push: Push, arm: Arm) -> None:
-    require(push.cover in arm.covers.names, f"{where}: cover is {push.cover!r}; allowed: {', '.join(arm.covers.names)}")
+    covers = arm.covers.names
+    require(is_one_of(push.cover, covers), f"{where}: cover is {push.cover!r}; allowed: {', '.join(covers)}")
     place, length = number(where, "contact_position", push.position), arm.covers.length_of(push.cover)
     require(
         0.0 <= place <= length,
@@ -667,6 +694,8 @@ def _require_place(where: str, push: Push, arm: Arm) -> None:
 def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
     _require_place(where, push, shared.arm)
     numbers(where, "newtons", push.force, 3)
+    if push.aside is not None:
+        numbers(where, "aside", push.aside, 2)
     begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
     require(
         0.0 <= begin < end <= seconds + ROUNDING,

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from wam_control.scenario_values import known
+from wam_control.scenario_values import known, require_list
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
@@ -58,8 +58,10 @@ def checked_settings(
     where: str, settings: Sequence[Setting], shared: Shared, controllers: Mapping[str, Any] = NONE
 ) -> tuple[Setting, ...]:
     """Settings of a step made in Python as those of a file, or refused as those; arguments of `settings_of`."""
+    require_list(where, "settings", settings, "Setting(node, name, value), () for none")
     for one in settings:
-        require(isinstance(one, Setting), f"{where}: settings has {one!r}; give Setting(node, name, value)")
+        is_named = isinstance(one, Setting) and isinstance(one.node, str) and isinstance(one.name, str)
+        require(is_named, f"{where}: settings has {one!r}; give Setting(node, name, value), node and name as texts")
     found = (settings_of(where, {node: {name: value}}, shared, controllers) for node, name, value in settings)
     return tuple(one for of_one in found for one in of_one)
 

@@ -33,6 +33,16 @@ def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     return tuple(number(where, key, element) for element in value)
 
 
+def require_made(where: str, key: str, value: Any, kind: Any) -> None:
+    """Refuse what is no named tuple of this class; of a step that is made in Python."""
+    require(isinstance(value, kind), f"{where}: {key} is {value!r}; give a {kind.__name__}({', '.join(kind._fields)})")
+
+
+def is_one_of(value: Any, allowed: Sequence[str]) -> bool:
+    """Whether it is one of these texts; an array, whose truth is unknown, is none."""
+    return isinstance(value, str) and value in allowed
+
+
 def require_list(where: str, key: str, value: Any, content: str) -> None:
     """Refuse what is no list or tuple; an array, whose truth is unknown, with what makes a list of it."""
     advice = "; give its tolist()" if hasattr(value, "tolist") else ""

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import pinocchio as pin
 
-from wam_control.scenario_values import known, number, numbers
+from wam_control.scenario_values import is_one_of, known, number, numbers, require_list
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require
@@ -65,7 +65,8 @@ def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
         names the step, the axis and the value that is not allowed.
     """
     require(isinstance(task, TaskCommand), f"{where}: task is {task!r}; give a TaskCommand")
-    require(task.frame in (BASE, *arm.covers.names), _no_frame(where, task.frame, arm))
+    require_list(where, "axes of the task", task.axes, "TaskAxis")
+    require(is_one_of(task.frame, (BASE, *arm.covers.names)), _no_frame(where, task.frame, arm))
     require(len(task.axes) > 0, f"{where}: the task has no axes; give at least one, or no task")
     for i, axis in enumerate(task.axes):
         _require_axis(f"{where}, axis {i + 1}", axis, arm)
@@ -154,7 +155,7 @@ def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskA
 
 
 def _cover(where: str, name: Any, arm: Arm) -> str:
-    if name not in arm.covers.names:
+    if not is_one_of(name, arm.covers.names):
         raise ParameterError(f"{where}: cover is {name!r}; allowed: {', '.join(arm.covers.names)}")
     return str(name)
 

@@ -4,9 +4,11 @@ Messages that come over topics and what a node returns are refused for the same 
 returns may be any sequence of numbers, as a numpy array; the others get lists and tuples of Python's own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from math import isfinite, isinf, isnan
 from typing import Any
+
+import numpy as np
 
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
@@ -34,18 +36,13 @@ def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence
     frames : that a force, a point or a table may have.
     arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
     """
-    kind = _KINDS[topic.type]
-    look: Callable[[Any], str] = {
+    defect_of: Callable[[Any], str] = {
         JOINT_STATE: lambda value: state_defect(value, names, arrays),
         WRENCH: lambda value: wrench_defect(value, frames),
         POINT: lambda value: point_defect(value, frames),
         TABLE: lambda value: table_defect(value, topic.columns, frames),
     }[topic.type]
-
-    def defect(value: Any) -> str:
-        return look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
-
-    return _converting(node, topic, defect)
+    return _converting(node, topic, defect_of)
 
 
 def conversion(node: str, topic: Topic) -> Check:
@@ -60,28 +57,58 @@ def conversion(node: str, topic: Topic) -> Check:
 
 
 def _converting(node: str, topic: Topic, defect_of: Callable[[Any], str]) -> Check:
-    convert = _AS_TAKEN[topic.type]
+    kind, convert = _KINDS[topic.type], _AS_TAKEN[topic.type]
 
     def check(value: Any) -> Any:
+        defect = "" if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
         try:
-            if not (defect := defect_of(value)):
-                return convert(value)
-        except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            defect = f"{value} does not hold numbers: {error}"
+            if not defect and not (defect := defect_of(taken := convert(value))):
+                return taken
+        except (TypeError, ValueError, OverflowError) as error:
+            defect = f"{value} cannot be sent: {error}"
         raise UnusableOutput(node, topic.name, defect)
 
     return check
 
 
-def _floats(values: Sequence[float]) -> tuple[float, ...]:
-    return tuple(map(float, values))
+def _floats(name: str, values: Any) -> list[float]:
+    """An array of numbers in any sequence; a TypeError names what is none."""
+    return [_float(name, value) for value in _listed(name, values)]
+
+
+def _float(name: str, value: Any) -> float:
+    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__"):
+        raise TypeError(f"{name} has {value!r}; return floats")
+    return float(value)
+
+
+def _listed(name: str, values: Any, of: str = "floats") -> Iterable[Any]:
+    if isinstance(values, (str, bytes, bytearray, Set, Mapping)) or not isinstance(values, Iterable):
+        raise TypeError(f"{name} is {values!r}; return a list of {of}")
+    return values
+
+
+def _framed(frame: Any) -> str:
+    if not isinstance(frame, str):
+        raise TypeError(f"frame is {frame!r}; return a text")
+    return frame
+
+
+def _as_table(table: Table) -> Table:
+    return Table(
+        _framed(table.frame), tuple(tuple(_floats("a row", row)) for row in _listed("rows", table.rows, "rows"))
+    )
 
 
 _AS_TAKEN: dict[str, Callable[[Any], Any]] = {
-    JOINT_STATE: lambda state: State(*(list(map(float, values)) for values in state)),
-    WRENCH: lambda wrench: Wrench(wrench.frame, _floats(wrench.force), _floats(wrench.torque)),  # type: ignore[arg-type]
-    POINT: lambda point: Point(point.frame, _floats(point.position)),  # type: ignore[arg-type]
-    TABLE: lambda table: Table(table.frame, tuple(map(_floats, table.rows))),
+    JOINT_STATE: lambda state: State(*map(_floats, State._fields, state)),
+    WRENCH: lambda wrench: Wrench(
+        _framed(wrench.frame),
+        tuple(_floats("force", wrench.force)),  # type: ignore[arg-type]
+        tuple(_floats("torque", wrench.torque)),  # type: ignore[arg-type]
+    ),
+    POINT: lambda point: Point(_framed(point.frame), tuple(_floats("position", point.position))),  # type: ignore[arg-type]
+    TABLE: _as_table,
 }
 
 

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
+from wam_description.configuration import Configuration
 from wam_description.defects import Check, UnusableOutput, conversion, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError, meant
@@ -72,6 +73,25 @@ def require_sections(sections: Iterable[str], entries: Iterable[str]) -> None:
     for section in set(sections) - names - set(NODES):
         if near := get_close_matches(section, [*NODES, *names], n=1, cutoff=NEARLY):
             raise ParameterError(f"section '/**/{section}' is of no node in 'nodes'; did you mean '{near[0]}'?")
+
+
+def require_parameters(configuration: Configuration) -> None:
+    """Refuse sections and values of nodes before any node starts.
+
+    A class of parameters refuses its own; where it has a method `require_fit`, it refuses with the arm.
+
+    Raises
+    ------
+    ParameterError
+        names the section, the value and what is allowed.
+    """
+    shared = configuration.shared
+    require_sections(configuration.sections, shared.nodes)
+    for entry in shared.nodes:
+        one = declared(entry)
+        if one.name in configuration.sections:
+            own = configuration.node(one.name, one.parameter_class)
+            getattr(own, "require_fit", lambda arm: None)(shared.arm)
 
 
 def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:

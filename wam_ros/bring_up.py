@@ -16,7 +16,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
-from wam_description.interface import declared, require_sections
+from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
 from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
@@ -29,6 +29,10 @@ from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logg
 LOGGER: Final = get_logger("wam")
 PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
 RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
+NOT_BEGUN: Final = (
+    -signal.SIGTERM,
+    128 + signal.SIGTERM,
+)  # codes of a recorder that was told to end before it had a bag
 TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 
@@ -56,10 +60,7 @@ def start(
     """
     names = node_names(configuration)
     require_places(names.values(), namespace)
-    require_sections(configuration.sections, names)
-    for entry, name in names.items():
-        if name in configuration.sections:
-            configuration.node(name, declared(entry).parameter_class)  # refused before anything starts
+    require_parameters(configuration)
     if processes == ONE:
         return Composition(configuration, namespace, None, is_stopped, log_level)
     return Processes(configuration, namespace, log_level, processes)
@@ -162,7 +163,7 @@ class Processes:
                 self._wait_until(name, deadline)
         self._terminate(LAST)
         self._wait_for_recorder()
-        if code := self.ended().get(LAST):
+        if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
             self.bag_failure = f"the recorder ended with code {code}; what it wrote may lack messages"
         self._stack.close()
 

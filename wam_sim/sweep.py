@@ -134,8 +134,8 @@ def outcome(point: SweepPoint) -> SweepResult:
     """Play the scenario and measure; refused parameters are a failure of this run alone."""
     nothing = math.nan
     try:
-        require_playable("the scenario", point.steps, point.configuration)
         run = Simulation(point.configuration, point.steps)
+        require_playable("the scenario", point.steps, point.configuration)
         failure = run.play()
     except ParameterError as error:
         return SweepResult(str(error), 0.0, nothing, nothing, nothing)

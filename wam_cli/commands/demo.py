@@ -22,7 +22,7 @@ from wam_cli.commands import (
 from wam_cli.commands.demo_nodes import play
 from wam_control.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
-from wam_description.interface import Interface
+from wam_description.interface import Interface, require_parameters
 from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
@@ -71,7 +71,8 @@ def run(given: argparse.Namespace) -> int:
     if task:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
     configuration = base.with_nodes("scenario", "recorder").with_values({"recorder:name": name})
-    Interface(configuration.shared)  # refused before anything is printed
+    Interface(configuration.shared)  # refused before anything is printed, as are the values
+    require_parameters(configuration)
     steps = report_task(configuration, bag, task.name if task else "")
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_cli.commands import processes_of
+from wam_cli.commands import is_paced, processes_of
 from wam_control.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_description.nodes import ONE
@@ -77,7 +77,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
         print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
     with (
-        page_next_to(given, NAMESPACE) as close_page,
+        page_next_to(given, NAMESPACE, is_paced(configuration)) as close_page,
         start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
     ):
         driver: Any = getattr(stack, "nodes", {}).get("driver")

@@ -5,6 +5,7 @@ import sys
 
 from wam_cli.commands import (
     configuration_of,
+    is_paced,
     namespace,
     processes_of,
     take_configuration,
@@ -68,7 +69,7 @@ def run(given: argparse.Namespace) -> int:
     stop = Stop()
     processes = processes_of(configuration, given)
     with (
-        page_next_to(given, given.namespace) as close_page,
+        page_next_to(given, given.namespace, is_paced(configuration)) as close_page,
         start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
