@@ -167,8 +167,7 @@ def main() -> None:
         there = f"{BARE * scaled.median:.2f}"
         rows.append([name, f"{real:.2f}", there, f"{least:.2f}", mark(BARE * scaled.median, *ROWS[name])])
         measured[name] = {"real_time_ratio": real, "direct_ratio": least, "bare_ratio": scaled}
-    print(machine())
-    print(f"bare plant: {quartiles(plant):.0f} times real time")
+    print(f"{machine()}; the bare plant makes {quartiles(plant):.0f} times real time")
     there = f"with a bare plant of {BARE:.0f}"
     print(table(["scenario", "times real time (middle half)", there, "direct run is faster by", "[must, aim]"], rows))
     save("speed", given, measured)

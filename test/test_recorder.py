@@ -361,7 +361,7 @@ def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     [
         ({}, ""),
         ({"timing.real_time_factor": 0.5, "timing.niceness": -3}, ""),
-        ({"timing.mode": "realtime"}, "another timing.mode"),
+        ({"timing.mode": "realtime"}, "timing.mode"),
         ({"arm.name": "other", "arm.payload": 1.0, "timing.period": 0.002, "timing.outer_divisor": 4}, "and 1 more"),
     ],
 )
@@ -380,7 +380,7 @@ def test_a_node_that_is_started_again_otherwise_makes_the_bag_one_of_two_runs(
         status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "driver", facts={DIGESTS: given}), "wam"))
         ros.wait(lambda i=i: received(node, "/wam/status") == i + 1)
     assert found in node.failure
-    begin = "node driver was started again with "
+    begin = "node driver was started again, with another "
     end = f", and {tmp_path / 'bag'} has both runs; record each with a recorder of its own"
     assert bool(found) is (node.failure.startswith(begin) and node.failure.endswith(end))
 

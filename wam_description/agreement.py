@@ -16,7 +16,7 @@ OF_ONE_PROCESS = frozenset(
     {"nodes", "timing.niceness", "timing.fifo_priority", "timing.timeout", "timing.real_time_factor"}
 )  # nothing that a node computes depends on them
 NAMED = 3  # parameters
-OTHER_VERSION = "another version of wam_stack"
+OTHER_VERSION = "version of wam_stack"
 _LENGTH = 3  # characters of 6 bits each: two values have the same digest in one of 260 000 cases
 
 
@@ -39,12 +39,16 @@ def disagreement(node: str, own: str, other: str) -> str:
     """
     if not (found := difference(own, other)):
         return ""
-    same = "version" if found == OTHER_VERSION else "configuration"
-    return f"{node} was started with {found} than the driver; start all nodes with the same {same}"
+    if found == OTHER_VERSION:
+        return (
+            f"{node} was started with another version of wam_stack than the driver; "
+            "start all nodes with the same version"
+        )
+    return f"{node} was started with another {found} than the driver; start all nodes with the same configuration"
 
 
 def difference(one: str, other: str) -> str:
-    """Which parameters differ between two `digests`, in words; '' where none does, or where one is empty."""
+    """Which parameters differ between two `digests`, or `OTHER_VERSION`; '' where none does, or where one is empty."""
     if not (one and other) or one == other:
         return ""
     names = _compared()
@@ -52,7 +56,7 @@ def difference(one: str, other: str) -> str:
         return OTHER_VERSION
     different = [name for i, name in enumerate(names, start=1) if _part(one, i) != _part(other, i)]
     more = f" and {len(different) - NAMED} more" if len(different) > NAMED else ""
-    return f"another {', '.join(different[:NAMED])}{more}"
+    return f"{', '.join(different[:NAMED])}{more}"
 
 
 def live_facts(group: Any, prefix: str) -> dict[str, str]:

@@ -29,10 +29,8 @@ from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logg
 LOGGER: Final = get_logger("wam")
 PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
 RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
-NOT_BEGUN: Final = (
-    -signal.SIGTERM,
-    128 + signal.SIGTERM,
-)  # codes of a recorder that was told to end before it had a bag
+# codes of a recorder that SIGTERM ended before it had a bag
+NOT_BEGUN: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
 TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 

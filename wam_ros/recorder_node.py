@@ -180,7 +180,7 @@ class RecorderNode(TolerantNode):
             return
         if found := difference(self._digests.setdefault(status.node, given), given):
             self._two_runs = (
-                f"node {status.node} was started again with {found}, and {self.bag.path} has both runs; "
+                f"node {status.node} was started again, with another {found}, and {self.bag.path} has both runs; "
                 "record each with a recorder of its own"
             )
             self.get_logger().error(self._two_runs)
