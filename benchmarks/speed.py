@@ -154,7 +154,7 @@ def main() -> None:
         )
         for i in range(given.rounds):
             recorded = configuration.with_values({"recorder:name": f"round_{i}"})
-            plant.append(bare(configuration, 5.0))
+            plant.append(bare(configuration, 2.0 if given.quick else 20.0))
             speeds["direct run"].append(direct(configuration, script))
             speeds["lockstep"].append(lockstep(configuration))
             speeds["lockstep, recorded"].append(lockstep(recorded, "recorder"))

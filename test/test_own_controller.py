@@ -511,6 +511,8 @@ def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
     ("topic", "given", "text"),
     [
         ("joint_effort_command", State([], [], "1234"), "effort is '1234'; return a list of floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", State([], [], np.array(["1"])), "effort has np.str_('1'); return floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", State([], [], np.array([1j])), "effort has np.complex128(1j); return floats"),  # type: ignore[arg-type]
         ("joint_effort_command", ([], [], [0.0]), "([], [], [0.0]) is no State; return one"),
         ("force_command", Wrench("base", {1.0, 2.0, 3.0}, (0.0,) * 3), "force is {1.0, 2.0, 3.0}; return a list"),  # type: ignore[arg-type]
         ("force_command", Wrench(b"base", (0.0,) * 3, (0.0,) * 3), "frame is b'base'; return a text"),  # type: ignore[arg-type]

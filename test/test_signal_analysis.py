@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from wam_analysis.findings.motion import NOT_IDENTIFIABLE, _friction_findings, _known
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
-from wam_analysis.measures.friction import identify_friction
+from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
 from wam_analysis.measures.loop_timing import latency, stamp_timing
 from wam_analysis.measures.response import step_response
@@ -721,6 +722,30 @@ def test_repetitions_of_a_motion_do_not_lessen_the_error_of_what_the_law_leaves_
     every = identify_friction(time, velocity, torque, rest=0.05, window=0.03)
     two = identify_friction(time[:2000], velocity[:2000], torque[:2000], rest=0.05, window=0.03)
     assert every.viscous_error > 0.7 * two.viscous_error
+
+
+def test_strokes_of_which_one_way_cannot_be_left_out_do_not_lessen_the_error_by_repetition() -> None:
+    """Both halves of a stroke are alike, so that there is one motion each way, and neither can be left out."""
+    stroke = np.interp(np.arange(1_300) / 1e3, [0.0, 0.02, 0.98, 1.0, 1.3], [0.0, 0.5, 0.5, 0.0, 0.0])
+    velocity = np.tile(np.concatenate([stroke, -stroke]), 16)
+    angle = np.cumsum(velocity) / 1e3
+    torque = 0.03 * np.sign(velocity) + 1e-2 * velocity + 3e-3 * np.sin(40.0 * angle + 1.0)
+    time = np.arange(len(velocity)) / 1e3
+    errors = [
+        identify_friction(time[:n], velocity[:n], torque[:n], rest=0.05, window=0.03).dynamic_error
+        for n in (4 * 1_300, len(time))
+    ]
+    assert errors[1] > 0.5 * errors[0] > 0.0
+
+
+def test_a_friction_that_is_not_determined_is_stated_without_a_number() -> None:
+    assert _known(0.0324, math.inf, "N m") == NOT_IDENTIFIABLE
+    assert _known(0.0324, math.nan, "N m") == "0.0324 N m"
+    found = Friction(*[0.1] * 9, 1, 0.1, 0.1)._replace(viscous_error=math.inf)
+    (_, _, viscous) = _friction_findings("motor1", found, (0.1,) * 3, "")
+    assert math.isnan(viscous.measured)
+    assert NOT_IDENTIFIABLE in viscous.note
+    assert "none" not in viscous.note
 
 
 def test_dry_friction_is_not_halved_where_the_other_direction_was_left_out_as_outliers() -> None:

@@ -76,8 +76,12 @@ def _floats(name: str, values: Any) -> list[float]:
     return [_float(name, value) for value in _listed(name, values)]
 
 
+# numpy gives all of its scalars a __float__
+_NO_NUMBERS = (bool, np.bool_, np.character, np.complexfloating)
+
+
 def _float(name: str, value: Any) -> float:
-    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__"):
+    if isinstance(value, _NO_NUMBERS) or not hasattr(value, "__float__"):
         raise TypeError(f"{name} has {value!r}; return floats")
     return float(value)
 

@@ -42,7 +42,7 @@ LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
-LONGEST_ON_ITS_WAY = 1.0  # s, for a status that is to be repeated
+LONGEST_ON_ITS_WAY = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
 LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 

@@ -240,8 +240,10 @@ def _breakaway(found: Friction) -> str:
 
 def _known(value: float, error: float, unit: str) -> str:
     """A value with its standard error, or that it is not identifiable."""
-    if not math.isfinite(error):
+    if math.isnan(error):
         return shown(value, unit)
+    if math.isinf(error):
+        return NOT_IDENTIFIABLE
     if not _is_identified(value, error):
         return f"{NOT_IDENTIFIABLE} ({shown(value)} +- {shown(error, unit)})"
     return f"{shown(value)} +- {shown(error, unit)}"
@@ -273,7 +275,8 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         identified = _is_identified(value, error)
         deviation = f"+-{shown(error)}" if math.isfinite(error) and identified else ""
         if not identified:
-            deviation = f"{NOT_IDENTIFIABLE}: {shown(value)} +-{shown(error)}"
+            deviation = NOT_IDENTIFIABLE
+            deviation += f": {shown(value)} +-{shown(error)}" if math.isfinite(error) else ""
         text = "; ".join(filter(None, (first, deviation, note)))
         measured = value if identified else math.nan
         return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)

@@ -254,22 +254,36 @@ def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) ->
     """Standard errors of the columns' factors from leaving out one half of a motion at a time, and all that repeat it.
 
     What the law leaves out returns where a motion is repeated: as separate halves, repetitions would agree on it and
-    lessen the error.  By the normal equations of all without those left out: the time goes with the length of the
-    recording.
+    lessen the error.  Where hardly anything can be left out with all that repeat it, halves are left out one by one,
+    and the error counts as many of them as do not repeat each other.
     """
     begins = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
     pieces = list(zip(np.split(columns, begins[1:]), np.split(wanted, begins[1:]), strict=True))
     group = _repeated([(a[:, 0], a[:, 1]) for a, _ in pieces])
-    products = np.zeros((max(group) + 1, columns.shape[1], columns.shape[1]))
-    targets = np.zeros(products.shape[:2])
-    for g, (a, b) in zip(group, pieces, strict=True):
-        products[g] += a.T @ a
-        targets[g] += a.T @ b
+    products = np.array([a.T @ a for a, _ in pieces])
+    targets = np.array([a.T @ b for a, b in pieces])
+    grouped = _spread(_sums(products, group), _sums(targets, group))
+    if grouped is not None:
+        return grouped
+    single = _spread(products, targets)
+    repetitions = len(pieces) / (max(group) + 1)
+    return np.zeros(columns.shape[1]) if single is None else math.sqrt(repetitions) * single
+
+
+def _sums(parts: Numbers, group: Sequence[int]) -> Numbers:
+    """Sum of the parts of each group."""
+    sums = np.zeros((max(group) + 1, *parts.shape[1:]))
+    np.add.at(sums, group, parts)
+    return sums
+
+
+def _spread(products: Numbers, targets: Numbers) -> Numbers | None:
+    """Standard errors from solving normal equations without one of the parts each; None from less than two."""
     left, right = products.sum(axis=0) - products, targets.sum(axis=0) - targets
     is_known = np.linalg.cond(left) < SINGULAR
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
     if len(found) < 2:
-        return np.zeros(columns.shape[1])
+        return None
     result: Numbers = _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
     return result
 
