@@ -227,6 +227,9 @@ def test_a_recorder_that_is_told_to_end_before_it_has_a_bag_lacks_no_messages(
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
     if imports:
         wait(lambda: catches_sigterm(pid_of(processes, "recorder")), "the first import")
+        pid = pid_of(processes, "recorder")
+        os.kill(pid, signal.SIGSTOP)  # so that it has no bag yet however busy the machine is
+        threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
     processes.stop()
     assert (processes.bag_failure, processes.killed) == ("", [])
     assert not list(tmp_path.glob("bags/*"))
