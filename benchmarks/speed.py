@@ -73,10 +73,10 @@ def bare(configuration: Configuration, seconds: float) -> float:
     arm, step = shared.arm, shared.timing.substep
     model = mujoco.MjModel.from_xml_string(mjcf(arm, step, driver.world, driver.effects))
     data = mujoco.MjData(model)
-    n = len(arm.joints.names)
+    n, transmission = len(arm.joints.names), TransmissionMap.of(arm)
     data.qpos[n : 2 * n] = arm.joints.start
-    data.qpos[:n] = TransmissionMap.of(arm).motor_from_joint @ arm.joints.start
-    data.ctrl[:] = TransmissionMap.of(arm).motor_torques(RigidBody(arm).gravity_torque(arm.joints.start).tolist())
+    data.qpos[:n] = transmission.motor_from_joint @ arm.joints.start
+    data.ctrl[:] = transmission.motor_torques(RigidBody(arm).gravity_torque(arm.joints.start).tolist())
     count = round(seconds / step)
     begin = time.perf_counter()
     for _ in range(count):
@@ -164,12 +164,13 @@ def main() -> None:
     rows, measured = [], dict[str, Any]()
     for name, values in speeds.items():
         real, least, scaled = quartiles(values), ratios(speeds["direct run"], values), ratios(values, plant)
-        there = f"{BARE * scaled.median:.2f}"
-        rows.append([name, f"{real:.2f}", there, f"{least:.2f}", mark(BARE * scaled.median, *ROWS[name])])
+        there = BARE * scaled.median
+        rows.append([name, f"{real:.2f}", f"{there:.2f}", f"{least:.2f}", mark(there, *ROWS[name])])
         measured[name] = {"real_time_ratio": real, "direct_ratio": least, "bare_ratio": scaled}
     print(f"{machine()}; the bare plant makes {quartiles(plant):.0f} times real time")
-    there = f"with a bare plant of {BARE:.0f}"
-    print(table(["scenario", "times real time (middle half)", there, "direct run is faster by", "[must, aim]"], rows))
+    required = f"with a bare plant of {BARE:.0f}"
+    head = ["scenario", "times real time (middle half)", required, "direct run is faster by", "[must, aim]"]
+    print(table(head, rows))
     save("speed", given, measured)
 
 

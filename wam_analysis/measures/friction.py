@@ -1,7 +1,7 @@
 """Friction of a motor or of a joint, identified from velocity and torque."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -189,29 +189,35 @@ def _robust(
     for _ in range(4):
         if int(np.sum(keep)) < FEWEST:
             break
-        used = _distinct(columns[keep])
-        solution = np.linalg.lstsq(columns[keep][:, used] / scale[used], wanted[keep], rcond=None)[0]
-        rest = wanted - columns[:, used] / scale[used] @ solution
+        used, solution, rest = _fit(columns, wanted, scale, keep)
         middle = float(np.median(rest[keep]))
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
         keep = np.abs(rest - middle) <= max(JUMP * sd, 1e-12)
     if _distinct(columns[keep]) != used:  # what was left out was all of one direction
-        used = _distinct(columns[keep])
-        solution = np.linalg.lstsq(columns[keep][:, used] / scale[used], wanted[keep], rcond=None)[0]
-        rest = wanted - columns[:, used] / scale[used] @ solution
+        used, solution, rest = _fit(columns, wanted, scale, keep)
     a = columns[keep][:, used] / scale[used]
+    products = a.T @ a
+    inverse = np.linalg.pinv(products)
     alike = max(float(width), _correlation_length(rest[keep]))
     freedom = max(len(a) / alike - len(used), FREEDOM)
-    covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
+    covariance = inverse * float(np.sum(rest[keep] ** 2)) / freedom
     noisy = _few(freedom) * np.sqrt(np.diag(covariance))
-    noisy[_undetermined(a.T @ a)] = math.inf
+    noisy[_undetermined(products)] = math.inf
     found, errors = np.full(len(scale), math.nan), np.full(len(scale), math.nan)
     found[used] = solution / scale[used]
     errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
-    errors[used] = np.hypot(errors[used], np.linalg.norm(np.linalg.pinv(a) @ waves[keep], axis=1) / scale[used])
+    errors[used] = np.hypot(errors[used], np.linalg.norm(inverse @ (a.T @ waves[keep]), axis=1) / scale[used])
     errors = np.hypot(errors, NEGLECTED * found)
     left = float(np.sqrt(np.mean(rest[keep] ** 2)))
     return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
+
+
+def _fit(columns: Numbers, wanted: Numbers, scale: Numbers, keep: Mask) -> tuple[list[int], Numbers, Numbers]:
+    """Columns that the kept samples tell apart, their factors in terms of `scale`, and what is left of all samples."""
+    used = _distinct(columns[keep])
+    scaled = columns[:, used] / scale[used]
+    solution = np.asarray(np.linalg.lstsq(scaled[keep], wanted[keep], rcond=None)[0], np.float64)
+    return used, solution, wanted - scaled @ solution
 
 
 def _distinct(columns: Numbers) -> list[int]:
@@ -294,18 +300,14 @@ def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
     Two repeat each other if length, mean and first and last speed are alike; speeds are compared with the mean.
     """
     marks = np.array([_mark(direction[0], np.abs(velocity)) for direction, velocity in halves])
-    group = np.full(len(marks), -1)
-    for number, first in enumerate(_firsts(group)):
-        alike = np.all(np.abs(marks - marks[first]) < REPEATED, axis=1)
-        group[alike & (group < 0)] = number
+    group, number = np.full(len(marks), -1), 0
+    while (left := np.flatnonzero(group < 0)).size:
+        alike = np.all(np.abs(marks[left] - marks[left[0]]) < REPEATED, axis=1)
+        alike[0] = True  # also where a speed is not finite
+        group[left[alike]] = number
+        number += 1
     found: list[int] = group.tolist()
     return found
-
-
-def _firsts(group: NDArray[np.int64]) -> Iterator[int]:
-    """The first that has no number yet, until all have one."""
-    while (without := group < 0).any():
-        yield int(np.argmax(without))
 
 
 def _mark(direction: float, speed: Numbers) -> tuple[float, ...]:
