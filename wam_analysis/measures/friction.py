@@ -213,7 +213,7 @@ def _robust(
 
 
 def _fit(columns: Numbers, wanted: Numbers, scale: Numbers, keep: Mask) -> tuple[list[int], Numbers, Numbers]:
-    """Columns that the kept samples tell apart, their factors in terms of `scale`, and what is left of all samples."""
+    """Columns that the kept samples distinguish, their factors in terms of `scale`, and what is left of all samples."""
     used = _distinct(columns[keep])
     scaled = columns[:, used] / scale[used]
     solution = np.asarray(np.linalg.lstsq(scaled[keep], wanted[keep], rcond=None)[0], np.float64)
