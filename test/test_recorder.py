@@ -16,12 +16,13 @@ from typing import Any
 
 import pytest
 import yaml
-from conftest import LONG, soon
+from conftest import LONG, RosWorld, soon
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -430,6 +431,38 @@ def test_gaps_in_the_numbering_are_drops(numbers: list[int], received: int, drop
     assert (numbering.received, numbering.dropped, numbering.missed) == (received, dropped, missed)
 
 
+def test_a_gap_where_there_is_another_publisher_is_no_drop() -> None:
+    present = {"first"}
+    numbering = Numbering(lambda: present)
+    for number in (1, 2, 5):  # one publisher: two were lost
+        numbering.add(number)
+    present.add("second")  # started again, its first three before there was a connection; the first one was killed
+    for number in (9, 10, 13):
+        numbering.add(number)
+    present.remove("first")
+    for number in (14, 16):
+        numbering.add(number)
+    assert (numbering.received, numbering.dropped, numbering.missed) == (8, 2 + 2 + 1, 8)
+
+
+def test_what_a_restarted_node_published_before_it_was_connected_is_not_lost(ros: Any, tmp_path: Path) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    gravity = diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam")
+    for life, sent in ((1, 4), (2, 8)):
+        with contextlib.closing(RosWorld(ros.domain_id)) as another_process:
+            status = publisher(another_process.node("gravity"), "status")
+            for _ in range(sent):
+                status.publish(gravity)  # the newest alone is kept for a recorder that does not know this publisher yet
+            ros.wait(matched(status), what="a connection")
+            ros.wait(lambda status=status: status.wait_for_all_acked(Duration()), what="the newest status")
+            states.publish(state(life, 0.0))
+            ros.wait(lambda life=life: received(node, "/wam/motor_states") == life, what="what came before this state")
+    (found,) = (count for count in node.recorder.counts() if count.topic == "/wam/status")
+    assert (found.received + found.missed, found.dropped) == (4 + 8, 0)
+
+
 def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
     def data(name: str) -> bytes:
         message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=name)])
@@ -437,7 +470,7 @@ def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
 
     row = BY_NAME["/diagnostics"]
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "", "/wam")
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
         for number in (1, 2, 3):
             machine.receive(row.name, data("driver: timing"), 0, 0, number)
         for number in (1, 9):
@@ -456,7 +489,9 @@ def test_the_times_of_a_lockstep_recording_are_not_those_of_another_arm(tmp_path
     rows = [BY_NAME["/diagnostics"], BY_NAME["motor_states"]]
     with BagWriter(tmp_path / "bag") as bag:
         profiles = {row.name: qos(row) for row in rows}
-        machine = Recorder(bag, {row.name: row for row in rows}, "lockstep", profiles, lambda name: "driver", "/left")
+        machine = Recorder(
+            bag, {row.name: row for row in rows}, "lockstep", profiles, lambda name: {"1": "driver"}, "/left"
+        )
         machine.receive("/diagnostics", diagnostics("right: driver", 1_795_558_389_219_000_000), 0, 0, 7)
         machine.receive("motor_states", bytes(serialize_message(state(5_000_000, 0.1))), 0, 0, 1)
         machine.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
@@ -477,7 +512,7 @@ def fill_disk(bag: BagWriter) -> None:
 def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
     row = BY_NAME["contact/in_contact"]
     bag = BagWriter(tmp_path / "bag")
-    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: "", "/wam")
+    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: {}, "/wam")
     machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
     assert not machine.failure
     fill_disk(bag)
@@ -576,7 +611,7 @@ def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_pa
     """The stack runs on while the recorder stops: the last total is older than the last messages."""
     row, name = BY_NAME["motor_states"], "/wam/motor_states"
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {name: row}, "lockstep", {name: qos(row)}, lambda name: "driver", "/wam")
+        machine = Recorder(bag, {name: row}, "lockstep", {name: qos(row)}, lambda name: {"1": "driver"}, "/wam")
         data = bytes(serialize_message(state(1, 0.0)))
         for number in range(6000, 8000):
             machine.receive(name, data, 0, 0, number)
@@ -618,7 +653,7 @@ def test_a_bag_that_vanishes_is_told_at_once_and_is_a_fault_if_it_was_required(
 def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
     row = BY_NAME["status"]
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "", "/wam")
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
         for k in range(300):
             status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
             machine.receive(row.name, bytes(serialize_message(status)), 0, 0, 1)
@@ -633,7 +668,7 @@ def test_no_bytes_on_any_topic_end_the_recorder(tmp_path: Path) -> None:
     chance = random.Random(20261120)
     rows = list(BY_NAME.values())
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: "", "/wam")
+        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: {}, "/wam")
         for k in range(5000):
             row = chance.choice(rows)
             data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))
@@ -700,7 +735,7 @@ def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(t
     states, push = BY_NAME["motor_states"], BY_NAME["sim/disturbance"]
     names = {"/wam/motor_states": states, "/wam/sim/disturbance": push}
     offered = {name: qos(row) for name, row in names.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), names, "lockstep", offered, lambda name: "", "/wam")
+    machine = Recorder(BagWriter(tmp_path / "bag"), names, "lockstep", offered, lambda name: {}, "/wam")
     machine.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
     machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
     machine.finish()
@@ -714,7 +749,7 @@ def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
     """Its duration, and with that its rates, would count from the start of the run."""
     rows = {f"/wam/{name}": BY_NAME[name] for name in ("robot_description", "status", "motor_states")}
     offered = {name: qos(row) for name, row in rows.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: "driver", "/wam")
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
     machine.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
     machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
     for k in range(3):
@@ -731,7 +766,7 @@ def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
 def test_a_run_without_a_stamp_is_recorded_at_its_start(tmp_path: Path) -> None:
     rows = {f"/wam/{name}": BY_NAME[name] for name in ("status", "motor_states")}
     offered = {name: qos(row) for name, row in rows.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: "driver", "/wam")
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
     for number in range(1, 2001):  # the arm is paused
         machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
     machine.finish()

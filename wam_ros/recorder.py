@@ -2,7 +2,7 @@
 
 import struct
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
@@ -41,15 +41,22 @@ class Count(NamedTuple):
 class Numbering:
     """Gaps in the numbers that publishers give their messages, counted from 1 without holes.
 
-    A number that is above none of the known ones starts a new publisher (restarted, or a second one of the same name);
-    otherwise the message follows the nearest number before it, and the messages between the two were lost.
+    A number that is above none of the known ones starts a new publisher (restarted, or a second one of the same name),
+    as does a gap where there is another publisher than before; otherwise the message follows the nearest number before
+    it, and the messages between the two were lost.
+
+    Parameters
+    ----------
+    writers : the identities of those that publish at present, none where they are not known; used at a gap alone.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, writers: Callable[[], Collection[str]] = tuple) -> None:
         self.received = 0
         self.dropped = 0
         self.missed = 0
         self._last: list[int] = []
+        self._writers = writers
+        self._known: set[str] = set()
 
     def add(self, number: int) -> None:
         """Count one message; 0 if its number is not known."""
@@ -60,15 +67,21 @@ class Numbering:
             self._last[0] = number
             return
         before = [last for last in self._last if last < number]
-        if not before:
-            if not self._last:
-                self.missed += number - 1
+        if self._is_another() or not before:
+            self.missed += number - 1
             self._last.insert(0, number)
             del self._last[_MOST_STREAMS:]
             return
         nearest = max(before)
         self.dropped += number - nearest - 1
         self._last[self._last.index(nearest)] = number
+
+    def _is_another(self) -> bool:
+        """Whether there is a publisher that was not there at the gap before, nor at the first message."""
+        others = set(self._writers()) - self._known
+        is_first = not self._known
+        self._known |= others
+        return bool(others) and not is_first
 
     def lacking(self, total: int) -> int:
         """Messages that are missing behind the last one, of a publisher that has sent so many.
@@ -82,10 +95,11 @@ class Numbering:
 class _Channel:
     """One topic on its way into the bag."""
 
-    def __init__(self, topic: Topic, name: str, sender: Callable[[str], str], arm: str) -> None:
+    def __init__(self, topic: Topic, name: str, writers: Callable[[], Mapping[str, str]], arm: str) -> None:
         self.topic = topic
         self.name = name
-        self.publisher_of = _publisher_reader(topic, partial(sender, name), arm)
+        self.publisher_of = _publisher_reader(topic, writers, arm)
+        self._writers = writers
         self._arm = arm if topic.type == _NODE_DIAGNOSTICS else ""
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
@@ -116,8 +130,12 @@ class _Channel:
         if found is None:
             if len(self.publishers) >= _MOST_PUBLISHERS:
                 self.publishers.popitem(last=False)
-            found = self.publishers[publisher] = Numbering()
+            found = self.publishers[publisher] = Numbering(partial(self._writers_of, publisher))
         return found
+
+    def _writers_of(self, publisher: str) -> list[str]:
+        """Identities of one node on a topic that all share, where few messages come; a gap elsewhere is a loss."""
+        return [writer for writer, node in self._writers().items() if node == publisher] if self._is_shared else []
 
 
 class Recorder:
@@ -134,7 +152,7 @@ class Recorder:
         0 in a recording from the start of the run; in one that begins later it is the first stamp of
         all, and no latched message, which may be older, has an earlier one.
     qos : what each topic's publishers offer, by full name.
-    sender : finds the only publisher of a topic.
+    writers : finds the present publishers of a topic: the node of each, by its identity.
     namespace : of the arm, by which its nodes are named in /diagnostics.
     """
 
@@ -144,7 +162,7 @@ class Recorder:
         topics: Mapping[str, Topic],
         mode: str,
         qos: Mapping[str, object],
-        sender: Callable[[str], str],
+        writers: Callable[[str], Mapping[str, str]],
         namespace: str,
     ) -> None:
         self.failure = ""
@@ -158,7 +176,7 @@ class Recorder:
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
-            self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, ""))
+            self._channels[name] = _Channel(topic, name, partial(writers, name), diagnosed_name(namespace, ""))
         if not self._lockstep or all(topic.latched for topic in topics.values()):
             self._held = None
 
@@ -303,21 +321,26 @@ def _counts(channel: _Channel) -> Iterator[Count]:
             yield Count(channel.name, node, 0, 0, 0, count)
 
 
-def _publisher_reader(topic: Topic, sender: Callable[[], str], arm: str) -> Callable[[bytes], str]:
+def _publisher_reader(topic: Topic, writers: Callable[[], Mapping[str, str]], arm: str) -> Callable[[bytes], str]:
     """A function that finds the node that sent a message, which rclpy does not report.
 
     Parameters
     ----------
     topic : row of the table of topics; one that every node publishes carries the node's name, up to a ':' or '/'.
     arm : what the names of this arm's nodes begin with in /diagnostics.
-    sender : finds the only publisher of any other topic, once a message has come.
+    writers : finds the publishers of any other topic, once a message has come; of several the name is ''.
     """
     if topic.type == _NODE_STATUS:
         return lambda data: _node_of(_text(data, 5))
     if topic.type == _NODE_DIAGNOSTICS:
         return lambda data: _node_of(_first_status_text(data).removeprefix(arm))
-    found = cache(sender)
-    return lambda data: found()
+
+    @cache
+    def only_node() -> str:
+        nodes = set(writers().values())
+        return nodes.pop() if len(nodes) == 1 else ""
+
+    return lambda data: only_node()
 
 
 def _first_status_text(data: bytes) -> str:

@@ -1,7 +1,6 @@
 """Node `recorder`: writes every topic of the interface table to a bag, with the parameters of all nodes."""
 
 import time
-from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from rclpy.serialization import deserialize_message
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.agreement import DIGESTS, difference
 from wam_description.interface import Interface
-from wam_description.parameters import ParameterError, parameter, values
+from wam_description.parameters import ParameterError, values
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
@@ -25,34 +24,14 @@ from wam_ros.parameters import declare
 from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY, topic_name
 from wam_ros.qos import DEPTH, qos
 from wam_ros.recorder import Recorder, summary
-from wam_ros.recorder_interface import RecorderInterface
+from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
 
-EVERY = "*"
 DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
 LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
 SILENCE = 5.0  # s without any message, after which a recorder that was started by hand reports it
 MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
-
-
-@dataclass(frozen=True)
-class RecorderParameters:
-    """Place and contents of the bag."""
-
-    directory: str = parameter("directory of the bag; created if it is missing")
-    name: str = parameter("name of the bag, a new directory; empty: arm, date and time of the start")
-    topics: tuple[str, ...] = parameter("recorded topics, named as in docs/topics.md; '*' for all")
-    required: bool = parameter("whether the arm brakes when the bag can no longer be written", before=False)
-    split_size: int = parameter("size at which the bag continues in another file; 0: never", "byte", 0, 2**50)
-    split_time: float = parameter("time after which the bag continues in another file; 0: never", "s", 0.0, 1e7)
-
-    def __post_init__(self) -> None:
-        for topic in self.topics:
-            if topic != EVERY and topic not in BY_NAME:
-                raise ParameterError(f"parameter 'topics' names '{topic}'; allowed: {EVERY}, {', '.join(BY_NAME)}")
-        if self.name != Path(self.name).name or self.name == "..":
-            raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
 
 
 class RecorderNode(TolerantNode):
@@ -76,7 +55,7 @@ class RecorderNode(TolerantNode):
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._writers, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
         self._status_name = self.resolve_topic_name(STATUS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
@@ -185,10 +164,13 @@ class RecorderNode(TolerantNode):
             )
             self.get_logger().error(self._two_runs)
 
-    def _sender(self, name: str) -> str:
-        """The node that publishes a topic, '' where there are several."""
-        found = {info.node_name for info in self.get_publishers_info_by_topic(name)}
-        return found.pop() if len(found) == 1 else ""
+    def _writers(self, name: str) -> dict[str, str]:
+        """The present publishers of a topic: the node of each, with its namespace if it has another, by identity."""
+        own = self.get_namespace().rstrip("/") + "/"
+        return {
+            bytes(info.endpoint_gid).hex(): f"{info.node_namespace.rstrip('/')}/{info.node_name}".removeprefix(own)
+            for info in self.get_publishers_info_by_topic(name)
+        }
 
     def attend(self) -> None:
         """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""

@@ -72,8 +72,7 @@ def run(given: argparse.Namespace) -> int:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
     configuration = base.with_nodes("scenario", "recorder").with_values({"recorder:name": name})
     Interface(configuration.shared)  # refused before anything is printed, as are the values
-    others = [entry for entry in configuration.shared.nodes if entry != "recorder"]  # its parameters need ROS
-    require_parameters(configuration.with_values({"nodes": others}))
+    require_parameters(configuration)
     steps = report_task(configuration, bag, task.name if task else "")
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:
