@@ -285,6 +285,15 @@ def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_
         Configuration.load(tmp_path / "0.yaml")
 
 
+@pytest.mark.parametrize(("divisor", "age"), [(36, 0.035), (5, 0.004)])
+def test_an_outer_period_after_which_every_input_is_absent_is_refused(divisor: int, age: float) -> None:
+    """It braked in the first period with the advice to list a node that runs."""
+    values = {"timing.outer_divisor": divisor, "ages.feedback": age}
+    with pytest.raises(ParameterError, match=f"ages.feedback is {age} s, less than an outer period, 0.0"):
+        WAM.with_values(values).shared  # noqa: B018 - refuses
+    assert WAM.with_values({**values, "ages.feedback": divisor * 1e-3}).shared.ages.feedback == divisor * 1e-3
+
+
 def test_a_configuration_without_nodes_is_refused() -> None:
     empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
     with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):

@@ -125,6 +125,33 @@ steps:
     assert hidden.force_peak > 14.0
 
 
+@pytest.mark.slow
+def test_a_sweep_names_a_force_whose_position_was_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """35 N along base -z, 36 deg off the normal of the link, were 24 N, and the table had nothing but `force_worst`."""
+    file = tmp_path / "inclined.yaml"
+    file.write_text("""
+steps:
+  - {name: release, seconds: 0.3, request: enable}
+  - {name: above, seconds: 2.0, posture: [0.0, -1.7, 0.0, 1.3]}
+  - {name: down, seconds: 4.0, posture: [0.0, -2.35, 0.0, 1.3], until_force: 1.5}
+  - {name: press, seconds: 3.0, force: {frame: base, newtons: [0.0, 0.0, -35.0]}}
+""")
+    configuration = Configuration.load(packaged("wam"))
+    run = Simulation(configuration, load(file, configuration.shared))
+    assert run.play() == run.unmet == ""
+    assert run.doubts.startswith("press, position_assumed: something is touched and where it is known from the torques")
+    table = tmp_path / "table.csv"
+    vary = f"{GAIN}={configuration.sections['force_loop']['force_gain'][0]}"
+    with pytest.raises(SystemExit, match="0"):
+        main(["sweep", str(table), "--scenario", str(file), "--vary", vary, "--keep", str(tmp_path)])
+    with table.open() as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["failure"] == ""
+    assert row["reported"] == "press: position_assumed"
+    assert float(row["force_worst"]) > 5.0
+    assert "1 sets, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
+
+
 def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) -> None:
     file, found = tmp_path / "force.yaml", []
     for newtons in ("[0.0, -20.0, 0.0]", "[20.0, 0.0, 0.0]"):

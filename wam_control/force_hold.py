@@ -754,5 +754,6 @@ def _position_assumed(point: ForcePoint, force_sd: float) -> str:
     )
     return (
         f"something is touched and {known}; {point.position:.3g} m of {point.cover} is assumed, and the force is as "
-        "wrong as that; pin it by the torque of the command, or set contact_source to pinned (contact_position)"
+        "wrong as that; pin it by the torque of a command across a link, or set contact_source to pinned "
+        "(contact_position)"
     )

@@ -379,6 +379,12 @@ class Shared:
             "parameter 'nodes' is empty; list the nodes to start, for example "
             "[driver, transform, velocity_loop, gravity, force_loop, contact_estimator]",
         )
+        outer = seconds(self.timing.outer_period_ns)
+        require(
+            self.ages.feedback >= outer,
+            f"ages.feedback is {self.ages.feedback:g} s, less than an outer period, {outer:g} s (timing.period times "
+            "timing.outer_divisor): commands of outer nodes would always count as absent; raise it, or shorten that",
+        )
         self.arm.links.require_bodies()
         each = ("joint_speed", "joint_acceleration", "joint_jerk")
         lengths("motion", self.arm.joints.names, {key: getattr(self.motion, key) for key in each})

@@ -208,7 +208,7 @@ def files_of(path: str | Path) -> list[Path]:
     return found
 
 
-def option_values(texts: Iterable[str]) -> dict[str, Any]:
+def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:
     """Parameters and values as an option gives them, for `Configuration.with_values`; each '[node:]parameter=value'.
 
     Raises
@@ -220,13 +220,15 @@ def option_values(texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name.strip() and equals and value.strip()):
-            raise ParameterError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
+            raise ParameterError(
+                f"{option} is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]"
+            )
         try:
             found[name.strip()] = yaml_text.parse(value)
         except yaml.YAMLError as error:
             reason = str(error).partition("\n")[0]
             shown = repr(value if len(value) <= LONGEST else f"{value[:LONGEST]}...")
-            raise ParameterError(f"--set {name.strip()}: {shown} is no value of YAML: {reason}") from error
+            raise ParameterError(f"{option} {name.strip()}: {shown} is no value of YAML: {reason}") from error
     return found
 
 

@@ -25,6 +25,7 @@ from wam_sim.reactions import (
     STEADY,
     PlayedStep,
     RecordedReaction,
+    doubts,
     too_short,
     unassessed,
     unmet_in_words,
@@ -63,6 +64,8 @@ class SweepResult(NamedTuple):
     force_peak : largest true force, N.
     unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; and those
         whose force another link hides, which bears more; '' for none.
+    reported : steps that count as carried out, and what the force loop reported at the end of each: where the position
+        of a force had to be assumed, for example, the measured force is not the true one; '' for nothing.
     """
 
     failure: str
@@ -71,6 +74,7 @@ class SweepResult(NamedTuple):
     force_worst: float
     force_peak: float
     unassessed: str = ""
+    reported: str = ""
 
 
 def grid(axes: Sequence[Axis]) -> list[tuple[Any, ...]]:
@@ -146,7 +150,8 @@ def outcome(point: SweepPoint) -> SweepResult:
     found = [failure, *unmet_in_words(reactions, others)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
     brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
-    return measured._replace(unassessed="; ".join(dict.fromkeys(brief)))
+    reports = (f"{one.name}: {why.name}" for one in played if one.step.commands_arm for why in doubts(reactions, one))
+    return measured._replace(unassessed="; ".join(dict.fromkeys(brief)), reported="; ".join(dict.fromkeys(reports)))
 
 
 def _measured(

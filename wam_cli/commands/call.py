@@ -38,6 +38,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+EXAMPLE: Final = "force_loop:force_gain=0.01"
 NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
 
 
@@ -55,7 +56,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     found.add_argument("name", metavar="NODE[:PARAMETER]", help="force_loop, or force_loop:force_gain")
     found.add_argument("--all", action="store_true", help="of a node also those that all nodes share")
     new = requests.add_parser("set", parents=[where], help="change a live parameter, or be refused with the reason")
-    new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help="for example force_loop:force_gain=0.01")
+    new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help=f"for example {EXAMPLE}")
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
@@ -116,7 +117,9 @@ def _get(given: argparse.Namespace, stack: CalledStack) -> int:
 
 
 def _set(given: argparse.Namespace, stack: CalledStack) -> int:
-    ((key, value),) = option_values([given.value]).items()
+    if ":" not in given.value.partition("=")[0]:
+        raise ValueError(f"'{given.value}' has no node; write NODE:PARAMETER=VALUE, for example {EXAMPLE}")
+    ((key, value),) = option_values([given.value], "wam call set").items()
     node, _, name = key.partition(":")
     values = stack.parameters(node)
     if name not in values:

@@ -3,6 +3,8 @@
 import argparse
 import csv
 import math
+import re
+import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -32,6 +34,7 @@ from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
 SCENARIO = "demo_scenario"
+ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +59,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--list", action="store_true", help="first values together, then the second ones and so on")
-    kind.add_argument("--random", action="store_true", help="draw between the two values of each parameter")
+    kind.add_argument(
+        "--random",
+        action="store_true",
+        help="draw numbers between the two values of each parameter, evenly, or by a factor where both are above 0; "
+        "not for whole numbers",
+    )
     parser.add_argument("--runs", type=int, default=RANDOM_RUNS, help="of --random; default: %(default)s")
     parser.add_argument("--seed", type=int, default=1, help="of --random; default: 1")
     parser.add_argument(
@@ -80,8 +88,12 @@ def run(given: argparse.Namespace) -> int:
     axes: list[Axis] = given.vary
     _refuse_idle(given, axes)
     sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
-    failed = sum((_of_experiment if given.experiment else _of_scenario)(given, axes, sets))
-    print(f"{len(sets)} sets, {failed} failed, in {given.file}")
+    failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
+    failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
+    doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
+    print(f"{len(sets)} sets, {failed} failed{doubts}, in {given.file}")
+    if failed == len(sets):
+        print(f"each set failed; the first: {failures[0]}", file=sys.stderr)
     return int(failed == len(sets))
 
 
@@ -101,8 +113,8 @@ def _scenario_file(given: argparse.Namespace) -> Path:
     return script_file(given.scenario or SCENARIO)
 
 
-def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
-    """Which sets failed; a row of the table for each."""
+def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
+    """Why each set failed, '' where it did not, and what was reported of the others; a row of the table for each."""
     configuration = configuration_of(given)
     runs = points(configuration, load(_scenario_file(given), configuration.shared), axes, sets)
     with batch_of(given) as batch:
@@ -111,11 +123,11 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> lis
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
         scenario_figure(given.picture, axes, sets, found)
-    return [bool(result.failure) for result in found]
+    return [result.failure for result in found], [result.reported for result in found]
 
 
-def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
-    """Which sets failed; a row of the table for each quantity, or for the failure."""
+def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
+    """Why each set failed, '' where it did not, and no report; a row of the table for each quantity, or the failure."""
     if given.config != BASE_CONFIGURATION or given.values:
         raise ValueError(
             "an experiment has its own configuration; leave out --config and --set, and --vary its numbers"
@@ -130,7 +142,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> l
     _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
     if given.picture:
         experiment_figure(given.picture, axes, sets, found)
-    return [bool(one.failure) for one in found]
+    return [one.failure for one in found], []
 
 
 def _axis(text: str) -> Axis:
@@ -140,6 +152,8 @@ def _axis(text: str) -> Axis:
         if not (0.0 < low < high < math.inf and count > 1):
             raise argparse.ArgumentTypeError(f"'{values}' is no LOW:HIGH:N with 0 < LOW < HIGH and N of 2 or more")
         return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(int(count))))
+    if re.fullmatch(rf"{ENDS}:{ENDS}", values.replace(" ", "")):
+        raise argparse.ArgumentTypeError(f"'{values}' has no number of values; write {values}:5 for five")
     parsed, reason = [], ""
     try:
         parsed = yaml_text.parse(f"[{values}]")
