@@ -386,6 +386,31 @@ def test_a_node_that_is_started_again_otherwise_makes_the_bag_one_of_two_runs(
     assert bool(found) is (node.failure.startswith(begin) and node.failure.endswith(end))
 
 
+@pytest.mark.parametrize("again", [1.0, 2.0])
+def test_a_node_that_is_started_again_with_another_parameter_of_its_own_is_named(
+    again: float, ros: Any, tmp_path: Path
+) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    driver = ros.node("driver")
+    driver.declare_parameter("seed", 1)
+    states = publisher(driver, "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    for life, gain in enumerate((1.0, again)):
+        gravity = ros.node("gravity")
+        gravity.declare_parameter("gain", gain)
+        status = publisher(gravity, "status")
+        ros.wait(matched(status))
+        status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam"))
+        ros.wait(lambda: not node.parameters_of_nodes.missing)
+        node.attend()
+        assert node.restarted == ["gravity"] * life
+        ros.wait(lambda: not node.restarted, what="its parameters")
+        ros.remove(gravity)
+    begin = "node gravity was started again, with another gain, and "
+    assert node.failure.startswith(begin) if again == 2.0 else node.failure == ""
+
+
 def test_a_recorder_to_which_nothing_came_ends_with_the_reason(
     ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
@@ -604,7 +629,50 @@ def test_messages_behind_the_last_one_are_counted_by_the_total(numbers: list[int
     numbering = Numbering()
     for number in numbers:
         numbering.add(number)
-    assert numbering.lacking(total) == lacking
+    numbering.announce(total)
+    assert numbering.lacking() == lacking
+
+
+def lives(*numbers_and_totals: tuple[list[int], int], present: bool = True) -> Numbering:
+    """A node that was started again, each time by another writer, with its numbers and what it announced at last."""
+    writers: list[str] = []
+    numbering = Numbering(lambda: writers)
+    for life, (numbers, total) in enumerate(numbers_and_totals):
+        writers[:] = [f"writer {life}"] if present else []
+        for number in numbers:
+            numbering.add(number)
+        numbering.announce(total)
+    return numbering
+
+
+ALL = list(range(1, 101))
+
+
+@pytest.mark.parametrize("present", [True, False])
+@pytest.mark.parametrize(
+    ("first", "second", "dropped", "missed", "lacking"),
+    [
+        ((ALL, 100), (ALL[:40], 30), 0, 0, 0),
+        ((ALL[:40], 40), (ALL, 70), 0, 0, 0),  # it is past its last total, which is above that of the first life
+        ((ALL, 100), (ALL[:10], 100), 0, 0, 90),
+        ((ALL[:90], 100), (ALL[:10], 15), 0, 0, 10 + 5),
+        ((ALL, 100), (ALL[9:20], 20), 0, 9, 0),  # before it was connected
+    ],
+)
+def test_losses_are_those_of_each_life_of_a_node(
+    first: tuple[list[int], int],
+    second: tuple[list[int], int],
+    dropped: int,
+    missed: int,
+    lacking: int,
+    present: bool,
+) -> None:
+    found = lives(first, second, present=present)
+    assert (found.dropped, found.missed, found.lacking()) == (dropped, missed, lacking)
+
+
+def test_a_gap_of_a_second_life_is_not_closed_by_numbers_of_the_first() -> None:
+    assert lives((ALL, 100), ([*range(1, 11), *range(102, 151)], 150)).dropped == 91
 
 
 def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ class Numbering:
 
     A number that is above none of the known ones starts a new publisher (restarted, or a second one of the same name),
     as does a gap where there is another publisher than before; otherwise the message follows the nearest number before
-    it, and the messages between the two were lost.
+    it, or the newest publisher's where that is alone, and the messages between the two were lost.
 
     Parameters
     ----------
@@ -54,7 +54,9 @@ class Numbering:
         self.received = 0
         self.dropped = 0
         self.missed = 0
-        self._last: list[int] = []
+        self._last: list[int] = []  # of each publisher, the newest first
+        self._total = 0  # messages that the newest one has announced
+        self._lost_before = 0  # at the end of those before it
         self._writers = writers
         self._known: set[str] = set()
 
@@ -66,30 +68,38 @@ class Numbering:
         if self._last and self._last[0] == number - 1:  # one publisher, nothing lost
             self._last[0] = number
             return
-        before = [last for last in self._last if last < number]
-        if self._is_another() or not before:
-            self.missed += number - 1
-            self._last.insert(0, number)
-            del self._last[_MOST_STREAMS:]
+        present = set(self._writers())
+        is_another = bool(self._known and present - self._known)
+        self._known |= present
+        followed = self._last[:1] if len(present) == 1 else self._last
+        before = [last for last in followed if last < number]
+        if is_another or not before:
+            self._begin(number)
             return
         nearest = max(before)
         self.dropped += number - nearest - 1
         self._last[self._last.index(nearest)] = number
 
-    def _is_another(self) -> bool:
-        """Whether there is a publisher that was not there at the gap before, nor at the first message."""
-        others = set(self._writers()) - self._known
-        is_first = not self._known
-        self._known |= others
-        return bool(others) and not is_first
+    def _begin(self, number: int) -> None:
+        """Another publisher begins, and what the one before announced is not of it."""
+        self._lost_before, self._total = (self.lacking() if self._last else 0), 0
+        self.missed += number - 1
+        self._last.insert(0, number)
+        del self._last[_MOST_STREAMS:]
 
-    def lacking(self, total: int) -> int:
-        """Messages that are missing behind the last one, of a publisher that has sent so many.
+    def announce(self, total: int) -> None:
+        """Take the number of messages that the publisher has sent; fewer than before are those of another one."""
+        if total < self._total:
+            self._lost_before = self.lacking()
+        self._total = total
+
+    def lacking(self) -> int:
+        """Messages that were announced and are missing behind the last one of their publisher.
 
         A total from before the last message leaves none; those sent before the recorder started are no loss.
         """
-        before = [last for last in self._last if last <= total]
-        return total - max(before) if before else max(0, total - self.received - self.dropped - self.missed)
+        last = self._last[0] if self._last else self.received + self.dropped + self.missed
+        return self._lost_before + max(0, self._total - last)
 
 
 class _Channel:
@@ -115,14 +125,19 @@ class _Channel:
         """A node has published so many messages on this topic."""
         self._first_totals.setdefault(node, total)
         self.totals[node] = total
+        for numbering in self._numberings(node):
+            numbering.announce(total)
+
+    def _numberings(self, node: str) -> list[Numbering]:
+        """Those of a node's messages; all of a topic that one node publishes, whose name may not be known."""
+        return [found for name, found in self.publishers.items() if not self._is_shared or name == node]
 
     def lost_at_end(self, node: str) -> int:
         """Messages that a node announced and that are missing behind the last one of it."""
-        total = self.totals.get(node, 0)
-        found = [numbering for name, numbering in self.publishers.items() if not self._is_shared or name == node]
+        found = self._numberings(node)
         if not found:  # what was sent before its first report may have been sent before there was a recorder
-            return total - self._first_totals.get(node, total)
-        return min(numbering.lacking(total) for numbering in found) if total else 0
+            return max(0, self.totals[node] - self._first_totals[node])
+        return min(numbering.lacking() for numbering in found)
 
     def numbering(self, publisher: str) -> Numbering:
         """Counts of one publisher; if there are too many, the oldest is dropped."""
@@ -131,11 +146,14 @@ class _Channel:
             if len(self.publishers) >= _MOST_PUBLISHERS:
                 self.publishers.popitem(last=False)
             found = self.publishers[publisher] = Numbering(partial(self._writers_of, publisher))
+            for node, total in self.totals.items():
+                if found in self._numberings(node):
+                    found.announce(total)
         return found
 
     def _writers_of(self, publisher: str) -> list[str]:
-        """Identities of one node on a topic that all share, where few messages come; a gap elsewhere is a loss."""
-        return [writer for writer, node in self._writers().items() if node == publisher] if self._is_shared else []
+        """Identities of a publisher's writers of the topic at present."""
+        return [writer for writer, node in self._writers().items() if node == publisher]
 
 
 class Recorder:

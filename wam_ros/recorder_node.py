@@ -12,8 +12,9 @@ from rclpy.serialization import deserialize_message
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.agreement import DIGESTS, difference
+from wam_description.arm import Shared
 from wam_description.interface import Interface
-from wam_description.parameters import ParameterError, values
+from wam_description.parameters import ParameterError, fields, values
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
@@ -31,6 +32,7 @@ from wam_ros.tolerance import TolerantNode
 DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
 LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
 SILENCE = 5.0  # s without any message, after which a recorder that was started by hand reports it
+_SHARED = frozenset(field.name for field in fields(Shared))
 MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
 
@@ -80,6 +82,8 @@ class RecorderNode(TolerantNode):
             str, str
         ] = {}  # how each node runs otherwise than this recorder takes it to, '' if it does not
         self._digests: dict[str, str] = {}  # of the shared parameters with which each node ran first
+        self._lives: dict[str, str] = {}  # the node of each writer of a status that was seen
+        self._again: dict[str, RemoteParameters] = {}  # those of nodes that were started again
         self._two_runs = ""  # which node was started again with others
         self._heard = self._heard_before = 0  # messages of others, recorded or not
         self._heard_at, self._is_silent = time.monotonic(), False
@@ -158,11 +162,34 @@ class RecorderNode(TolerantNode):
         if not given or status.node not in self._nodes or self._two_runs:
             return
         if found := difference(self._digests.setdefault(status.node, given), given):
-            self._two_runs = (
-                f"node {status.node} was started again, with another {found}, and {self.bag.path} has both runs; "
-                "record each with a recorder of its own"
-            )
-            self.get_logger().error(self._two_runs)
+            self._report_two_runs(status.node, found)
+
+    @property
+    def restarted(self) -> list[str]:
+        """Nodes that were started again and are asked for their parameters."""
+        return list(self._again)
+
+    def _look_for_restarts(self) -> None:
+        """Ask a node that was started again for its own parameters, and report others than those in the bag."""
+        for writer, node in self._writers(self._status_name).items():
+            if writer not in self._lives and node in self._lives.values() and node in self.parameters_of_nodes.found:
+                self._again[node] = RemoteParameters(self, [node])
+            self._lives[writer] = node
+        for node, again in list(self._again.items()):
+            again.ask()
+            if node in again.found:
+                del self._again[node]
+                before, after = self.parameters_of_nodes.found[node], again.found[node]
+                others = sorted(name for name in before.keys() - _SHARED if str(before[name]) != str(after.get(name)))
+                if others and not self._two_runs:
+                    self._report_two_runs(node, ", ".join(others))
+
+    def _report_two_runs(self, node: str, others: str) -> None:
+        self._two_runs = (
+            f"node {node} was started again, with another {others}, and {self.bag.path} has both runs; "
+            "record each with a recorder of its own"
+        )
+        self.get_logger().error(self._two_runs)
 
     def _writers(self, name: str) -> dict[str, str]:
         """The present publishers of a topic: the node of each, with its namespace if it has another, by identity."""
@@ -179,6 +206,7 @@ class RecorderNode(TolerantNode):
         self._look_for_messages()
         self.parameters_of_nodes.ask()
         self._compare()
+        self._look_for_restarts()
         if self.ready or self.parameters_of_nodes.missing or self._unmatched():
             return
         self._attach_parameters()  # now, so that a killed recorder leaves them
