@@ -48,6 +48,16 @@ def test_a_force_that_cycles_and_is_off_is_reported_as_both() -> None:
     assert list(loop.reactions)[:2] == [ForceReaction.NOT_REACHED, ForceReaction.CYCLE]
 
 
+@pytest.mark.parametrize(("lasting", "expected"), [(0.085, ForceReaction.NONE), (1.0, ForceReaction.CYCLE)])
+def test_an_impact_that_bounces_is_no_limit_cycle(lasting: float, expected: ForceReaction) -> None:
+    """At a touch the force turned back five times in 75 ms, and a limit cycle was reported for two seconds."""
+    loop = force_loop(ARM, PINNED)
+    for k in range(100):
+        swing = 0.9 * (-1) ** (k // 3) if k * DT < lasting else 0.0
+        ask(loop, World(400.0, force=5.0 + swing), down(5.0))
+    assert loop.reaction is expected
+
+
 def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     loop = force_loop(ARM, PINNED)
     for k in range(220):

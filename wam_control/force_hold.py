@@ -39,6 +39,7 @@ FADING = 0.2  # of the time without it, by which that with it is reduced: a link
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
+BOUNCING = 0.1  # s after the first touch, in which an impact turns the force as often as a limit cycle
 FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
 FAINT = 0.5  # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
 SLOWED = 0.5  # of the speed along the force, from then on
@@ -144,6 +145,7 @@ class ForceHold:
         """Another force is commanded."""
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
+        self._bouncing = 0.0  # s, for which the force may still turn by an impact
         self._frequency = self._watched = self._shaking = self._blocked = 0.0
         self._is_watching = False
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
@@ -309,7 +311,7 @@ class ForceHold:
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
         if self.is_touching and not self.has_touched:
-            self.has_touched = True
+            self.has_touched, self._bouncing = True, BOUNCING
             self._forget_swings()
         self._count(measured, desired, given_way, parameters, dt)
         # tangential forces grow with the force
@@ -348,6 +350,9 @@ class ForceHold:
         is_late, limits = parameters.is_estimated and self.share > SLOWED, parameters.limits
         is_faint = is_late and not (limits.surface_speed or limits.slide_speed)  # such a surface swings the force, too
         swing = limits.cycle_force * desired * (FAINT if is_faint else 1.0)
+        if self._bouncing > 0.0:
+            self._turns.reset()
+        self._bouncing -= dt
         is_cycling = self._turns.step(measured, swing, limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         turned = self._has_turned(axis, external, measured, desired, parameters, dt)

@@ -166,7 +166,7 @@ class RecorderNode(TolerantNode):
 
     @property
     def restarted(self) -> list[str]:
-        """Nodes that were started again and are asked for their parameters."""
+        """Nodes that were started again and whose parameters have been requested."""
         return list(self._again)
 
     def _look_for_restarts(self) -> None:
