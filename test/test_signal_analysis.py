@@ -1,11 +1,22 @@
 """The analysis functions on signals of known answer, with seeded noise: within 2 %."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from arms import WAM
 
-from wam_analysis.findings.motion import NOT_IDENTIFIABLE, _friction_findings, _known
+from wam_analysis.findings.motion import (
+    NOT_IDENTIFIABLE,
+    _friction_findings,
+    _friction_of_joints,
+    _friction_of_motors,
+    _friction_section,
+    _known,
+)
+from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
@@ -758,3 +769,135 @@ def test_dry_friction_is_not_halved_where_the_other_direction_was_left_out_as_ou
     found = identify_friction(time, velocity, torque, rest=0.002, window=0.03)
     assert abs(found.dynamic - 0.2093) < 3.0 * found.dynamic_error < 0.05
     assert math.isnan(found.offset)
+
+
+def stops(dynamic: float, breakaway: float, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, velocity and torque of a shaft that moves to both sides and rests, at the end of which torque rises."""
+    time = np.arange(16_000) / 1e3
+    phase, way = time % 1.0, np.where(time % 2.0 < 1.0, 1.0, -1.0)
+    velocity = way * np.where(phase < 0.599, (2.0 + np.sin(0.9 * time)) * np.sin(math.pi * (phase + 5e-4) / 0.6), 0.0)
+    rising = np.clip((phase - 1.0) / seconds + 1.0, 0.0, 1.0) * breakaway
+    torque = np.where(velocity == 0.0, -way * rising, dynamic * np.sign(velocity) + 0.01 * velocity)
+    return time, velocity, torque
+
+
+def test_a_shaft_that_creeps_before_every_motion_has_no_static_friction() -> None:
+    """All breakaways are at dynamic friction, alike: that of 0.25 N m was stated as 0.18 N m +- 1 %."""
+    time, velocity, torque = stops(0.18, 0.1805, 0.4)
+    found = identify_friction(time, velocity, torque + draws(4, len(time), 5e-4), rest=0.05, window=0.03)
+    assert found.breakaways >= 3
+    assert found.dynamic == PRECISE(0.18, rel=0.01)
+    assert math.isinf(found.static_error)
+
+
+def test_static_friction_is_not_known_better_than_the_torque_rises_between_samples() -> None:
+    """It rises from zero to 0.25 N m in 8 samples; the last before the slip has 0.219 N m each time."""
+    time, velocity, torque = stops(0.205, 0.25, 8e-3)
+    found = identify_friction(time, velocity, torque, rest=0.05, window=0.03)
+    assert found.breakaways >= 3
+    assert found.static < 0.22
+    assert abs(found.static - 0.25) < 3.0 * found.static_error
+
+
+@pytest.mark.parametrize("end", [1_700, 2_600])
+def test_one_or_two_breakaways_have_an_error_too(end: int) -> None:
+    time, velocity, torque = (values[900:end] for values in stops(0.18, 0.25, 0.3))
+    found = identify_friction(time, velocity, torque, rest=0.05, window=0.03)
+    assert found.breakaways == (1 if end < 2_000 else 2)
+    assert abs(found.static - 0.25) < 3.0 * found.static_error < 0.5 * found.static
+
+
+def test_a_shaft_whose_encoder_counts_in_a_rest_is_not_at_rest() -> None:
+    """A count in each 5 ms, too short for a motion: it moves at 0.8 rad/s, and carries dynamic friction."""
+    time, velocity, torque = stops(0.18, 0.19, 0.4)
+    creeping = velocity == 0.0
+    velocity[creeping & (np.arange(len(time)) % 5 == 0)] = 4.0
+    assert identify_friction(time, velocity, torque, rest=0.05, window=0.03).breakaways == 0
+
+
+def signals_of(time: np.ndarray, **given: np.ndarray | str) -> TransmissionSignals:
+    """Signals of an arm with one motor and one joint; what is not given is zero."""
+    zero, every = np.zeros((len(time), 1)), np.ones(len(time), dtype=np.bool_)
+    names = ("angle", "velocity", "torque", "load", "joint_velocity", "cable_torque", "strain")
+    rest: dict[str, Any] = {**dict.fromkeys(names, zero), "use": every, "sampled": every, "load_from": CABLE}
+    return TransmissionSignals(time=time, caveats=(), **{**rest, **given})
+
+
+ONE_JOINT: Any = SimpleNamespace(motors=SimpleNamespace(names=("motor1",)), joints=SimpleNamespace(names=("joint1",)))
+SMOOTH: Any = SimpleNamespace(commutation=(), effects=None)
+
+
+def every_fifth(values: np.ndarray) -> np.ndarray:
+    rows = np.arange(len(values))
+    return np.interp(rows, rows[::5], values[::5])[:, np.newaxis]
+
+
+def test_friction_of_a_joint_is_not_that_of_a_torque_between_its_samples() -> None:
+    """The strain gauges read at 1 kHz what swings in the cables, which are recorded at 200 Hz."""
+    time = np.arange(12_000) / 1e3
+    swing = np.sin(2.0 * math.pi * 25.0 * time)
+    velocity = 0.6 * np.sin(1.1 * time) + 0.1 * np.sin(4.3 * time) + 0.05 * swing
+    free = 0.45 * np.sign(velocity) + 0.05 * velocity
+    signals = signals_of(
+        time,
+        sampled=np.arange(len(time)) % 5 == 0,
+        joint_velocity=velocity[:, np.newaxis],
+        strain=2.0 * swing[:, np.newaxis],
+        cable_torque=every_fifth(2.0 * swing + free),
+    )
+    found = _friction_of_joints(signals, ONE_JOINT)["joint1"]
+    assert found.dynamic == PRECISE(0.45, rel=0.002)
+    assert found.viscous == PRECISE(0.05, rel=0.02)
+
+
+def test_errors_of_the_friction_of_a_motor_have_the_ripple_of_its_amplifier() -> None:
+    """2 % of the torque that holds a weight, 24 times a turn: half of the dry friction of a motor that hardly turns."""
+    time, velocity, angle = repeated_move()
+    load = np.full(len(time), 0.8)
+    parts = {"velocity": velocity, "angle": angle, "load": load, "torque": load + 0.032 * np.sign(velocity)}
+    signals = signals_of(time, **{name: values[:, np.newaxis] for name, values in parts.items()})
+    rippled: Any = SimpleNamespace(commutation=((0.02, 24),), effects=None)
+    smooth, found = (_friction_of_motors(signals, ONE_JOINT, each)["motor1"] for each in (SMOOTH, rippled))
+    assert found.viscous_error > 5.0 * smooth.viscous_error
+    assert found.inertia_error > 10.0 * smooth.inertia_error
+    assert found.dynamic == smooth.dynamic
+
+
+def test_errors_of_a_motor_hold_its_friction_under_a_dither_between_samples_of_its_load() -> None:
+    """Links that a dither of 25 Hz shakes: their torque is a straight line between samples, half a period early."""
+    time, shaken = np.arange(12_000) / 1e3, 2.0 * math.pi * 25.0
+
+    def speed(at: np.ndarray) -> np.ndarray:
+        return np.asarray(6.0 * np.sin(1.3 * at) + 1.5 * np.sin(0.7 * at) + 2.0 * np.sin(shaken * at))
+
+    early = time - 0.5e-3
+    load = 4e-4 * 2.0 * shaken * np.cos(shaken * early)
+    signals = signals_of(
+        time,
+        sampled=np.arange(len(time)) % 5 == 0,
+        velocity=speed(time)[:, np.newaxis],
+        torque=(load + 0.02 * np.sign(speed(early)) + 1e-3 * speed(early))[:, np.newaxis],
+        load=every_fifth(load),
+    )
+    found = _friction_of_motors(signals, ONE_JOINT, SMOOTH)["motor1"]
+    assert abs(found.viscous - 1e-3) < 3.0 * found.viscous_error
+    assert abs(found.dynamic - 0.02) < 3.0 * found.dynamic_error
+
+
+def test_what_is_not_determined_does_not_depend_on_the_text_of_a_note() -> None:
+    found = Friction(*[0.1] * 5, *[0.001] * 4, 3, 0.1, 0.1)
+    signals: Any = signals_of(np.arange(3.0), load_from=f"gauges, {NOT_IDENTIFIABLE}")
+    recording: Any = SimpleNamespace(lacking=lambda *names: ())
+    section = _friction_section(recording, WAM, signals, {"motor1": found}, {})
+    assert not any("Not determined" in one for one in section.sentences)
+    unsure = _friction_section(recording, WAM, signals, {"motor1": found._replace(static_error=math.inf)}, {})
+    assert any("Not determined by this recording: motor1: static friction;" in one for one in unsure.sentences)
+
+
+def test_dry_friction_of_one_direction_is_marked_as_such() -> None:
+    found = Friction(*[0.1] * 5, *[0.001] * 4, 3, 0.1, 0.1)
+    both, one = (
+        _friction_findings("motor1", some, (0.1,) * 3, "")[1] for some in (found, found._replace(offset=math.nan))
+    )
+    assert "one direction" not in both.note
+    assert "one direction" in one.note

@@ -18,7 +18,6 @@ from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recorded import PredictionParameters
 from wam_description.arm import Arm
-from wam_description.effects import Effects
 
 Numbers = NDArray[np.float64]
 
@@ -32,6 +31,7 @@ FAINT = 3.0  # times the median order; smaller ripple is not reported
 SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
 UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable"
+ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
 DROWNED = 10.0  # times the torque of the cables; rotors that take more hide every loss
 IMPOSSIBLE = 3.0  # standard errors below zero
@@ -64,7 +64,7 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
         about = _friction_section(recording, arm, signals, {}, joints)
         about = about._replace(sentences=(drowned, *about.sentences))
         return MotionFindings((stick, about, frequency_section(recording, arm)), None, {}, {})
-    friction = _friction_of_motors(signals, arm, effects)
+    friction = _friction_of_motors(signals, arm, recording.parameters)
     ripple = _ripples(signals, arm, friction)
     sections = (
         stick,
@@ -136,51 +136,70 @@ def _stick_sentence(name: str, phases: Phases) -> str:
 # friction
 
 
-def _friction_of_motors(signals: TransmissionSignals, arm: Arm, effects: Effects | None) -> dict[str, Friction]:
-    """Of the motors; their cogging may be part of what was measured at some angles, and adds to the errors."""
-    free, found = signals.torque - signals.load, {}
-    for i, name in enumerate(arm.motors.names):
-        alone = _possible(
+def _friction_of_motors(
+    signals: TransmissionSignals, arm: Arm, parameters: PredictionParameters
+) -> dict[str, Friction]:
+    """Of the motors; what only the size is known of may be part of what was measured, and adds to the errors.
+
+    Their torque is that of the period that ends at its stamp, and so is their velocity here.
+    """
+    free = signals.torque - signals.load
+    velocity = signals.velocity.copy()
+    velocity[1:] = 0.5 * (signals.velocity[1:] + signals.velocity[:-1])
+    return {
+        name: _possible(
             identify_friction(
                 signals.time,
-                signals.velocity[:, i],
+                velocity[:, i],
                 free[:, i],
                 MOTOR_REST,
                 WINDOW,
                 signals.use,
-                waves=_waves(signals.angle[:, i], name, effects),
+                waves=np.hstack([_waves(signals, i, name, parameters), _unrecorded(signals, i)]),
             )
         )
-        cogging = effects.ripple(name) / math.sqrt(2.0) if effects else 0.0  # N m, rms
-        static_error, dynamic_error = math.hypot(alone.static_error, cogging), math.hypot(alone.dynamic_error, cogging)
-        found[name] = alone._replace(static_error=static_error, dynamic_error=dynamic_error)
-    return found
+        for i, name in enumerate(arm.motors.names)
+    }
 
 
-def _waves(angle: Numbers, shaft: str, effects: Effects | None) -> Numbers | None:
-    """Both quadratures of each configured ripple of a motor, (k, 2 w), N m, rms over phases that are not known."""
-    if effects is None:
-        return None
-    ripples = effects.ripples
-    every = zip(ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, strict=True)
-    own = [
-        ratio * amplitude / math.sqrt(2.0) * wave(cycles * ratio * angle)
-        for name, ratio, amplitude, cycles in every
-        if name == shaft
-        for wave in (np.sin, np.cos)
+def _waves(signals: TransmissionSignals, motor: int, shaft: str, parameters: PredictionParameters) -> Numbers:
+    """Both quadratures of each configured ripple of a motor and its amplifier, (k, 2 w), N m, rms over the phases."""
+    angle, torque, effects = signals.angle[:, motor], signals.torque[:, motor], parameters.effects
+    waves: list[tuple[Numbers | float, float]] = [
+        (fraction * torque, cycles) for fraction, cycles in parameters.commutation[motor : motor + 1]
     ]
-    return np.column_stack(own) if own else None
+    if effects is not None:
+        ripples = effects.ripples
+        every = zip(ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, strict=True)
+        waves += [(ratio * amplitude, ratio * cycles) for name, ratio, amplitude, cycles in every if name == shaft]
+    both = [size / math.sqrt(2.0) * wave(cycles * angle) for size, cycles in waves for wave in (np.sin, np.cos)]
+    return np.column_stack(both) if both else np.empty((len(angle), 0))
+
+
+def _unrecorded(signals: TransmissionSignals, motor: int) -> Numbers:
+    """What a motor's load may differ by from the recorded one, (k, 2), N m: within a period, and between its samples.
+
+    It is that of an instant within half a period of the middle of one. A straight line is off a curve by a twelfth of
+    the curvature times the squared interval, in the mean.
+    """
+    period = float(np.median(np.diff(signals.time)))
+    interval = period / max(float(np.mean(signals.sampled)), period)
+    rate = np.gradient(signals.load[:, motor], signals.time)
+    return np.column_stack([0.5 * period * rate, interval**2 / 12.0 * np.gradient(rate, signals.time)])
 
 
 def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
-    """Of the joints: torque of the cables less that on the links; needs both."""
-    free = signals.cable_torque - signals.strain
+    """Of the joints: torque of the cables less that on the links, at the instants at which the former was recorded.
+
+    Between these it is interpolated and lacks what the cables swing by, which is more than friction changes by.
+    """
+    rows = signals.sampled
+    time, velocity, use = signals.time[rows], signals.joint_velocity[rows], signals.use[rows]
+    free = signals.cable_torque[rows] - signals.strain[rows]
     if signals.load_from != CABLE or not np.any(np.isfinite(free)):
         return {}
     return {
-        name: _possible(
-            identify_friction(signals.time, signals.joint_velocity[:, i], free[:, i], JOINT_REST, WINDOW, signals.use)
-        )
+        name: _possible(identify_friction(time, velocity[:, i], free[:, i], JOINT_REST, WINDOW, use))
         for i, name in enumerate(arm.joints.names)
     }
 
@@ -221,7 +240,12 @@ def _friction_section(
         for name, found in {**friction, **joints}.items()
         if name in seen
     ]
-    unsure = [one.name for one in findings if NOT_IDENTIFIABLE in one.note]
+    unsure = [
+        _named(name, kind)
+        for name, found in {**friction, **joints}.items()
+        for kind, _, value, error in _numbers(found)
+        if not _is_identified(value, error)
+    ]
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
     still = [name for name in {**friction, **joints} if name not in seen]
@@ -267,25 +291,34 @@ def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
     return own[0], own[1], own[2]
 
 
+def _numbers(found: Friction) -> tuple[tuple[str, str, float, float], ...]:
+    """Kind, unit, value and standard error of each friction of a shaft."""
+    return (
+        ("static", "N m", found.static, found.static_error),
+        ("dynamic", "N m", found.dynamic, found.dynamic_error),
+        ("viscous", "N m s/rad", found.viscous, found.viscous_error),
+    )
+
+
+def _named(shaft: str, kind: str) -> str:
+    return f"{shaft}: {kind} friction"
+
+
 def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
     """Of one shaft."""
-    static, dynamic, viscous = configured
-
-    def one(kind: str, unit: str, value: float, error: float, predicted: float, first: str = "") -> Finding:
+    about = {"static": f"{found.breakaways} breakaways"}
+    if math.isnan(found.offset) and math.isfinite(found.dynamic):
+        about["dynamic"] = ONE_WAY
+    findings = []
+    for (kind, unit, value, error), predicted in zip(_numbers(found), configured, strict=True):
         identified = _is_identified(value, error)
-        deviation = f"+-{shown(error)}" if math.isfinite(error) and identified else ""
+        deviation = f"+-{shown(error)}" if math.isfinite(error) else ""
         if not identified:
-            deviation = NOT_IDENTIFIABLE
-            deviation += f": {shown(value)} +-{shown(error)}" if math.isfinite(error) else ""
-        text = "; ".join(filter(None, (first, deviation, note)))
-        measured = value if identified else math.nan
-        return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
-
-    return [
-        one("static", "N m", found.static, found.static_error, static, f"{found.breakaways} breakaways"),
-        one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
-        one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
-    ]
+            deviation = f"{NOT_IDENTIFIABLE}: {shown(value)} {deviation}" if deviation else NOT_IDENTIFIABLE
+        text = "; ".join(filter(None, (about.get(kind), deviation, note)))
+        stated = (value, error) if identified else (math.nan, math.nan)
+        findings.append(Finding(_named(name, kind), unit, stated[0], predicted, text, stated[1]))
+    return findings
 
 
 # ripple

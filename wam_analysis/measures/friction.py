@@ -14,6 +14,7 @@ Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FEWEST = 20  # samples in motion that are needed
+AGREEING = 3  # breakaways of which the least is taken for the highest: no single one decides
 STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
 PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
@@ -33,15 +34,16 @@ class Friction(NamedTuple):
     Attributes
     ----------
     static : torque at which the shaft breaks away, median over the breakaways.  Those nearer to dynamic
-        friction than to the upper quartile are left out: what moves off at less was not quite at rest.
+        friction than to the third highest are left out: what moves off at less was not quite at rest.
     dynamic : torque of dry friction in motion.
     viscous : torque per velocity.
     inertia : torque per acceleration.
     offset : torque that does not change its sign.
     static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four; three of them hold
         the truth also where there are few breakaways or motions.  That of `static` is at least half of its rise above
-        `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often as you like.
-        NaN of fewer than three breakaways.
+        `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often as you like;
+        and at least what the torque changes by in a period before a breakaway: it may be as much again until the shaft
+        slips.  Infinite where the torque rises by no more than it scatters in motion.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
     unexplained : the same as a share of the rms of that torque about its mean.
@@ -89,8 +91,7 @@ def identify_friction(
     load : (n, k), torques of unknown size that also act, as those of a weight over the angle; None for none.  Their
         part is identified in motion and taken off.
     waves : (n, k), N m, torques of which only the rms is known: each acts with a factor of unknown sign and about one,
-        as the two quadratures of a cogging over the angle.  What they can change is part of the errors of `dynamic`,
-        `viscous` and `inertia`; None for none.
+        as the two quadratures of a cogging over the angle.  What they can change is part of all errors; None for none.
 
     Returns
     -------
@@ -112,22 +113,10 @@ def identify_friction(
     solution, errors, left = _in_motion(velocity, torque, acting, unknown, rest, half, period, allowed)
     dynamic, viscous, inertia, offset = solution[:4]
     free = torque - acting @ np.nan_to_num(np.array(solution[4:])) - (0.0 if math.isnan(offset) else offset)
-    statics = _breakaways(velocity, free, rest, 2 * half, allowed)
-    if math.isfinite(dynamic):
-        statics = statics[statics >= dynamic]  # what moved at less was creeping
-        middle = (dynamic + float(np.percentile(statics, 75.0))) / 2.0 if len(statics) else math.nan
-        statics = statics[statics >= middle]
-    else:
-        statics = statics[:0]  # it never slid: what ended its rest was no breakaway
-    static = float(np.median(statics)) if len(statics) else math.nan
-    error = math.nan
-    if len(statics) > 2:
-        scatter = 1.4826 * float(np.median(np.abs(statics - static)))
-        alike = _few(len(statics) - 1.0) * scatter / math.sqrt(len(statics))
-        error = math.hypot(alike, CREEP * (static - dynamic), NEGLECTED * static)
-    return Friction(
-        static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), *left
+    static, error, count = _static(
+        _breakaways(velocity, free, rest, 2 * half, allowed), dynamic, math.hypot(errors[0], left[0]), unknown
     )
+    return Friction(static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], count, *left)
 
 
 _NAN = math.nan
@@ -327,7 +316,36 @@ def _few(freedom: float) -> float:
     return math.sqrt(n * math.expm1(deviate**2 / n)) / SIGMAS
 
 
-def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> Numbers:
+class _Breakaways(NamedTuple):
+    """Ends of sticks, (k,): torque in the direction of the slip, its larger change in the last two periods, row."""
+
+    torque: Numbers
+    step: Numbers
+    row: NDArray[np.int64]
+
+
+def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) -> tuple[float, float, int]:
+    """Static friction, its standard error and the number of breakaways that count.
+
+    A shaft that creeps carries dynamic friction, about which the torque scatters by `noise`: breakaways that rise by no
+    more may all be of a shaft that never stuck, and the error is infinite.  The part of `waves` in it is in the error.
+    """
+    near = found.torque >= dynamic  # what moved at less was creeping; where it never slid, it was no breakaway
+    if not np.any(near):
+        return math.nan, math.nan, 0
+    count = found.torque >= (dynamic + float(np.min(np.sort(found.torque[near])[-AGREEING:]))) / 2.0
+    torque = found.torque[count]
+    static = float(np.median(torque))
+    wave = float(np.sqrt(np.mean(np.sum(waves[found.row[count]] ** 2, axis=1))))
+    if not static - dynamic > SIGMAS * math.sqrt(max(noise**2 - wave**2, 0.0)):
+        return static, math.inf, len(torque)
+    scatter = 1.4826 * float(np.median(np.abs(torque - static)))
+    alike = _few(len(torque) - 1.0) * scatter / math.sqrt(len(torque))
+    step = float(np.median(found.step[count]))
+    return static, math.hypot(alike, CREEP * (static - dynamic), step, wave), len(torque)
+
+
+def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> _Breakaways:
     """Torque against the rest at the end of each stick, with the sign of the slip that follows."""
     sd = noise(velocity[np.abs(velocity) <= rest])
     phases = stick_slip_phases(velocity, max(3.0 * sd, STILL * rest), max(window // 4, 1))
@@ -340,10 +358,13 @@ def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, al
         still = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, STILL * rest))
         last = int(begin + still[-1]) + 1 if len(still) else int(begin)
         first = max(int(begin), last - length)
-        if int(end) not in begins or last - first < 4 or not np.all(allowed[first:last]):
-            continue
-        found.append(begins[int(end)] * _end_of_line(torque[first:last]))
-    return np.array(found, dtype=np.float64)
+        # counts of an encoder in these rows are too few for a motion, and still one
+        is_stuck = np.all(allowed[first:last]) and np.all(np.abs(velocity[first:last]) <= rest)
+        if int(end) in begins and last - first >= 4 and is_stuck:
+            step = float(np.max(np.abs(np.diff(torque[last - 3 : last]))))
+            found.append((begins[int(end)] * _end_of_line(torque[first:last]), step, last - 1))
+    torques, steps, rows = np.array(found, dtype=np.float64).reshape(-1, 3).T
+    return _Breakaways(torques, steps, rows.astype(np.int64))
 
 
 def _end_of_line(values: Numbers) -> float:
