@@ -1,5 +1,6 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -25,6 +26,7 @@ from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.status import DONE
 from wam_sim.recording import RecordedRun
 
+OF_THE_START = "predicted for the parameters at the start, which were changed"
 MOST_CHANGES = 4  # of parameters that are named
 LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
@@ -127,7 +129,10 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     progress("forces and contacts")
     recording = analysed_run(bag, namespace)
     held = held_forces(recording)
-    middle = (force_section(recording, held), cycle_section(recording, held), contact_section(recording))
+    predicted = [
+        _of_the_start(one, recording) for one in (force_section(recording, held), cycle_section(recording, held))
+    ]
+    middle = (*predicted, contact_section(recording))
     progress("friction, ripple, power and frequency")
     motion = motion_sections(recording)
     progress("timing")
@@ -169,6 +174,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     verdict = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
     verdict += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
     verdict += [f"STOPPED: {fault}." for fault in faults]
+    verdict += _changed(recording.run, summary.traces.zero)
     if summary.steps and summary.outcome != DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")
     return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
@@ -202,6 +208,18 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
             f"Changed while it ran: {', '.join(named[:MOST_CHANGES])}{more}. "
             "Predictions and domains of gains are for the values at the start."
         )
+
+
+def _of_the_start(section: Section, recording: AnalysedRun) -> Section:
+    """A section whose predictions are for the parameters at the start, marked where these were changed."""
+    changed = tuple(_changed(recording.run, recording.summary.traces.zero))
+    if not changed:
+        return section
+    findings = tuple(
+        one._replace(note="; ".join(filter(None, (one.note, OF_THE_START)))) if math.isfinite(one.predicted) else one
+        for one in section.findings
+    )
+    return section._replace(sentences=(*changed, *section.sentences), findings=findings)
 
 
 def _brief(note: str) -> str:

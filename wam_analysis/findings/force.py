@@ -7,7 +7,7 @@ import numpy as np
 
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import SHORTEST_HOLD, AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, deviations, shown
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import CYCLING, HeldForce
@@ -22,7 +22,6 @@ from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
-UNLIKE = "The prediction leaves out friction, inertia and feed-forward."
 NO_FORCE = f"No constant force was commanded for {SHORTEST_HOLD:g} s"
 SEEN = 0.02  # of the force; a smaller cycle is not reported
 
@@ -42,9 +41,8 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     range_stated, range_findings = _dynamic_range(held)
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
     verdict = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary), *_forces_verdict(held))
-    flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
     every = (*findings, *range_findings)
-    return Section("force", "Force", (*sentences, *flagged, *range_stated), every, lacking, verdict)
+    return Section("force", "Force", (*sentences, *range_stated), every, lacking, verdict)
 
 
 def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -184,7 +182,7 @@ def _press_findings(one: HeldForce) -> list[Finding]:
         return found
     if one.predicted is not None:
         rise = math.log(9.0) * one.predicted.time_constant
-        note = "predicted without friction, inertia and feed-forward, (5.2)"
+        note = "predicted for the loop alone (5.2): no friction, inertia, feed-forward, limits of the approach"
     else:
         rise, note = math.nan, ""
     if response is not None:
@@ -194,7 +192,9 @@ def _press_findings(one: HeldForce) -> list[Finding]:
             why = f"not measured: it {impact}"
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
-            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note))), late),
+            Finding(
+                f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note))), late, is_ideal=True
+            ),
             Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
             Finding(f"{name}: overshoot", "%", over, note=why),
         ]
