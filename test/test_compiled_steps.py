@@ -118,6 +118,24 @@ def test_a_law_that_changes_in_every_step_is_left_to_python(values: dict[str, An
     assert plant(**values)._advance is None
 
 
+@pytest.mark.parametrize("is_fast", [True, False])
+def test_a_count_is_any_whole_number_above_0(is_fast: bool, with_c: pytest.MonkeyPatch) -> None:
+    """0 gave velocities of 0 in C, and those of the step before in Python."""
+    if not is_fast:
+        with_c.setitem(sys.modules, NAME, None)
+    made = plant()
+    assert (made._advance is not None) == is_fast
+    made.step([0.1] * 4, np.int64(2))
+    assert made.data.time == pytest.approx(0.001)
+    before = made.strain_torque
+    for count in (0, -1):
+        with pytest.raises(ValueError, match=f"count is {count}; it must be 1 or more"):
+            made.step([0.1] * 4, count)
+    with pytest.raises(TypeError, match="float"):
+        made.step([0.1] * 4, 2.0)  # type: ignore[arg-type]
+    assert made.strain_torque == before
+
+
 def test_an_error_of_mujoco_is_an_exception_and_the_next_step_works(with_c: pytest.MonkeyPatch) -> None:
     made = plant()
     made.brake(False)

@@ -612,6 +612,22 @@ def test_cables_tightened_to_a_share_are_those_of_an_arm_with_that_pretension(sh
         assert min(found[0][3::4]) == 0.0
 
 
+@pytest.mark.parametrize("slack", [True, False])
+@pytest.mark.parametrize("shares", [[-1.0], [math.nan], [math.inf], [], [0.5, 0.5]])
+def test_a_pretension_that_is_refused_changes_nothing(shares: list[float], slack: bool) -> None:
+    """A negative one was refused, or not without slack, and remained."""
+    plant = plant_of(damped(one_joint()), slack=slack, tension_friction=(1e-4,), creep=True)
+    plant.set_pretension([0.5])
+    before = repr((plant.tensions, plant.data.plastic.tolist(), plant._friction.levels, plant._circuits.each))
+    with pytest.raises(
+        ValueError, match=r"the parts of the pretension are .*; give one for all or one for each of 1 c"
+    ):
+        plant.set_pretension(shares)
+    plant.set_pretension([0.5])
+    after = repr((plant.tensions, plant.data.plastic.tolist(), plant._friction.levels, plant._circuits.each))
+    assert after == before
+
+
 @pytest.mark.slow
 def test_active_pretension_lowers_the_least_force_and_a_large_one_needs_it_back() -> None:
     """6.5: a delicate task with a fifth of the pretension, a strong one with all of it, on one plant."""

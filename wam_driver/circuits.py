@@ -68,8 +68,19 @@ class CableCircuits:
         self._move_ends(self._nominal, self._circuits)
 
     def tighten(self, shares: Sequence[float]) -> tuple[Circuit, ...]:
-        """Set the pretension of each circuit (6.5), parts of the configured one, (n,); the circuits with it."""
+        """Set the pretension of each circuit (6.5), parts of the configured one, (n,); the circuits with it.
+
+        Raises
+        ------
+        ValueError
+            for a part that is below 0, or for another number of them; nothing is changed then.
+        """
         before = self._circuits
+        if len(shares) != len(before) or not all(0.0 <= share < math.inf for share in shares):
+            raise ValueError(
+                f"the parts of the pretension are {shares}; give one for all or one for each of {len(before)} "
+                "circuits, 0 or above"
+            )
         self._circuits = tuple(
             circuit._replace(pretension=share * circuit.pretension)
             for circuit, share in zip(self._nominal, shares, strict=True)

@@ -4,7 +4,7 @@ import ctypes
 import importlib
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, SupportsIndex
 
 import mujoco
 
@@ -14,7 +14,7 @@ from wam_driver.loads import AppliedPush
 from wam_driver.surfaces import SHARPNESS, SMALLEST_DEPTH, SurfaceLaw
 
 # `advance` of fast_steps.c, without its first argument
-Advance = Callable[[int, bool, Callable[[], object]], list[float]]
+Advance = Callable[[SupportsIndex, bool, Callable[[], object]], list[float]]
 
 
 def compiled_steps(

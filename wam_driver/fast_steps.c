@@ -202,7 +202,7 @@ static PyObject *prepare(PyObject *Py_UNUSED(self), PyObject *args) {
 
 PyDoc_STRVAR(advance_doc,
              "advance(prepared, count, is_set, set_friction)\n\n"
-             "Advance by `count` steps; the velocities of rotors and joints at the start of the last one, rad/s.\n"
+             "Advance by `count` steps, 1 or more; the velocities of rotors and joints at the start of the last one, rad/s.\n"
              "`prepared`: of `prepare`.  `is_set`: whether MuJoCo has the levels of friction.");
 
 static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ssize_t given) {
@@ -213,6 +213,7 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
   const Plant *plant = PyCapsule_GetPointer(args[0], PREPARED);
   const long count = plant ? PyLong_AsLong(args[1]) : -1;
   if (PyErr_Occurred()) return NULL;
+  if (count < 1) return PyErr_Format(PyExc_ValueError, "count is %ld; it must be 1 or more", count);
   mjData *data = plant->data;
   PyObject *was_slack = PyObject_GetAttrString(plant->circuits, "is_slack");
   if (!was_slack) return NULL;

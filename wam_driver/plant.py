@@ -10,7 +10,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import partial
+from operator import index
 from struct import Struct
+from typing import SupportsIndex
 
 import mujoco
 import numpy as np
@@ -236,24 +238,35 @@ class Plant:
         self._is_set = False
 
     def set_pretension(self, shares: Sequence[float]) -> None:
-        """Set the pretension of each circuit now (6.5), one part of the configured one for all, or one each, (n,)."""
+        """Set the pretension of each circuit now (6.5), one part of the configured one for all, or one each, (n,).
+
+        Raises
+        ------
+        ValueError
+            for a part that is below 0, or for another number of them; nothing is changed then.
+        """
         before = self._plastic.copy()
         self._friction.set_circuits(self._circuits.tighten(list(shares) if len(shares) > 1 else [*shares] * self._n))
         position, plastic = self._kept
         self._kept = position, (plastic + (self._plastic - before)).tolist()
         self._is_set = False
 
-    def step(self, torque: Sequence[float], count: int = 1) -> None:
+    def step(self, torque: Sequence[float], count: SupportsIndex = 1) -> None:
         """Advance by one step or several.
 
         Parameters
         ----------
         torque : torque of each motor on its rotor, N m.
-        count : number of steps with this torque.
+        count : number of steps with this torque, 1 or more.
+
+        Raises
+        ------
+        ValueError
+            for another number of steps.
         """
         self._write_torque(0, *torque)
         if self._advance is None:
-            self._velocity = self._advance_in_python(count)
+            self._velocity = self._advance_in_python(_whole(count))
         else:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
 
@@ -396,6 +409,14 @@ class Plant:
     def objects(self) -> list[ObjectState]:
         """The true state of every free body, door and moving obstacle, in the order of `World.objects`."""
         return self._objects.measure()
+
+
+def _whole(count: SupportsIndex) -> int:
+    """A number of steps; the steps in C refuse the same ones."""
+    steps = index(count)
+    if steps < 1:
+        raise ValueError(f"count is {steps}; it must be 1 or more")
+    return steps
 
 
 def _unheard(_: str) -> None:
