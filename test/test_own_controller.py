@@ -488,6 +488,7 @@ class Careless(Echo):
         (State([], [], [True] * 4), "cannot be sent: effort has True; return floats"),
         (State([], [], np.full(4, True)), "cannot be sent: effort has np.True_; return floats"),  # type: ignore[arg-type]
         (State([], [], b"abcd"), "cannot be sent: effort is b'abcd'; return a list of floats"),  # type: ignore[arg-type]
+        (State([], [], memoryview(b"abcd")), "cannot be sent: effort is <memory at"),  # type: ignore[arg-type]
         (State([], [], {1.0}), "cannot be sent: effort is {1.0}; return a list of floats"),  # type: ignore[arg-type]
         (State([], [], None), "cannot be sent: effort is None; return a list of floats"),  # type: ignore[arg-type]
     ],

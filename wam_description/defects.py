@@ -87,7 +87,7 @@ def _float(name: str, value: Any) -> float:
 
 
 def _listed(name: str, values: Any, of: str = "floats") -> Iterable[Any]:
-    if isinstance(values, (str, bytes, bytearray, Set, Mapping)) or not isinstance(values, Iterable):
+    if isinstance(values, (str, bytes, bytearray, memoryview, Set, Mapping)) or not isinstance(values, Iterable):
         raise TypeError(f"{name} is {values!r}; return a list of {of}")
     return values
 
