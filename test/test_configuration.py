@@ -125,6 +125,10 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
         ("/**:\n  ros__parameters:\n    a: &a {b: [*a]}", r"is not YAML: \*a is inside of what it refers to"),
         ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
+        (
+            "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",
+            "section '/.*': 'a.b' is empty; give it a value, or leave it",
+        ),
         ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
@@ -249,6 +253,7 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
         ("base: nothing\n", "no configuration 'nothing' comes with wam_stack"),
         ("base: odd.yaml\n", "base is the file itself"),
         ("base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n", r"section '/\*\*/drivr' is of no node in 'nodes'"),
+        ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
         ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
         ("base: wam\ndriver: {ros__parameters: {}}\n", "section 'driver' is not allowed"),
     ],
@@ -292,6 +297,21 @@ def test_an_outer_period_after_which_every_input_is_absent_is_refused(divisor: i
     with pytest.raises(ParameterError, match=f"ages.feedback is {age} s, less than an outer period, 0.0"):
         WAM.with_values(values).shared  # noqa: B018 - refuses
     assert WAM.with_values({**values, "ages.feedback": divisor * 1e-3}).shared.ages.feedback == divisor * 1e-3
+
+
+def test_a_section_may_be_empty(tmp_path: Path) -> None:
+    """That of a node without parameters is."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: wam\n/**/gravity: {ros__parameters: {}}\n/**: {ros__parameters: {}}\n")
+    assert Configuration.load(path).sections == WAM.sections
+
+
+@pytest.mark.parametrize("factor", [1e-300, 9e-4])
+def test_a_real_time_factor_at_which_nothing_seems_to_move_is_refused(factor: float) -> None:
+    """The driver ended with a traceback of rclpy, whose timers count nanoseconds."""
+    with pytest.raises(ParameterError, match=r"timing.real_time_factor is .*; allowed: 0.001 to 100, or 0 for as fast"):
+        _ = WAM.with_values({"timing.real_time_factor": factor}).shared
+    assert WAM.with_values({"timing.real_time_factor": 0.001}).shared.timing.real_time_factor == 0.001
 
 
 def test_a_configuration_without_nodes_is_refused() -> None:
@@ -376,7 +396,7 @@ def test_a_text_that_looks_like_a_number_is_refused_with_what_to_write(value: st
     assert str(refusal.value) == f"step 1: seconds is {read!r}; it must be a finite number{hint}"
 
 
-@pytest.mark.parametrize("value", [{}, {"a": 1}, {"a"}, b"a", "a"])
+@pytest.mark.parametrize("value", [{}, {"a": 1}, {"a"}, b"a", bytearray(b"a"), memoryview(b"a"), "a"])
 def test_what_is_no_list_is_none_for_a_parameter_either(value: Any) -> None:
     with pytest.raises(ParameterError, match=r"parameter 'names' is .*; it must be a list of str"):
         build(Loop, {"gain": 1.0, "names": value})

@@ -8,7 +8,7 @@ from wam_control.scenario_values import known, require_list
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
-from wam_description.parameters import ParameterError, build, checked, fields, flatten, meant, require
+from wam_description.parameters import ParameterError, build, checked, fields, given_once, meant, require
 from wam_description.wiring import declaration
 
 NONE: Final[Mapping[str, Any]] = MappingProxyType({})
@@ -42,7 +42,7 @@ def settings_of(where: str, body: Any, shared: Shared, controllers: Mapping[str,
     for node, values in body.items():
         require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
         live = {field.name: field for field in fields(_parameter_class(where, node, shared, controllers)) if field.live}
-        for name, value in flatten(values).items():
+        for name, value in given_once(f"{where}: set, {node}", values).items():
             has = meant(name, live).strip() or f"it has: {', '.join(sorted(live)) or 'none'}"
             require(
                 name in live,
@@ -62,8 +62,12 @@ def checked_settings(
     for one in settings:
         is_named = isinstance(one, Setting) and isinstance(one.node, str) and isinstance(one.name, str)
         require(is_named, f"{where}: settings has {one!r}; give Setting(node, name, value), node and name as texts")
-    found = (settings_of(where, {node: {name: value}}, shared, controllers) for node, name, value in settings)
-    return tuple(one for of_one in found for one in of_one)
+    found: dict[tuple[str, str], Setting] = {}
+    for node, name, value in settings:
+        for one in settings_of(where, {node: {name: value}}, shared, controllers):
+            require(one[:2] not in found, f"{where}: set, {node}: '{one.name}' is given twice; remove one")
+            found[one[:2]] = one
+    return tuple(found.values())
 
 
 def require_settings(

@@ -18,6 +18,7 @@ from wam_description.parts import Joints, Links, Motors, distinct
 from wam_description.units import STANDARD_GRAVITY
 
 LARGEST_CONDITION = 1e8  # of joint_from_motor
+SLOWEST = 1e-3  # of timing.real_time_factor: 1 s of the arm takes 17 min, and a period of 0.1 s nearly two
 TOLERANCE = 1e-3  # m, by which numbers that describe the same point may differ
 
 
@@ -253,8 +254,8 @@ class Timing:
     )
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     real_time_factor: float = parameter(
-        "simulated time per time of the wall clock in lockstep, which is slower where the machine is; "
-        "0: as fast as it can",
+        "simulated time per time of the wall clock in lockstep, which is slower where the machine is; 0.001 at "
+        "least, or 0: as fast as it can",
         low=0.0,
         high=100.0,
         before=0.0,
@@ -271,6 +272,13 @@ class Timing:
         high=49,
         before=0,
     )
+
+    def __post_init__(self) -> None:
+        factor = self.real_time_factor
+        require(
+            factor == 0.0 or factor >= SLOWEST,
+            f"timing.real_time_factor is {factor:g}; allowed: {SLOWEST:g} to 100, or 0 for as fast as it can",
+        )
 
     @cached_property
     def period_ns(self) -> int:

@@ -4,7 +4,6 @@ import difflib
 import hashlib
 import os
 import sys
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +13,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, dotted, fields, listed, nested
+from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested
 
 T = TypeVar("T")
 SHARED = "/**"
@@ -337,12 +336,7 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
             raise ParameterError(
                 f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"
             )
-        values = list(dotted(body[PARAMETERS]))
-        if twice := [one for one, count in Counter(one for one, _ in values).items() if count > 1]:
-            raise ParameterError(
-                f"{path}: section '{key}': '{twice[0]}' is given twice, with dots and without; remove one"
-            )
-        sections[name] = dict(values)
+        sections[name] = given_once(f"{path}: section '{key}'", body[PARAMETERS])
     return _frozen(sections)
 
 

@@ -9,7 +9,6 @@ import contextlib
 import dataclasses
 import difflib
 import math
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
@@ -153,12 +152,28 @@ def flatten(tree: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def dotted(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of a nested mapping, each as often as it is given."""
+    """Dotted names and values of a nested mapping, each as often as it is given; an empty group is a value."""
     for key, value in tree.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value:
             yield from dotted(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
+
+
+def given_once(where: str, tree: Mapping[str, Any]) -> dict[str, Any]:
+    """A nested mapping as a flat one with dotted names; refused where a name is given twice, or a group is empty.
+
+    Raises
+    ------
+    ParameterError
+        begins with `where`: file and section, or step.
+    """
+    found: dict[str, Any] = {}
+    for name, value in dotted(tree):
+        require(name not in found, f"{where}: '{name}' is given twice, with dots and without; remove one")
+        require(not isinstance(value, Mapping), f"{where}: '{name}' is empty; give it a value, or leave it out")
+        found[name] = value
+    return found
 
 
 def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -261,7 +276,7 @@ def checked(field: Field, value: Any) -> Value:
         names the parameter, the value and what is allowed.
     """
     if field.is_array:
-        if isinstance(value, (str, bytes, Mapping, Set)) or not hasattr(value, "__iter__"):
+        if isinstance(value, (str, bytes, bytearray, memoryview, Mapping, Set)) or not hasattr(value, "__iter__"):
             raise ParameterError(
                 f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}{as_number(value)}"
             )
@@ -293,7 +308,10 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
 
 def is_finite(value: float) -> bool:
     """Whether a number is finite, as a float also where it is an int of hundreds of digits."""
-    return abs(value) <= sys.float_info.max
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def require(condition: bool, message: str) -> None:
