@@ -83,6 +83,15 @@ def test_times_and_velocities_are_kept() -> None:
         ([PathPoint(tuple(START), (), 1.0), PathPoint(tuple(START), (), 0.5)], "have to rise"),
         ([PathPoint((0.1, -1.2, 0.2, 0.3), (0.1, 0.0, 0.0, 0.0), 1.0)], "has to end at rest"),
         ([], "no points"),
+        ([PathPoint((0.0, -1.2, 0.2, 0.3), (1e300, 0.0, 0.0, 0.0), 1e9)], "allowed: 1e-06 to 1e.06 s between them"),
+        (
+            [PathPoint((0.0, -1.2, 0.2, 0.3), (0.0, -1e308, 0.0, 0.0), 9.0)],
+            "joint2 of the trajectory reaches 1e.308 rad/s",
+        ),
+        (
+            [PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0), PathPoint((0.0, -1.2, 0.2, 0.3), (), 1.0 + 1e-9)],
+            "1e-09 s after",
+        ),
     ],
 )
 def test_a_trajectory_beyond_the_limits_is_refused_with_the_number(points: list[PathPoint], reason: str) -> None:

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -492,6 +493,11 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
         ({"force_loop": {"posture_gian": 1.0}}, "no parameter 'posture_gian' that may change while it runs; did you "),
         ({"force_loop": {"posture_gian": 1.0}}, r"did you mean 'posture_gain'\?$"),
         ({"driver": {"seed": 3}}, "set, driver: it has no parameter 'seed' that may change while it runs; it has: eff"),
+        ({"force_loop": {"forc_gain": {}}}, "set, force_loop: 'forc_gain' is empty; give it a value, or leave it out"),
+        (
+            {"force_loop": {"limits.settling_time": 1.0, "limits": {"settling_time": 2.0}}},
+            "set, force_loop: 'limits.settling_time' is given twice, with dots and without; remove one",
+        ),
     ):
         with pytest.raises(ParameterError, match=f"{tmp_path}/one.yaml, step 1: .*{reason}"):
             read(set=body)
@@ -526,6 +532,26 @@ def test_a_posture_that_the_force_loop_cannot_follow_is_refused(
     held = [name for name in CONFIGURATION.shared.nodes if name != "force_loop"]
     path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.35, "posture": GOAL}]})
     load_for(CONFIGURATION.with_values({"nodes": held, "force_loop:joint_speed_limit": 0.1}), str(path))
+
+
+def test_a_posture_in_the_shortest_time_there_is_is_refused_with_the_time_that_it_takes(tmp_path: Path) -> None:
+    path = write(tmp_path, {"steps": [{"name": "go", "seconds": 5e-324, "posture": [*START[:3], 0.7]}]})
+    with pytest.raises(ParameterError, match=r"at up to inf rad/s; .*; give the step at least 0.2 s"):
+        load_for(CONFIGURATION, str(path))
+
+
+def test_a_posture_is_refused_where_no_joint_may_turn(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"joint4 goes from .* force_loop:joint_speed_limit, 0 rad/s; raise it"):
+        load_for(CONFIGURATION, quick(tmp_path, 1.0, 0.0))
+
+
+@pytest.mark.parametrize("time", ["1.0e-150", "1.0e+150"])
+def test_a_time_of_a_trajectory_that_nothing_is_computed_with_is_refused(time: str, tmp_path: Path) -> None:
+    text = "steps: [{name: go, seconds: 1.0, trajectory: {postures: [[0.0, -0.5, 0.0, 0.5]], times: [TIME]}}]"
+    with pytest.raises(
+        ParameterError, match=r"step 'go': a point of the trajectory is at .*; allowed: 1e-06 to 1e\+06 s"
+    ):
+        load_for(CONFIGURATION, str(write(tmp_path, text.replace("TIME", time))))
 
 
 @pytest.mark.slow
@@ -605,6 +631,8 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
     assert left(short, 1.5) > left(short, 3.9) + 0.1
 
 
+JOINT = TaskAxis(AxisKind.FORCE, 1, value=1.0)
+SETTLING = Setting("force_loop", "limits.settling_time", cast(Any, 1.0))
 PRESSING = TaskAxis(AxisKind.FORCE, -1, "outer_link", 0.28, (0.0, 0.0, -1.0), 5.0)
 
 
@@ -660,7 +688,7 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
         (task(PRESSING._replace(stiffness=10.0)), "axis 1: stiffness and damping belong to an impedance"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, 9)), "axis 2: joint is 9; allowed: -1 to 3"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, cast(Any, 2.0))), "axis 2: joint is 2.0; allowed: -1 to 3, a wh"),
-        (task(PRESSING._replace(joint=1)), "axis 1: joint is 1, cover 'outer_link', direction .*; give a joint, or a"),
+        (task(PRESSING._replace(joint=1)), "axis 1: joint is 1, cover 'outer_link', .*; give a joint alone, or a link"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is to be at 9.0 rad; allowed"),
         (task(PRESSING, frame="hand"), "frame is 'hand'; allowed: base, inner_link"),
         (
@@ -695,7 +723,35 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
         (path(PosturePath((PathPoint(tuple(GOAL), cast(Any, None)),))), "velocity is None; it must be a list of joint"),
         (path(PosturePath((PathPoint(tuple(GOAL), (0.1,)),))), r"velocity is \(0.1,\); it must be a list of 4 numbers"),
         (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.0, cast(Any, 3))), "aside is 3; it must be"),
+        (
+            ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.0, (5.0, 5.0))),
+            r"aside is \(5, 5\) m; allowed: up to the radius of outer_link, 0.0254 m, from its axis, \(0, 0\) m; leave",
+        ),
         (task(*(), frame=cast(Any, None)), "frame is None; allowed: base"),
+        (task(JOINT._replace(direction=cast(Any, None))), "axis 1: direction is None; it must be a list of 3 numbers"),
+        (task(JOINT._replace(direction=cast(Any, ()))), r"axis 1: direction is \(\); it must be a list of 3 numbers"),
+        (task(JOINT._replace(position=cast(Any, "abc"))), "axis 1: position is 'abc'; it must be a finite number"),
+        (
+            task(JOINT._replace(position=0.3)),
+            "axis 1: joint is 1, cover '', position 0.3, .*; give a joint alone, or a",
+        ),
+        (ScenarioStep("go", cast(Any, np.float32("inf"))), r"seconds is np.float32\(inf\); it must be a finite number"),
+        (
+            ScenarioStep("go", 1.0, force=PRESS, chirp=Chirp(1.0, 1e-300, 2.0)),
+            "chirp goes from 1e-300 to 2 Hz; allowed",
+        ),
+        (ScenarioStep("go", 1.0, force=PRESS, chirp=Chirp(1.0, 1.0, 1e300)), "chirp .*; allowed: 1e-06 to 1e.06 Hz"),
+        (setting("force_loop", "force_gain", {}), "set, force_loop: 'force_gain' is empty; give it a value"),
+        (
+            setting("force_loop", "limits", {"settling_time": 1.0, "settling_time.x": {}}),
+            "set, force_loop: 'limits.settling_time.x' is empty",
+        ),
+        (
+            ScenarioStep(
+                "go", 1.0, settings=(SETTLING, SETTLING._replace(name="limits", value={"settling_time": 2.0}))
+            ),
+            "set, force_loop: 'limits.settling_time' is given twice; remove one",
+        ),
         (
             ScenarioStep("go", 1.0, task=TaskCommand("base", cast(Any, None))),
             "axes of the task is None; it must be a l",
@@ -733,6 +789,62 @@ def test_what_a_step_made_in_python_sets_has_the_types_of_a_file(tmp_path: Path)
     (taken,) = Scenario([made], SHARED).steps
     assert taken == read
     assert str(taken) == str(read), "1 and 1.0 are equal, and ROS takes only one of them"
+
+
+# a step with what Python has for numbers, and the keys of a file with the same
+IN_PYTHON: list[tuple[dict[str, Any], dict[str, Any]]] = [
+    ({"seconds": Fraction(2), "posture": [0, 0, 0, 1]}, {"seconds": 2.0, "posture": [0.0, 0.0, 0.0, 1.0]}),
+    ({"posture": tuple(np.array([0, 0, 0, 1]))}, {"posture": [0.0, 0.0, 0.0, 1.0]}),
+    ({"until_force": np.int64(2)}, {"until_force": 2.0}),
+    ({"tip": [Fraction(1, 2), 0, np.float32(0.25)]}, {"tip": [0.5, 0.0, 0.25]}),
+    (
+        {"trajectory": PosturePath(cast(Any, [PathPoint(cast(Any, GOAL), cast(Any, []))]))},
+        {"trajectory": {"postures": [GOAL]}},
+    ),
+    (
+        {"trajectory": PosturePath((PathPoint(tuple(np.array([0, 0, 0, 1])), (), cast(Any, Fraction(2))),))},
+        {"trajectory": {"postures": [[0.0, 0.0, 0.0, 1.0]], "times": [2.0]}},
+    ),
+    (
+        {"force": ForceCommand("base", cast(Any, [0, 0, -5])), "chirp": Chirp(1, np.int64(2), Fraction(9, 2))},
+        {"force": {"frame": "base", "newtons": [0, 0, -5]}, "chirp": {"newtons": 1, "from": 2, "to": 4.5}},
+    ),
+    (
+        {"push": Push("outer_link", Fraction(1, 4), cast(Any, [0, np.int64(5), 0]), 0, Fraction(1, 2))},
+        {"push": {"cover": "outer_link", "contact_position": 0.25, "newtons": [0, 5, 0], "end": 0.5}},
+    ),
+    (
+        {
+            "task": TaskCommand(
+                "base",
+                cast(
+                    Any,
+                    [TaskAxis(AxisKind.FORCE, -1, "outer_link", Fraction(1, 4), cast(Any, [0, 0, -1]), Fraction(5))],
+                ),
+            )
+        },
+        {"task": {"axes": [{"force": 5, "along": [0, 0, -1], "cover": "outer_link", "contact_position": 0.25}]}},
+    ),
+]
+
+
+@pytest.mark.parametrize(("made", "body"), IN_PYTHON)
+def test_numbers_of_a_step_made_in_python_are_those_of_a_file(
+    made: dict[str, Any], body: dict[str, Any], tmp_path: Path
+) -> None:
+    """Compiled code refuses others with a TypeError, in the middle of the run."""
+    (read,) = load(write(tmp_path, {"steps": [{"name": "go", "seconds": 1.0, **body}]}), SHARED)
+    (taken,) = Scenario([ScenarioStep(**{"name": "go", "seconds": 1.0, **made})], SHARED).steps
+    assert repr(taken) == repr(read), "equal, and of the same types"
+
+
+def test_a_trajectory_of_lists_is_played() -> None:
+    lists = PosturePath(cast(Any, [PathPoint(cast(Any, GOAL), cast(Any, [0] * 4), cast(Any, Fraction(2)))]))
+    run = Simulation(
+        CONFIGURATION, [ScenarioStep("on", 0.1, request="enable"), ScenarioStep("go", 2.0, trajectory=lists)]
+    )
+    assert not run.play()
+    assert run.driver.plant.q == pytest.approx(GOAL, abs=0.05)
 
 
 def test_what_a_step_made_in_python_sets_has_to_fit_the_other_values_of_its_node() -> None:

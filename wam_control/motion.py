@@ -25,6 +25,8 @@ STEEPEST = 15.0  # rad/m, of a joint on a line
 EXACT = 1e-10  # m, of the nodes of a line
 REACHED = 1e-6  # m, between a node and the line; what is further from it is out of reach
 ROUNDING = 1e-9
+UNITS = ("rad/s", "rad/s^2", "rad/s^3")  # of the derivatives of a joint angle
+SHORTEST, LONGEST = 1e-6, 1e6  # s, of a part of a trajectory: its fifth power is a number, too
 THERE = 0.02  # rad, between the arm and the first point of a trajectory, if that is at 0 s
 
 
@@ -168,8 +170,17 @@ class PostureMotion:
                 f"a point of the trajectory is at {point.time:g} s, after one at {before:g} s; the times have to rise "
                 "from above 0, or all be 0",
             )
+            require(
+                SHORTEST <= point.time - before <= LONGEST,
+                f"a point of the trajectory is at {point.time:g} s, {point.time - before:g} s after the one before; "
+                f"allowed: {SHORTEST:g} to {LONGEST:g} s between them",
+            )
+            self._require_within(1, list(map(abs, point.velocity)) or rest)  # what is far beyond has no polynomial
             parts.append(part := _Polynomials(a, rate, b, point.velocity or rest, point.time - before))
-            self._require_within(part)
+            for order in range(1, len(UNITS) + 1):
+                self._require_within(order, part.largest(order))
+            for extreme in part.extremes():
+                self._require_inside(extreme)
             before, rate = point.time, list(point.velocity) or rest
         require(
             not any(rate),
@@ -195,17 +206,16 @@ class PostureMotion:
                 f"{name} of the trajectory is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad",
             )
 
-    def _require_within(self, part: "_Polynomials") -> None:
+    def _require_within(self, order: int, sizes: Sequence[float]) -> None:
+        """Refuse a derivative, of this order and size (n,), that is beyond the limits."""
         limits = (self._limits.joint_speed, self._limits.joint_acceleration, self._limits.joint_jerk)
-        for order, (unit, most) in enumerate(zip(("rad/s", "rad/s^2", "rad/s^3"), limits, strict=True), start=1):
-            for name, largest, limit in zip(self._joints.names, part.largest(order), most, strict=True):
-                require(
-                    largest <= limit * (1.0 + ROUNDING),
-                    f"{name} of the trajectory reaches {largest:.3g} {unit}; allowed: {limit:g} {unit} (motion); give "
-                    f"it {(largest / limit) ** (1.0 / order):.3g} times the time, or no times",
-                )
-        for extreme in part.extremes():
-            self._require_inside(extreme)
+        unit = UNITS[order - 1]
+        for name, size, limit in zip(self._joints.names, sizes, limits[order - 1], strict=True):
+            require(
+                size <= limit * (1.0 + ROUNDING),
+                f"{name} of the trajectory reaches {size:.3g} {unit}; allowed: {limit:g} {unit} (motion); give it "
+                f"{(size / limit) ** (1.0 / order):.3g} times the time, or no times",
+            )
 
 
 class LineMotion:

@@ -9,12 +9,12 @@ from typing import Any, Final, NamedTuple
 import yaml
 
 from wam_control.contact_position import torque_of_position
-from wam_control.motion import GoalMotion, LineMotion, PostureMotion
+from wam_control.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
 from wam_control.posture_watch import BEHIND, CAUGHT_UP
 from wam_control.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
-from wam_control.scenario_values import is_one_of, known, number, numbers, require_list, require_made
+from wam_control.scenario_values import floats, is_one_of, known, number, numbers, require_list, require_made
 from wam_control.task import AxisKind, TaskCommand
-from wam_control.task_text import require_task, task_of_text, torque_task
+from wam_control.task_text import as_of_file, require_task, task_of_text, torque_task
 from wam_description import yaml_text
 from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration, packaged
@@ -50,6 +50,7 @@ REQUESTS = ("", "enable", "disable")
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
+SLOWEST_CHIRP, FASTEST_CHIRP = 1e-6, 1e6  # Hz; their ratio is a number, too
 FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
 Motion = GoalMotion | PostureMotion | LineMotion
 
@@ -74,7 +75,7 @@ class Push(NamedTuple):
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
-    aside: tuple[float, float] | None = None  # m, y and z of the tube's axis there; of the arm by default
+    aside: tuple[float, float] | None = None  # m, y and z where it acts, within the tube; on its axis by default
 
     @property
     def torque(self) -> Triple:
@@ -334,7 +335,8 @@ def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], s
     what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
     if step.posture:
         what = f"goes from {round(start[k], 6) + 0.0:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
-        advice = f"give the step at least {math.ceil(1e3 * (excess * step.seconds - ROUNDING)) / 1e3:g} s"
+        least = FASTEST * abs(step.posture[k] - start[k]) / most if most else 0.0
+        advice = f"give the step at least {math.ceil(1e3 * (least - ROUNDING)) / 1e3:g} s"
         if followed == math.inf:
             advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
     elif step.trajectory is not None and any(point.time for point in step.trajectory.points):
@@ -510,24 +512,29 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
 
 
 def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any]) -> ScenarioStep:
-    """A step made in Python, with values as those of a file have them."""
+    """A step made in Python, with tuples and floats as those of a file have them; compiled code takes no others."""
     _require_step(where, step, shared)
-    force, torque = (_floats(vector) for vector in step.force[1:])
-    step = step._replace(
+    return step._replace(
+        seconds=float(step.seconds),
+        posture=floats(step.posture),
+        until_force=float(step.until_force),
+        force=ForceCommand(step.force.frame, *map(floats, step.force[1:])),
+        push=step.push and _on_axis(_push_of_floats(step.push), shared.arm),
+        chirp=step.chirp and Chirp(*floats(step.chirp)),
         settings=checked_settings(where, step.settings, shared, controllers),
-        force=step.force._replace(force=force, torque=torque),
-        tip=step.tip and _floats(step.tip),
-        posture=_floats(step.posture),
+        task=step.task and as_of_file(step.task),
+        trajectory=step.trajectory and PosturePath(tuple(map(_point_of_floats, step.trajectory.points))),
+        tip=step.tip and floats(step.tip),
     )
-    if not step.push:
-        return step
-    push = step.push._replace(force=_floats(step.push.force), aside=step.push.aside and _floats(step.push.aside))
-    return step._replace(push=_on_axis(push, shared.arm))
 
 
-def _floats(values: Sequence[float]) -> Any:
-    """The numbers of a vector as a tuple, whatever sequence they were given in."""
-    return tuple(map(float, values))
+def _push_of_floats(push: Push) -> Push:
+    begin, end = float(push.begin), float(push.end)
+    return Push(push.cover, float(push.position), floats(push.force), begin, end, push.aside and floats(push.aside))
+
+
+def _point_of_floats(point: PathPoint) -> PathPoint:
+    return PathPoint(floats(point.position), floats(point.velocity), float(point.time))
 
 
 def _require_one(where: str, keys: Sequence[str]) -> None:
@@ -663,6 +670,10 @@ def _require_chirp(where: str, chirp: Chirp) -> None:
     keys = ("newtons", "from", "to")
     _, start, end = (number(where + ", chirp", key, value) for key, value in zip(keys, chirp, strict=True))
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
+    require(
+        start >= SLOWEST_CHIRP and end <= FASTEST_CHIRP,
+        f"{where}: chirp goes from {start:g} to {end:g} Hz; allowed: {SLOWEST_CHIRP:g} to {FASTEST_CHIRP:g} Hz",
+    )
 
 
 def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
@@ -695,7 +706,7 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
     _require_place(where, push, shared.arm)
     numbers(where, "newtons", push.force, 3)
     if push.aside is not None:
-        numbers(where, "aside", push.aside, 2)
+        _require_within_tube(where, push, shared.arm)
     begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
     require(
         0.0 <= begin < end <= seconds + ROUNDING,
@@ -704,3 +715,15 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
     )
     excess = shared.push_excess(push.force, push.torque)
     require(not excess, f"{where}: push: {excess}")
+
+
+def _require_within_tube(where: str, push: Push, arm: Arm) -> None:
+    """Refuse a push outside the tube, where nothing can touch it."""
+    y, z = numbers(where, "aside", push.aside, 2)
+    at_y, at_z = arm.covers.aside(push.cover, push.position)
+    radius = arm.covers.radius_of(push.cover)
+    require(
+        math.hypot(y - at_y, z - at_z) <= radius + ROUNDING,
+        f"{where}: aside is ({y:g}, {z:g}) m; allowed: up to the radius of {push.cover}, {radius:g} m, from its axis, "
+        f"({at_y:.4g}, {at_z:.4g}) m; leave it out for the axis",
+    )

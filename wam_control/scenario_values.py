@@ -33,6 +33,11 @@ def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     return tuple(number(where, key, element) for element in value)
 
 
+def floats(values: Sequence[float]) -> Any:
+    """The numbers of a vector as a tuple, whatever sequence they were given in."""
+    return tuple(map(float, values))
+
+
 def require_made(where: str, key: str, value: Any, kind: Any) -> None:
     """Refuse what is no named tuple of this class; of a step that is made in Python."""
     require(isinstance(value, kind), f"{where}: {key} is {value!r}; give a {kind.__name__}({', '.join(kind._fields)})")

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import pinocchio as pin
 
-from wam_control.scenario_values import is_one_of, known, number, numbers, require_list
+from wam_control.scenario_values import floats, is_one_of, known, number, numbers, require_list
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require
@@ -73,6 +73,18 @@ def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
     checked_task(task, where)
 
 
+def as_of_file(task: TaskCommand) -> TaskCommand:
+    """A task that was made in Python with tuples and floats as one of a file has them."""
+    return task._replace(axes=tuple(_as_of_file(axis) for axis in task.axes))
+
+
+def _as_of_file(axis: TaskAxis) -> TaskAxis:
+    position, value = (None if one is None else float(one) for one in (axis.position, axis.value))
+    rate, stiffness, damping = floats((axis.rate, axis.stiffness, axis.damping))
+    motion = {"value": value, "rate": rate, "stiffness": stiffness, "damping": damping}
+    return axis._replace(position=position, direction=floats(axis.direction), **motion)
+
+
 def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
     """Refuse what no axis of a file can have, then what is not allowed."""
     require(isinstance(axis, TaskAxis), f"{where} is {axis!r}; give a TaskAxis")
@@ -88,10 +100,11 @@ def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
         f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}, a whole number",
     )
     if axis.joint >= 0:
+        place, direction = number(where, "position", axis.position), numbers(where, "direction", axis.direction, 3)
         require(
-            axis.cover == "" and not any(axis.direction),
-            f"{where}: joint is {axis.joint}, cover {axis.cover!r}, direction {axis.direction}; give a joint, or a "
-            "link and a direction",
+            axis.cover == "" and not place and not any(direction),
+            f"{where}: joint is {axis.joint}, cover {axis.cover!r}, position {place:g}, direction {direction}; give a "
+            "joint alone, or a link with position and direction",
         )
     else:
         _cover(where, axis.cover, arm)
