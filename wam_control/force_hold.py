@@ -350,10 +350,7 @@ class ForceHold:
         is_late, limits = parameters.is_estimated and self.share > SLOWED, parameters.limits
         is_faint = is_late and not (limits.surface_speed or limits.slide_speed)  # such a surface swings the force, too
         swing = limits.cycle_force * desired * (FAINT if is_faint else 1.0)
-        if self._bouncing > 0.0:
-            self._turns.reset()
-        self._bouncing -= dt
-        is_cycling = self._turns.step(measured, swing, limits.settling_time, dt) and is_touching
+        is_cycling = self._turns_again(measured, swing, limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         turned = self._has_turned(axis, external, measured, desired, parameters, dt)
         if is_late and is_touching and self._turns.count > FEW:
@@ -364,6 +361,13 @@ class ForceHold:
         found += [(ForceReaction.NOT_REACHED, missed)] if missed else []
         found += [(ForceReaction.NOT_EXPLAINED, turned)] if turned else []
         return found or [self._doubted(case, force_sd, unexplained, parameters)]
+
+    def _turns_again(self, measured: float, least: float, window: float, dt: float) -> bool:
+        """Whether the measured force turns back again and again, as `Reversals.step`, and not by an impact."""
+        if self._bouncing > 0.0:
+            self._turns.reset()
+        self._bouncing -= dt
+        return self._turns.step(measured, least, window, dt)
 
     def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the force is not measured well enough, None where it is.
