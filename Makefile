@@ -17,6 +17,9 @@ SOURCE_ID := $(shell find $(SOURCE) -type f ! -name '*.pyc' | LC_ALL=C sort | xa
 # auto: the inner loop as C, with the same bits, where there is a compiler; 1: or the reason why not; 0: as plain Python.
 # It stays so until another is given, or `make clean`.
 COMPILE ?= $(or $(patsubst $(STAMPS)/compile-%,%,$(wildcard $(STAMPS)/compile-?)),auto)
+ifeq ($(and $(filter 1,$(words $(COMPILE))),$(filter auto 0 1,$(COMPILE))),)
+$(error COMPILE is '$(COMPILE)'; allowed: auto, 0, 1)
+endif
 INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)-$(COMPILE)
 
 # A sourced ROS or another environment must not reach .venv: its libraries would mix with those of the wheels.
@@ -45,6 +48,7 @@ demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam b
 	@$(VENV)/bin/wam demo $(ARGS)
 
 install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help; COMPILE=0: nothing as C
+	@$(if $(IS_SHOWN),:,$(SHOW_BUILD))
 
 dependencies: $(STAMPS)/test  # for the container: everything but the package itself
 
@@ -134,6 +138,18 @@ $(STAMPS)/docs: $(STAMPS)/test
 	@echo "Installing what builds the site"
 	$(call INSTALL_WITH,$(DOCS_EXTRAS))
 
+# what is installed, and why it is plain Python where it is
+COMPILE_LOG := $(STAMPS)/compile.log
+PLAIN_0 := COMPILE=0; as C: make install COMPILE=1
+PLAIN_1 := $(VENV) was changed after it was installed; as C: make clean, then make install COMPILE=1
+PLAIN_auto := no C compiler with the headers of Python; as C: apt install gcc python3-dev, then make install COMPILE=1
+define SHOW_BUILD
+if (cd $(VENV) && bin/python3 -c 'import wam_driver.fast_steps') 2>/dev/null; then echo "The inner loop is compiled"; \
+elif [ $(COMPILE) = auto ] && [ -e $(COMPILE_LOG).failed ]; then \
+	echo "The inner loop is plain Python, with the same numbers: it could not be compiled, see $(COMPILE_LOG).failed"; \
+else echo "The inner loop is plain Python, with the same numbers: $(PLAIN_$(COMPILE))"; fi
+endef
+
 REINSTALL := $(PIP) install -q --no-deps --force-reinstall --no-build-isolation .
 
 $(INSTALLED): $(STAMPS)/ros
@@ -141,12 +157,12 @@ $(INSTALLED): $(STAMPS)/ros
 	@$(TIDY)
 ifeq ($(COMPILE),auto)
 	@echo "Compiling the inner loop, where there is a compiler: about a minute; COMPILE=0 leaves it as plain Python"
-	@WAM_COMPILE=auto $(REINSTALL) 2>$(STAMPS)/compile.log || $(REINSTALL)
-	@cd $(VENV) && bin/python3 -c 'import wam_driver.fast_steps' 2>/dev/null || \
-		echo "It stays plain Python, with the same numbers; as C: apt install gcc python3-dev, then make install COMPILE=1"
+	@rm -f $(COMPILE_LOG).failed
+	@WAM_COMPILE=auto $(REINSTALL) 2>$(COMPILE_LOG) || { mv $(COMPILE_LOG) $(COMPILE_LOG).failed; $(REINSTALL); }
 else
 	@WAM_COMPILE=$(filter-out 0,$(COMPILE)) $(REINSTALL)
 	@touch $(STAMPS)/compile-$(COMPILE)
 endif
 	@$(TIDY)
 	@touch $@
+	@$(SHOW_BUILD)$(eval IS_SHOWN := 1)

@@ -1,5 +1,6 @@
 """Batches: equal on every executor, finished pieces are kept, Ctrl-C ends them, damage is repaired.  About 12 s."""
 
+import argparse
 import hashlib
 import math
 import os
@@ -11,7 +12,7 @@ import sys
 import time
 import warnings
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 from conftest import LONG
 
+from wam_cli.commands import batch_of
 from wam_experiments.stability.stability_map import stability_map
 from wam_sim import batch, pieces
 from wam_sim.progress import Progress
@@ -221,6 +223,16 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("workers", "pieces", "count"), [(5, 1, 1), (2, 7, 2)])
+def test_no_more_processes_are_started_than_there_are_pieces(
+    workers: int, pieces: int, count: int, tmp_path: Path
+) -> None:
+    given = argparse.Namespace(workers=workers, dask=None, fresh=True, command="sweep")
+    with batch_of(given, pieces) as options:
+        assert isinstance(options.executor, ProcessPoolExecutor)
+        assert len(options.executor._processes) == count
+
+
 def test_an_end_does_not_wait_for_inputs_that_no_worker_takes(tmp_path: Path) -> None:
     (tmp_path / "large.py").write_text(LARGE)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

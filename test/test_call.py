@@ -61,6 +61,10 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
         "wam call: 'posture_gain=2' has no node; write NODE:PARAMETER=VALUE, for example force_loop:force_gain=0.01\n"
     )
     assert called("set", "posture_gain=2") == (1, "", no_node)
+    code, out, err = called("set", "driver:watchdog=5.0")
+    assert (code, out) == (1, "")
+    assert "driver:watchdog is chosen at the start" in err
+    assert "'wam call get driver' lists those that can" in err
     code, out, err = called("get", "force_loop:posture_gian")
     assert (code, out) == (1, "")
     assert "did you mean 'posture_gain'?" in err

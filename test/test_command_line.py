@@ -3,6 +3,8 @@
 import argparse
 import importlib
 import os
+import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -38,7 +40,7 @@ def test_without_a_command_the_help_is_printed_and_that_is_no_error(capsys: pyte
 def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = said(capsys, "--version")
     assert code == 0
-    assert out.startswith("wam_stack ")
+    assert re.fullmatch(r"wam_stack .+, inner loop: (compiled|plain Python)\n", out)
 
 
 def test_a_misspelt_command_is_answered_with_the_one_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,6 +83,8 @@ def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -
         ("nothing", "write [node:]parameter=value"),
         ("timing.period=[", "is no value of YAML"),
         ("drivr:seed=1", "no section '/**/drivr'"),
+        ("force_loop:timing.period=0.01", "did you mean 'timing.period' of section '/**'?"),
+        ("arm.payload=20", "arm.joints.length and offset, and arm.payload, 20 kg"),
     ],
 )
 def test_a_number_that_cannot_be_changed_is_named(
@@ -100,6 +104,7 @@ def test_a_number_that_cannot_be_changed_is_named(
         ("0.01:inf:3", "'0.01:inf:3' is no LOW:HIGH:N with 0 < LOW < HIGH"),
         ("0x" + "f" * 5000, "beyond every float"),
         ("", "write for example servo.gain=1,2"),
+        ("1:2:1000000000", "'1:2:1000000000' has 1000000000 values; at most 100000 sets are played"),
     ],
 )
 def test_values_of_a_sweep_are_refused_with_the_reason(values: str, reason: str, capsys: Any) -> None:
@@ -144,6 +149,43 @@ def test_a_value_that_is_not_allowed_is_refused_before_the_demonstration_is_anno
     code, out, err = said(capsys, "demo", "--no-live", "--set", value)
     assert (code, out) == (1, "")
     assert text in err
+
+
+@pytest.mark.parametrize("task", [(), ("--task", "push-box")])
+@pytest.mark.parametrize("name", ["../x", "a/b"])
+def test_a_name_with_directories_is_refused_before_the_demonstration_is_announced(
+    name: str,
+    task: tuple[str, ...],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = said(capsys, "demo", "--no-live", "--name", name, *task)
+    assert (code, out) == (1, "")
+    assert f"'name' is '{name}'; allowed: a name without directories" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["demo --scenario", "demo --task", "demo --name", "up --scenario", "sweep t.csv --vary seed=1 --scenario"],
+)
+def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = said(capsys, *words.split(), "")
+    assert (code, out) == (2, "")
+    assert "it is empty; give a name or a file, or leave the option out" in err
+
+
+@pytest.mark.parametrize("command", ["model urdf", "scorecard", "demo --no-live", "up", "sweep t.csv --vary seed=1"])
+def test_a_parameter_with_two_values_is_refused(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = said(capsys, *command.split(), "--set", "arm.payload=0.5", "--set", "arm.payload=1")
+    assert (code, out) == (1, "")
+    assert "--set has arm.payload twice, with two values; give one of them" in err
 
 
 def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
@@ -321,3 +363,21 @@ def test_the_force_loop_is_named_only_where_it_runs(
     without = [name for name in base.shared.nodes if name not in left_out]
     report_task(base.with_values({"nodes": without}), Path("bag"))
     assert f"  {who} 5, 10, 5 N" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("error", [ImportError("initialization failed"), ValueError("half imported"), None])
+def test_a_signal_ends_a_command_with_its_code_whatever_an_interrupted_import_raises(
+    number: int, error: Exception | None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_: argparse.Namespace) -> int:
+        try:
+            signal.raise_signal(number)
+        except BaseException:
+            if error is None:
+                raise
+            raise error from None  # as the module of MuJoCo in C
+        return 0
+
+    monkeypatch.setattr(importlib.import_module("wam_cli.commands.scorecard"), "run", interrupted)
+    assert said(capsys, "scorecard") == (128 + number, "", "")

@@ -352,7 +352,7 @@ def test_nothing_of_somebody_elses_is_written_over(tmp_path: Path, capsys: pytes
         (["bag", "--config", str(own), "--write", str(own)], "is the configuration itself"),
         (["bag", "--config", str(above), "--write", str(own)], f"own.yaml is a base of the configuration {above}"),
         (["bag", "--write", str(packaged("wam"))], "is the configuration itself"),
-        (["--excite", str(steps), "--only-write"], "is another file; give a new one"),
+        (["--excite", str(steps), "--only-write"], "exists, and this command did not write it; give a new file"),
     ):
         with pytest.raises(SystemExit) as ended:
             main(["identify", *words])

@@ -235,6 +235,17 @@ def test_a_recorder_that_is_told_to_end_before_it_has_a_bag_lacks_no_messages(
     assert not list(tmp_path.glob("bags/*"))
 
 
+def test_a_recorder_that_is_ended_before_the_other_nodes_leaves_a_bag_that_is_not_whole(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["gravity", "recorder"]})) as processes:
+        wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+        os.kill(pid_of(processes, "recorder"), signal.SIGTERM)
+        assert processes.wait(bool) == {"recorder": 0}
+    assert processes.bag_failure.startswith("the recorder ended before the other nodes; the bag lacks")
+
+
 def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
     recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:

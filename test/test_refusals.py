@@ -36,6 +36,16 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
         ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
         ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
         ("figures --workers 0", "wam figures: --workers is 0; it must be at least 1"),
+        ("map out.csv --workers 99999", "wam map: --workers is 99999; it must be at most 1024"),
+        ("evaluate force --workers 99999", "wam evaluate: --workers is 99999; it must be at most 1024"),
+        (
+            "identify --excite e.yaml --only-write --seconds inf",
+            "wam identify: --seconds is inf; it must be at most 3600",
+        ),
+        (
+            "identify --excite e.yaml --only-write --seconds 1e6",
+            "wam identify: --seconds is 1e+06; it must be at most 3600",
+        ),
     ],
 )
 def test_a_count_or_a_range_that_says_nothing_is_named(
@@ -75,6 +85,44 @@ def test_what_cannot_be_written_is_said_before_the_work(
     (tmp_path / "file").write_text("in the way")
     assert reason in refused(capfd, *words.split())
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (
+            "sweep own.yaml --vary arm.payload=0,0.5",
+            "a file that ends in .csv, .tsv, .txt, .dat; give the scenario with --scenario",
+        ),
+        ("sweep own.yaml --experiment creep --vary seed=1,2", "FILE own.yaml would be a table; give a file that ends"),
+        ("map own.yaml", "FILE own.yaml would be a table; give a file that ends"),
+        ("analyse bag --json own.yaml", "--json own.yaml would be JSON; give a file that ends in .json, .txt"),
+        (
+            "analyse bag --html own.yaml",
+            "--html own.yaml would be a page of HTML; give a file that ends in .html, .htm",
+        ),
+        ("evaluate soak --write own.yaml", "--write own.yaml would be a page of the documentation; give a file that"),
+        (
+            "experiment creep --write own.yaml",
+            "--write own.yaml would be a page of the documentation; give a file that",
+        ),
+        (
+            "identify bag --write own.yaml",
+            "--write own.yaml exists, and this command did not write it; give a new file",
+        ),
+        ("identify --excite own.yaml", "--excite own.yaml exists, and this command did not write it; give a new file"),
+        ("identify --excite e.txt", "--excite e.txt would be a scenario; give a file that ends in .yaml, .yml"),
+        ("identify bag --write e", "--write e would be a configuration; give a file that ends in .yaml, .yml"),
+    ],
+)
+def test_a_file_of_another_kind_is_not_written_over(
+    words: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = "steps:\n  - {name: release, seconds: 0.1, request: enable}\n"
+    (tmp_path / "own.yaml").write_text(own)
+    assert reason in refused(capfd, *words.split())
+    assert {entry.name: entry.read_text() for entry in tmp_path.iterdir()} == {"own.yaml": own}
 
 
 @pytest.mark.parametrize("command", ["demo --no-live", "record"])

@@ -246,6 +246,10 @@ def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
         (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs are in Python"),
         (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
         ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
+        (("arm.payload=0", "--set=arm.payload=3"), "--set arm.payload has no effect here: --vary sets it"),
+        ((f"{GAIN}=0.001", "--runs=3"), "--runs has no effect without --random; leave it out, or give --random"),
+        ((f"{GAIN}=0.001", "--seed=1"), "--seed has no effect without --random"),
+        (("seed=1:2:1000", "arm.payload=0.1:0.2:1000"), "1000000 sets in all, seed: 1000, arm.payload: 1000; at most"),
     ],
 )
 def test_an_axis_that_would_not_be_used_is_refused(

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import difflib
 import importlib
+import importlib.util
 import os
 import signal
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
-from wam_ros.program import end_at_once_on_signals, ignore_signals
+from wam_ros.program import SIGNALS, end_at_once_on_signals, ignore_signals
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
 COMMANDS = {
@@ -76,26 +77,39 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     given.ros = rest
+    received: list[int] = []
+
+    def interrupt(number: int, frame: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
     # a signal raises an exception, so that the command cleans up; commands that run nodes handle signals themselves
-    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: _end}
-    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    before = {number: signal.signal(number, interrupt) for number in SIGNALS}
     try:
         with contextlib.redirect_stdout(_Printable(sys.stdout)):
             code = command.run(given)
         sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the pipe was closed: `wam ... | head`
-        code = 128 + signal.SIGPIPE
-    except ModuleNotFoundError as error:
-        sys.exit(_missing(given.command, error))
-    except (ValueError, OSError) as error:
-        parser.exit(1, printable(f"wam {given.command}: {error}{_hint(error, given.command)}", kept="\n") + "\n")
-    except KeyboardInterrupt:
-        code = 128 + signal.SIGINT
+    except BaseException as error:
+        # the exception may have become another one: that of a module in C whose import was interrupted
+        code = 128 + received[0] if received else _ended_by(error, given.command, parser)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
     sys.exit(code or 0)
+
+
+def _ended_by(error: BaseException, command: str, parser: argparse.ArgumentParser) -> int:
+    """The exit code of a command that an error ended; prints what the user can do, or raises it again."""
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the pipe was closed: `wam ... | head`
+        return 128 + signal.SIGPIPE
+    if isinstance(error, KeyboardInterrupt):  # of a process that computes
+        return 128 + signal.SIGINT
+    if isinstance(error, ModuleNotFoundError):
+        return _missing(command, error)
+    if isinstance(error, ValueError | OSError):
+        parser.exit(1, printable(f"wam {command}: {error}{_hint(error, command)}", kept="\n") + "\n")
+    raise error
 
 
 def _complete() -> None:
@@ -148,10 +162,6 @@ def program() -> None:
         main()
     finally:
         ignore_signals()
-
-
-def _end(number: int, frame: object) -> None:
-    sys.exit(128 + number)
 
 
 def _unknown(word: str) -> str:
@@ -215,10 +225,13 @@ def _without_library(command: str, error: ImportError) -> str:
 
 
 def _version() -> str:
+    """The version that is installed, and how the inner loop is that runs."""
+    build = "compiled" if importlib.util.find_spec("wam_driver.fast_steps") else "plain Python"
     try:
-        return version("wam_stack")
+        found = version("wam_stack")
     except PackageNotFoundError:
-        return "not installed"
+        found = "not installed"
+    return f"{found}, inner loop: {build}"
 
 
 def _hint(error: Exception, command: str) -> str:

@@ -206,7 +206,7 @@ class Arm:
                 torque <= strength[i],
                 f"the motors cannot carry the links beyond {joint}: they weigh up to {torque:.3g} N m there, "
                 f"the peak torque is {strength[i]:.3g} N m; check arm.links.mass, arm.links.centre, "
-                "arm.joints.length and offset",
+                "arm.joints.length and offset" + f", and arm.payload, {self.payload:g} kg" * bool(self.payload),
             )
 
     @cached_property

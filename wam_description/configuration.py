@@ -139,7 +139,10 @@ class Configuration(NamedTuple):
         found = {one for one in keys if one.rpartition(":")[2] == parameter} | {key.replace(".", ":", 1)} & keys
         place = key[: key.rfind(":") + 1]
         near = [place + name for name in difflib.get_close_matches(parameter, flat, n=1)]
-        return " or ".join(f"'{one}'" for one in sorted(found) or near)
+        # a parameter of all nodes is none of this one, so that its name alone would be what was given
+        return " or ".join(
+            f"'{one}'" + f" of section '{SHARED}'" * (bool(place) and ":" not in one) for one in sorted(found) or near
+        )
 
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
         """The configuration of `path`: this one with changed values and further sections."""
@@ -215,7 +218,7 @@ def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]
     ParameterError
         where one is none.
     """
-    found = {}
+    found: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name.strip() and equals and value.strip()):
@@ -223,11 +226,13 @@ def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]
                 f"{option} is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]"
             )
         try:
-            found[name.strip()] = yaml_text.parse(value)
+            parsed = yaml_text.parse(value)
         except yaml.YAMLError as error:
             reason = str(error).partition("\n")[0]
             shown = repr(value if len(value) <= LONGEST else f"{value[:LONGEST]}...")
             raise ParameterError(f"{option} {name.strip()}: {shown} is no value of YAML: {reason}") from error
+        if found.setdefault(name.strip(), parsed) != parsed:
+            raise ParameterError(f"{option} has {name.strip()} twice, with two values; give one of them")
     return found
 
 

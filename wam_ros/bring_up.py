@@ -150,6 +150,7 @@ class Processes:
         All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
         """
         deadline = time.monotonic() + PATIENCE
+        was_first = self.ended().get(LAST) == 0
         others = [name for name in self._processes if name not in (self._first, LAST)]
         if any(code < 0 for code in self.ended().values()):
             for process in self._processes.values():
@@ -163,6 +164,8 @@ class Processes:
         self._wait_for_recorder()
         if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
             self.bag_failure = f"the recorder ended with code {code}; what it wrote may lack messages"
+        elif was_first and others:
+            self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
         self._stack.close()
 
     def _terminate(self, name: str) -> None:

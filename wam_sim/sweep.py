@@ -33,6 +33,7 @@ from wam_sim.reactions import (
 )
 from wam_sim.simulation import Simulation
 
+MOST_SETS = 100_000  # of a sweep: their configurations take a gigabyte
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
 
@@ -78,7 +79,17 @@ class SweepResult(NamedTuple):
 
 
 def grid(axes: Sequence[Axis]) -> list[tuple[Any, ...]]:
-    """Every combination of the values."""
+    """Every combination of the values.
+
+    Raises
+    ------
+    ValueError
+        where there are more than `MOST_SETS`.
+    """
+    count = math.prod(len(axis.values) for axis in axes)
+    if count > MOST_SETS:
+        counts = ", ".join(f"{axis.name}: {len(axis.values)}" for axis in axes)
+        raise ValueError(f"{count} sets in all, {counts}; at most {MOST_SETS} are played: give fewer values")
     return list(product(*(axis.values for axis in axes)))
 
 

@@ -16,6 +16,7 @@ from wam_description.parameters import ParameterError
 
 Array = NDArray[np.float64]
 
+HEADING = "# The controllers' model as identified"  # of the file
 DIGITS = 6
 LIGHTEST = 1e-6  # kg m^2; an inertia that came out negative
 DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
@@ -152,4 +153,4 @@ def write_overlay(file: Path, base: str, values: Mapping[str, Any], command: str
             branch = branch.setdefault(part, {})
         branch[leaf] = value
     body = yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=120)
-    file.write_text(f"# The controllers' model as identified: {command}\n{body}", encoding="utf-8")
+    file.write_text(f"{HEADING}: {command}\n{body}", encoding="utf-8")

@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +24,8 @@ from wam_sim.progress import Progress
 
 BASE_CONFIGURATION = "wam"
 LAST_PORT = 65535
+YAML_SUFFIXES = (".yaml", ".yml")
+MOST_WORKERS = 1024
 
 
 def namespace(text: str) -> str:
@@ -40,6 +42,19 @@ def namespace(text: str) -> str:
             f"'{text}' is no namespace; give words of letters, digits and '_' that begin with no digit, joined by '/'"
         )
     return inner
+
+
+def filled(text: str) -> str:
+    """A name or file, as an option takes it.
+
+    Raises
+    ------
+    ArgumentTypeError
+        where it is empty, as that of a variable that is not set; it would be as if the option was not given.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError("it is empty; give a name or a file, or leave the option out")
+    return text
 
 
 def exit_code_of(unmet: Sequence[object]) -> int:
@@ -224,6 +239,29 @@ def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
     take_port(parser)
 
 
+class FileKind(NamedTuple):
+    """A kind of file that commands write.
+
+    Attributes
+    ----------
+    name : of one, as messages have it.
+    suffixes : that it may have, in lower case.
+    heading : how those begin that this program wrote; others are not written over.  '' where any may be.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    heading: str = ""
+
+
+# '' is for devices and pipes, as /dev/stdout
+TABLE = FileKind("a table", (".csv", ".tsv", ".txt", ".dat", ""))
+JSON = FileKind("JSON", (".json", ".txt", ""))
+HTML = FileKind("a page of HTML", (".html", ".htm", ""))
+PAGE = FileKind("a page of the documentation", (".md",))
+RERUN = FileKind("a recording for Rerun", (".rrd", ""))
+
+
 class BatchOptions(NamedTuple):
     """Executor, folder of finished pieces, and progress report of a batch."""
 
@@ -240,6 +278,13 @@ def take_executor(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def executor_of(given: argparse.Namespace, pieces: int) -> AbstractContextManager[Executor]:
+    """What the options of `take_executor` name, with no more processes than pieces."""
+    if given.workers is not None:
+        at_least("--workers", given.workers, 1, MOST_WORKERS)
+    return executor(min(given.workers or os.cpu_count() or 1, pieces), given.dask)
+
+
 def take_batch(parser: argparse.ArgumentParser) -> None:
     """Give a command the options of a long computation."""
     take_executor(parser)
@@ -254,13 +299,11 @@ def take_batch(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def batch_of(given: argparse.Namespace) -> Iterator[BatchOptions]:
-    """What the options of `take_batch` name; progress goes to stderr."""
-    if given.workers is not None:
-        at_least("--workers", given.workers, 1)
+def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
+    """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
     if not given.fresh:
         writable_directory("--keep", given.keep)
-    with executor(given.workers, given.dask) as found:
+    with executor_of(given, pieces) as found:
         yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
 
 
@@ -304,7 +347,7 @@ def evaluation_of(given: argparse.Namespace) -> Configuration:
     for seed in given.seed:
         at_least("--seed", seed, 0)
     if given.write:
-        writable_file("--write", given.write)
+        writable_file("--write", given.write, PAGE)
         refuse_source(given, "--write", given.write)
     require_effect("--set", option_values(given.values))
     return configuration_of(given)
@@ -328,8 +371,8 @@ def require_effect(option: str, names: Iterable[str]) -> None:
             )
 
 
-def at_least(option: str, value: float, low: float) -> None:
-    """Refuse the value of an option that is too small, or no number.
+def at_least(option: str, value: float, low: float, high: float = math.inf) -> None:
+    """Refuse the value of an option that is too small or too large, or no number.
 
     Raises
     ------
@@ -338,6 +381,8 @@ def at_least(option: str, value: float, low: float) -> None:
     """
     if not value >= low:
         raise ValueError(f"{option} is {value:g}; it must be at least {low:g}")
+    if value > high:
+        raise ValueError(f"{option} is {value:g}; it must be at most {high:g}")
 
 
 def rising(option: str, ends: Sequence[float]) -> None:
@@ -353,14 +398,33 @@ def rising(option: str, ends: Sequence[float]) -> None:
         raise ValueError(f"{option} is {low:g} to {high:g}; LOW must be above 0 and HIGH not below it")
 
 
-def writable_file(option: str, file: Path) -> None:
-    """Refuse, before the work, a file that could not be written after it.
+def writable_file(option: str, file: Path, kind: FileKind, advice: str = "") -> None:
+    """Refuse, before the work, a file that could not be written after it, or should not be.
+
+    Parameters
+    ----------
+    kind : what is written.
+    advice : what was meant by a YAML file in the place of another kind.
 
     Raises
     ------
     ValueError
         with the reason, and what to do.
     """
+    _require_place(option, file)
+    suffix = file.suffix.lower()
+    if suffix not in kind.suffixes:
+        allowed = ", ".join(filter(None, kind.suffixes))
+        advice = f"; {advice}" if advice and suffix in YAML_SUFFIXES else ""
+        raise ValueError(f"{option} {file} would be {kind.name}; give a file that ends in {allowed}{advice}")
+    if kind.heading and file.exists():
+        text = file.read_text(encoding="utf-8", errors="replace")
+        if text.strip() and not text.startswith(kind.heading):
+            raise ValueError(f"{option} {file} exists, and this command did not write it; give a new file")
+
+
+def _require_place(option: str, file: Path) -> None:
+    """Refuse a file that could not be written."""
     folder = file.parent
     if file.is_dir():
         why = "it is a directory"
@@ -374,10 +438,10 @@ def writable_file(option: str, file: Path) -> None:
 
 
 def writable_picture(option: str, file: Path) -> None:
-    """Refuse, before the work, a picture that could not be written after it, as `writable_file` does."""
+    """Refuse, before the work, a picture that could not be written after it, as `writable_file` does other files."""
     from matplotlib.backend_bases import FigureCanvasBase  # slow, and for pictures alone
 
-    writable_file(option, file)
+    _require_place(option, file)
     if file.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
         raise ValueError(
             f"cannot draw {file}: there is no format '{file.suffix}'; give a .png, .pdf or .svg as {option}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.commands import take_arm, take_topic_map, topic_map_of, writable_file
+from wam_cli.commands import HTML, JSON, take_arm, take_topic_map, topic_map_of, writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,9 +30,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Analyse, print, write."""
     if given.html:
-        writable_file("--html", given.html)
+        writable_file("--html", given.html, HTML)
     if given.json and given.json != "-":
-        writable_file("--json", Path(given.json))
+        writable_file("--json", Path(given.json), JSON)
     mapped = topic_map_of(given)
     begin = time.monotonic()
 

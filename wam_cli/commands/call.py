@@ -131,6 +131,9 @@ def _set(given: argparse.Namespace, stack: CalledStack) -> int:
     else:
         new = _like(value, like, key)
     reply = stack.request(SetParameters(node, {name: new}))
+    if not reply.success and name not in stack.live(node, values):
+        chosen = f"{key} is chosen at the start and cannot change while the node runs"
+        return _stated([reply._replace(message=f"{chosen}; 'wam call get {node}' lists those that can")])
     return _stated([reply._replace(message=reply.message or f"{key}={value}")])
 
 

@@ -12,6 +12,7 @@ from wam_bag.errors import BagError
 from wam_cli.commands import (
     configuration_of,
     exit_code_of,
+    filled,
     new_bag,
     take_configuration,
     take_page,
@@ -48,12 +49,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     played = parser.add_mutually_exclusive_group()
     played.add_argument(
         "--task",
-        default="",
+        type=filled,
         metavar="NAME",
         help=f"play this task instead of the demonstration: {', '.join(tasks())}, or a YAML file of your own",
     )
-    played.add_argument("--scenario", default="", help="play these steps instead of the demonstration: a YAML file")
-    parser.add_argument("--name", default="", help="name of the bag; default: demo or the task, date and time")
+    played.add_argument("--scenario", type=filled, help="play these steps instead of the demonstration: a YAML file")
+    parser.add_argument("--name", type=filled, help="name of the bag; default: demo or the task, date and time")
     take_page(parser, default=None)
     take_configuration(parser)
 

@@ -99,7 +99,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     every_scenario = [scenario for _, scenario in order]
     refuse_overridden(given, {name for one in every_scenario for name in one.values}, "each scenario")
     if given.mode == "direct":
-        with batch_of(given) as batch:
+        with batch_of(given, len(every_scenario)) as batch:
             scored = evaluate(configuration, every_scenario, *batch)
     else:
         scored = scores(configuration, every_scenario, Progress("scenarios", sys.stderr))

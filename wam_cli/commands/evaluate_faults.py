@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
 from wam_experiments.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
 from wam_experiments.faults.trials import FaultKind, KindResult, played
 from wam_sim.progress import Progress
@@ -38,7 +38,7 @@ def run(given: argparse.Namespace) -> int:
     if given.count is not None:
         at_least("--count", given.count, 1)
     if given.write:
-        writable_file("--write", given.write)
+        writable_file("--write", given.write, PAGE)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # nothing broken leaves this machine
     logging.getLogger().setLevel(logging.ERROR)
     results = list(_interrupted(given) if given.ctrl_c is not None else _played(given))

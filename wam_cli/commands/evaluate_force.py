@@ -5,8 +5,10 @@ import sys
 from pathlib import Path
 
 from wam_cli.commands import (
+    PAGE,
     at_least,
     configuration_of,
+    executor_of,
     refuse_overridden,
     require_effect,
     take_configuration,
@@ -20,7 +22,6 @@ from wam_experiments.force_benchmark.figure import figure
 from wam_experiments.force_benchmark.page import details, page, report, required
 from wam_experiments.force_benchmark.results_file import key
 from wam_experiments.force_benchmark.tasks import SECONDS, draw, task_values
-from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
 
@@ -56,11 +57,9 @@ def run(given: argparse.Namespace) -> int:
     at_least("--seconds", given.seconds, 1.0)
     for number in given.only or ():
         at_least("--only", number, 0)
-    if given.workers is not None:
-        at_least("--workers", given.workers, 1)
     writable_directory("--results", given.results.parent)
     if given.write:
-        writable_file("--write", given.write)
+        writable_file("--write", given.write, PAGE)
     trials = _trials(given)
     if given.only:
         print("\n".join(details(given.seed, trial) for trial in trials))
@@ -77,7 +76,7 @@ def _trials(given: argparse.Namespace) -> list[ForceTrial]:
     if given.values:
         drawn = [draw(base.shared.arm, given.seed, number) for number in numbers]
         refuse_overridden(given, {name for task in drawn for name in task_values(base, task)}, "each task")
-    with executor(given.workers, given.dask) as found:
+    with executor_of(given, len(numbers)) as found:
         return evaluate(
             base,
             given.seed,

@@ -25,8 +25,9 @@ def run(given: argparse.Namespace) -> int:
     configuration = evaluation_of(given)
     if given.write:
         with_section(given.write, SECTION, "")  # refuses a page without the section, before the work
-    with batch_of(given) as batch:
-        found = results(run_trial, trials(configuration, given.seed, given.seconds), *batch)
+    played = trials(configuration, given.seed, given.seconds)
+    with batch_of(given, len(played)) as batch:
+        found = results(run_trial, played, *batch)
     text, short = table(found), list(missed(found))
     print(text)
     if given.write:

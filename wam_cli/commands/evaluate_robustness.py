@@ -53,7 +53,7 @@ def run(given: argparse.Namespace) -> int:
     before = given.before.read_text(encoding="utf-8") if given.before else ""
     configuration = evaluation_of(given)
     chosen = drives(configuration, given.seed, given.only, given.seconds)
-    with batch_of(given) as batch:
+    with batch_of(given, max(map(len, chosen))) as batch:
         groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
         whole = given.only == list(degradations.NAMES)
         first = results(evaluate_scenario, first_tasks(configuration, given.seed), *batch) if whole else []

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
 from wam_experiments.faults.page import with_section
 from wam_sim.progress import Progress
 from wam_trials.faults.soak import soak
@@ -21,7 +21,7 @@ def run(given: argparse.Namespace) -> int:
     """Run; 1 if memory grows or messages are lost."""
     at_least("--seconds", given.seconds, 2.0)
     if given.write:
-        writable_file("--write", given.write)
+        writable_file("--write", given.write, PAGE)
     found = soak(configuration_of(given), given.seconds, Progress("soak, seconds", sys.stderr))
     text = found.section(f"wam evaluate soak --seconds {given.seconds:g}")
     print(text)

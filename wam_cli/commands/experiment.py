@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from wam_cli.commands import writable_directory, writable_file
+from wam_cli.commands import PAGE, writable_directory, writable_file
 from wam_experiments.thesis.definition import Experiment, Run, load, names
 from wam_experiments.thesis.evaluation import evaluate, text
 from wam_experiments.thesis.figure import draw
@@ -43,7 +43,7 @@ def run(given: argparse.Namespace) -> int:
         raise ValueError("name one experiment, or give --all; --list prints the names")
     writable_directory("--directory", Path(given.directory))
     if given.write:
-        writable_file("--write", Path(given.write))
+        writable_file("--write", Path(given.write), PAGE)
     results: dict[str, tuple[Experiment, Result, Path]] = {}
     chosen = names() if given.all else [given.experiment]
     for number, experiment in enumerate(map(load, chosen), 1):

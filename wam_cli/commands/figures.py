@@ -18,7 +18,7 @@ def run(given: argparse.Namespace) -> int:
     """Compute, draw, print how far the plant is from the lines."""
     names = known(given.names or list(FIGURES))  # before anything is started
     writable_directory("--to", given.to)
-    with batch_of(given) as batch:
+    with batch_of(given, len(names)) as batch:
         found = numbers(names, *batch)
     given.to.mkdir(parents=True, exist_ok=True)
     for name, values in found.items():

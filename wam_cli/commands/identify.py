@@ -11,10 +11,13 @@ import yaml
 
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import LOADS, loaded, recorded_motion
+from wam_analysis.identification.overlay import HEADING as MODEL_HEADING
 from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
 from wam_cli.commands import (
+    YAML_SUFFIXES,
+    FileKind,
     at_least,
     configuration_of,
     refuse_source,
@@ -35,6 +38,9 @@ from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
+MODEL = FileKind("a configuration", YAML_SUFFIXES, MODEL_HEADING)
+MOVES = FileKind("a scenario", YAML_SUFFIXES, HEADING)
+LONGEST = 3600.0  # s of motion; the choice of its moves takes minutes
 TOPICS = ("motor_states", "status", *LOADS)
 
 
@@ -61,10 +67,11 @@ def run(given: argparse.Namespace) -> int:
     if (given.bag is None) == (given.excite is None):
         raise ValueError("give a bag, or --excite SCENARIO to make one")
     configuration = configuration_of(given)
-    for option, file in (("--write", given.write), ("--excite", given.excite)):
-        if file is not None:
-            writable_file(option, file)
-    _refuse_loss(given)
+    if given.write is not None:
+        refuse_source(given, "--write", given.write)
+        writable_file("--write", given.write, MODEL)
+    if given.excite is not None:
+        writable_file("--excite", given.excite, MOVES)
     bag = given.bag
     if given.excite is not None:
         bag = _excite(configuration, given)
@@ -98,16 +105,6 @@ def run(given: argparse.Namespace) -> int:
     return 0
 
 
-def _refuse_loss(given: argparse.Namespace) -> None:
-    """Refuse to write over the configuration that is read, or over a scenario that is somebody's own."""
-    if given.write is not None:
-        refuse_source(given, "--write", given.write)
-    if given.excite is not None and given.excite.exists():
-        text = given.excite.read_text(encoding="utf-8", errors="replace")
-        if text.strip() and not text.startswith(HEADING):
-            raise ValueError(f"--excite {given.excite} would be written, and it is another file; give a new one")
-
-
 def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
     """Refuse a bag of an arm with another transmission, as far as the bag has it."""
     if "driver" not in run.parameters.nodes:
@@ -130,7 +127,7 @@ def _base(given: argparse.Namespace) -> str:
 
 def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | None:
     """Write the scenario and play it; the bag, None where it was not played to its end."""
-    at_least("--seconds", given.seconds, 10.0)
+    at_least("--seconds", given.seconds, 10.0, LONGEST)
     at_least("--seed", given.seed, 0)
     if not given.only_write:
         writable_directory("--directory", given.directory)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wam_cli.commands import at_least, batch_of, rising, take_batch, writable_file
+from wam_cli.commands import TABLE, at_least, batch_of, rising, take_batch, writable_file
 from wam_experiments.stability.stability_map import stability_map, write_csv
 
 
@@ -27,10 +27,10 @@ def run(given: argparse.Namespace) -> int:
     for name, ends, count in (("gamma", given.gamma, given.gamma_points), ("zeta", given.zeta, given.zeta_points)):
         at_least(f"--{name}-points", count, 1)
         rising(f"--{name}", ends)
-    writable_file("FILE", given.file)
+    writable_file("FILE", given.file, TABLE)
     gamma = np.linspace(given.gamma[0], given.gamma[1], given.gamma_points)
     zeta = np.asarray(np.geomspace(given.zeta[0], given.zeta[1], given.zeta_points), dtype=float)
-    with batch_of(given) as batch:
+    with batch_of(given, len(zeta)) as batch:
         found = stability_map(gamma, zeta, given.stiffness_ratio, given.stiction, *batch)
     write_csv(found, given.file)
     print(f"{found.steps.size} points in {given.file}")

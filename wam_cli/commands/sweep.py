@@ -14,9 +14,12 @@ import yaml
 
 from wam_cli.commands import (
     BASE_CONFIGURATION,
+    TABLE,
     at_least,
     batch_of,
     configuration_of,
+    filled,
+    refuse_overridden,
     refuse_source,
     require_effect,
     take_batch,
@@ -30,9 +33,9 @@ from wam_description.configuration import LONGEST, option_values
 from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
 from wam_sim.batch import results
-from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
+from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, points, sweep
 
-RANDOM_RUNS = 100
+RANDOM_RUNS, RANDOM_SEED = 100, 1
 SCENARIO = "demo_scenario"
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 
@@ -43,10 +46,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_configuration(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
-        "--scenario", metavar="NAME", help=f"YAML file, or the name of one that is installed; default: {SCENARIO}"
+        "--scenario",
+        type=filled,
+        metavar="NAME",
+        help=f"YAML file, or the name of one that is installed; default: {SCENARIO}",
     )
     what.add_argument(
-        "--experiment", metavar="NAME", help="of the thesis, or a whole-arm task, with its own configuration"
+        "--experiment",
+        type=filled,
+        metavar="NAME",
+        help="of the thesis, or a whole-arm task, with its own configuration",
     )
     parser.add_argument(
         "--vary",
@@ -65,8 +74,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="draw numbers between the two values of each parameter, evenly, or by a factor where both are above 0; "
         "not for whole numbers",
     )
-    parser.add_argument("--runs", type=int, default=RANDOM_RUNS, help="of --random; default: %(default)s")
-    parser.add_argument("--seed", type=int, default=1, help="of --random; default: 1")
+    parser.add_argument("--runs", type=int, help=f"of --random; default: {RANDOM_RUNS}")
+    parser.add_argument("--seed", type=int, help=f"of --random; default: {RANDOM_SEED}")
     parser.add_argument(
         "--picture",
         type=Path,
@@ -77,17 +86,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Compute what is not kept from before, write table and plot; 1 where every run failed."""
-    at_least("--runs", given.runs, 1)
-    at_least("--seed", given.seed, 0)
-    writable_file("FILE", given.file)
-    if given.picture:
-        writable_picture("--picture", given.picture)
+    count, seed = _drawn(given)
     for option, file in (("FILE", given.file), ("--picture", given.picture)):
         if file:
             refuse_source(given, option, file, *([] if given.experiment else [_scenario_file(given)]))
+    writable_file("FILE", given.file, TABLE, "give the scenario with --scenario")
+    if given.picture:
+        writable_picture("--picture", given.picture)
     axes: list[Axis] = given.vary
     _refuse_idle(given, axes)
-    sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
+    sets = drawn(axes, count, seed) if given.random else listed(axes) if given.list else grid(axes)
     failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
     failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
     doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
@@ -97,11 +105,24 @@ def run(given: argparse.Namespace) -> int:
     return int(failed == len(sets))
 
 
+def _drawn(given: argparse.Namespace) -> tuple[int, int]:
+    """How many sets are drawn, and their seed; refused where none are drawn."""
+    for option, value in (("--runs", given.runs), ("--seed", given.seed)):
+        if value is not None and not given.random:
+            raise ValueError(f"{option} has no effect without --random; leave it out, or give --random")
+    count = RANDOM_RUNS if given.runs is None else given.runs
+    seed = RANDOM_SEED if given.seed is None else given.seed
+    at_least("--runs", count, 1, MOST_SETS)
+    at_least("--seed", seed, 0)
+    return count, seed
+
+
 def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
     """Refuse an axis whose values would stand in the table without having been used, and such values of --set."""
     names = [axis.name for axis in axes]
     require_effect("--set", option_values(given.values))
     require_effect("--vary", names)
+    refuse_overridden(given, names, "--vary")
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
@@ -117,7 +138,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tup
     """Why each set failed, '' where it did not, and what was reported of the others; a row of the table for each."""
     configuration = configuration_of(given)
     runs = points(configuration, load(_scenario_file(given), configuration.shared), axes, sets)
-    with batch_of(given) as batch:
+    with batch_of(given, len(runs)) as batch:
         is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
         found = sweep(runs, batch.executor, None if is_own else batch.folder, batch.report)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
@@ -133,7 +154,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
             "an experiment has its own configuration; leave out --config and --set, and --vary its numbers"
         )
     runs = sweeping.points(definition.load(given.experiment), axes, sets)
-    with batch_of(given) as batch:
+    with batch_of(given, len(runs)) as batch:
         found = results(sweeping.outcome, runs, *batch)
     rows: list[tuple[Any, ...]] = []
     for values, one in zip(sets, found, strict=True):
@@ -151,6 +172,8 @@ def _axis(text: str) -> Axis:
         low, high, count = (kind(end) for kind, end in zip((float, float, int), values.split(":"), strict=True))
         if not (0.0 < low < high < math.inf and count > 1):
             raise argparse.ArgumentTypeError(f"'{values}' is no LOW:HIGH:N with 0 < LOW < HIGH and N of 2 or more")
+        if count > MOST_SETS:
+            raise argparse.ArgumentTypeError(f"'{values}' has {count} values; at most {MOST_SETS} sets are played")
         return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(int(count))))
     if re.fullmatch(rf"{ENDS}:{ENDS}", values.replace(" ", "")):
         raise argparse.ArgumentTypeError(f"'{values}' has no number of values; write {values}:5 for five")

@@ -5,6 +5,7 @@ import sys
 
 from wam_cli.commands import (
     configuration_of,
+    filled,
     is_paced,
     namespace,
     processes_of,
@@ -33,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_time(parser)
     parser.add_argument("--mode", choices=("realtime", "lockstep"), help=argparse.SUPPRESS)  # what it was called before
-    parser.add_argument("--scenario", default="", help="play this scenario: a YAML file, or demo_scenario")
+    parser.add_argument("--scenario", type=filled, help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")
     parser.add_argument(
         "--namespace", type=namespace, default=NAMESPACE, help="namespace of the nodes; default: %(default)s"
@@ -58,13 +59,13 @@ def import_nodes(configuration: Configuration, given: argparse.Namespace) -> Non
 def run(given: argparse.Namespace) -> int:
     """Start the nodes and wait for the first to end."""
     die_with_parent()
+    end_at_once_on_signals()  # there is nothing to clean up yet
     configuration = timed(configuration_of(given), given)
     extra = ["scenario"] * bool(given.scenario) + ["recorder"] * given.record
     configuration = configuration.with_nodes(*extra)
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
         load_for(configuration, given.scenario)  # refused before any node starts
-    end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()
     processes = processes_of(configuration, given)

@@ -6,7 +6,7 @@ from pathlib import Path
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
-from wam_cli.commands import take_arm, take_port, writable_file
+from wam_cli.commands import RERUN, take_arm, take_port, writable_file
 from wam_live.page import free_port, needing_viser
 from wam_ros.program import Stop
 
@@ -27,7 +27,7 @@ def run(given: argparse.Namespace) -> int:
     if given.save or given.rerun:
         load_rerun()  # before the work
         if given.save:
-            writable_file("--save", given.save)
+            writable_file("--save", given.save, RERUN)
         else:
             viewer()
         recording = _recording(given)
