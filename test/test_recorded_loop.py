@@ -65,7 +65,7 @@ def test_the_stacks_own_guard_answers_next_to_the_ideal_velocity_source(capsys: 
         main(["guard", "--bag", str(SAMPLES / "actuator-limit-cycle")])
     said = capsys.readouterr().out
     ideal, _, real = said.partition("As it was recorded, with its velocity loops, which is what counts on that arm:\n")
-    assert "margin: the gain is 0.834 of the largest" in ideal
+    assert "margin: the gain is 0.832 of the largest" in ideal  # by the configured friction: the strokes are too short
     assert real.startswith(
         "Stability guard (sampled loop with its velocity loops, contact of 1751 N/m, posture [-0.014] rad): domain I"
     )
