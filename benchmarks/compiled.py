@@ -25,7 +25,7 @@ from comparing import Quartiles, machine, mark, options, quartiles, ratios, save
 from plant import FREE, Case, pose_in_contact
 from speed import ROWS, scenario
 
-from wam_control.scenario import load
+from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_sim.simulation import Simulation
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from comparing import Quartiles, arguments, machine, quartiles, ratios, save, table
 
-from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
-from wam_control.contact_inference import ContactInference
-from wam_control.momentum_observer import MomentumObserver
+from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_inference import ContactInference
+from wam_control.contact.momentum_observer import MomentumObserver
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody

@@ -20,7 +20,7 @@ from plant import FREE, Case
 from wam_analysis.drawing import STYLE, TRUE
 from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
 from wam_bag.bag import read
-from wam_control.scenario import ScenarioStep
+from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_sim.batch import processes, results

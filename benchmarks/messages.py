@@ -14,7 +14,7 @@ from comparing import arguments, machine, quartiles, ratios, save, table
 from parts import NODES
 from speed import scenario_steps
 
-from wam_control.scenario import ScenarioStep
+from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import declared
 from wam_description.synchroniser import Inputs

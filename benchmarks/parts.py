@@ -16,7 +16,7 @@ import yaml
 from comparing import arguments, machine, quartiles, save, table
 from speed import scenario
 
-from wam_control.scenario import load
+from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import declared
 from wam_sim.simulation import Simulation

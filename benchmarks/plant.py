@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from comparing import Quartiles, arguments, machine, mark, quartiles, ratios, save, table
 
-from wam_control.scenario import load
+from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody

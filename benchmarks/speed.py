@@ -17,7 +17,7 @@ from comparing.clock import Readings, watched_clock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from wam_control.scenario import ScenarioStep, load
+from wam_control.task.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import mjcf

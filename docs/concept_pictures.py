@@ -14,7 +14,7 @@ from matplotlib.patches import FancyBboxPatch, Polygon
 from wam_analysis.drawing import INK, SHAFTS
 from wam_description.configuration import Configuration, packaged
 from wam_description.transmission_map import TransmissionMap
-from wam_experiments.figures.style import GREY, picture
+from wam_studies.figures.style import GREY, picture
 from wam_theory.linear_loop import routh_gain
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from wam_analysis.table import markdown
-from wam_control.dither import Dither
-from wam_control.force_loop import ForceLoop, ForceLoopParameters
-from wam_control.scenario import STEP_KEYS
-from wam_control.velocity_loop import VelocityLoopParameters
+from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
+from wam_control.task.scenario import STEP_KEYS
+from wam_control.velocity.dither import Dither
+from wam_control.velocity.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
@@ -33,22 +33,22 @@ from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
-from wam_experiments import design_choices
-from wam_experiments.contact_benchmark import resting_push
-from wam_experiments.figures import backdrivability, open_loop, transmissions
-from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
-from wam_experiments.figures.catalogue import table as figures_table
-from wam_experiments.force_benchmark import usual_tasks
-from wam_experiments.force_benchmark.elbow import elbow, elbow_table
-from wam_experiments.plant.figure import figure
-from wam_experiments.scorecard import report as scorecard
-from wam_experiments.tasks.pictures import save as save_task
-from wam_experiments.thesis import claims
-from wam_experiments.thesis.definition import load, tasks
-from wam_experiments.thesis.evaluation import evaluate
-from wam_experiments.thesis.rows import markdown as rows_of_a_result
 from wam_sim.batch import processes
 from wam_sim.pieces import default_folder
+from wam_studies import design_choices
+from wam_studies.contact_benchmark import resting_push
+from wam_studies.figures import backdrivability, open_loop, transmissions
+from wam_studies.figures.catalogue import FIGURES, file_of, numbers
+from wam_studies.figures.catalogue import table as figures_table
+from wam_studies.force_benchmark import usual_tasks
+from wam_studies.force_benchmark.elbow import elbow, elbow_table
+from wam_studies.plant.figure import figure
+from wam_studies.scorecard import report as scorecard
+from wam_studies.tasks.pictures import save as save_task
+from wam_studies.thesis import claims
+from wam_studies.thesis.definition import load, tasks
+from wam_studies.thesis.evaluation import evaluate
+from wam_studies.thesis.rows import markdown as rows_of_a_result
 from wam_theory.equations import EQUATIONS, Equation
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -203,7 +203,7 @@ def citing() -> dict[str, list[str]]:
 def tests_by_function() -> dict[str, list[str]]:
     """Name of a function to the tests, file.name, that use it, apart from tests of shapes and refusals."""
     found: dict[str, list[str]] = {}
-    paths = [*sorted(ROOT.glob("test/test_equations_*.py")), ROOT / "test" / "test_stick_slip.py"]
+    paths = [*sorted(ROOT.glob("test/theory/test_equations_*.py")), ROOT / "test" / "theory" / "test_stick_slip.py"]
     for path in paths:
         named = {function.name: names_in(function) for function in functions(path)}
         for test, names in named.items():

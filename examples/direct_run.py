@@ -1,6 +1,6 @@
 """Play the demonstration without ROS and print how well the force was held."""
 
-from wam_control.scenario import load
+from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_sim.simulation import Simulation
 

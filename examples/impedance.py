@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wam_control.scenario import Push, ScenarioStep
+from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import parameter

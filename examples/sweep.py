@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_control.force_loop import ForceLoop, ForceLoopParameters
-from wam_control.scenario import ScenarioStep
+from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
+from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import ForceCommand
 from wam_sim.batch import processes, results

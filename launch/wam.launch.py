@@ -20,7 +20,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from wam_control.scenario import load_for, script_file
+from wam_control.task.scenario import load_for, script_file
 from wam_description.configuration import Configuration, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf

@@ -20,7 +20,7 @@ from typing import Any, Final
 from bag_samples import CLOUD, OURS, WAYS, random_samples, write
 
 from wam_bag.bag import read
-from wam_experiments.faults.bag_faults import PATIENCE, limits, mutated, values, verdict
+from wam_studies.faults.bag_faults import PATIENCE, limits, mutated, values, verdict
 
 COVERED: Final = {
     "all checksums": "everything", "unchunked, checked": "everything",

@@ -9,9 +9,9 @@ import numpy as np
 
 from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns
 from wam_description.configuration import SHARED
-from wam_experiments.thesis.definition import Experiment, configured
-from wam_experiments.thesis.recording import Recording, Step
 from wam_sim.recorded_parameters import RecordedParameters
+from wam_studies.thesis.definition import Experiment, configured
+from wam_studies.thesis.recording import Recording, Step
 
 NAMESPACE = "/wam"
 

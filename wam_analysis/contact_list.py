@@ -22,7 +22,7 @@ from wam_analysis.demo_traces import (
 )
 from wam_analysis.held_messages import held_rows
 from wam_analysis.measures.runs import runs
-from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
+from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"

@@ -19,7 +19,7 @@ from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
-from wam_control.reaction_status import REFUSAL
+from wam_control.force.reaction_status import REFUSAL
 from wam_description.status import DONE
 from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
 from wam_sim.recording import RecordedRun, recorded_run

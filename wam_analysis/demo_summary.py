@@ -23,8 +23,8 @@ from wam_analysis.task_forces import TaskForce, measured_force, task_forces, tas
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
-from wam_control.force_hold import ForceReaction
-from wam_control.scenario import FORCE_LOOP
+from wam_control.force.force_hold import ForceReaction
+from wam_control.task.scenario import FORCE_LOOP
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.reactions import SETTLING_TIME, STEADY, RecordedReaction, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of

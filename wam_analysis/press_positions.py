@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from wam_analysis.demo_traces import NAN, Mask, Traces
 from wam_analysis.task_forces import arm_of
 from wam_bag.bag import BagError, TableColumns
-from wam_control.force_axis import ForceAxes, PressedForce
-from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_axis import ForceAxes, PressedForce
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.rigid_body import RigidBody
 from wam_sim.recording import RecordedRun
 

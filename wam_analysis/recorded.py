@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from wam_bag.bag import BagError
-from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.held_messages import rows_before_gaps
 from wam_bag.bag import BagError, TableColumns
-from wam_control.task import AxisKind, TaskCommand, task_of
+from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import Table

@@ -9,8 +9,8 @@ from wam_analysis.command_gaps import CommandGap
 from wam_analysis.demo_traces import NAN, Mask, Numbers, Times, Traces
 from wam_analysis.held_messages import held_rows
 from wam_bag.bag import BagError, TableColumns
-from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.scenario import FORCE_LOOP
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.task.scenario import FORCE_LOOP
 from wam_sim.recording import RecordedRun, RecordedStep
 
 AFTER = 100_000_000  # ns, for which the force of a push or a press may last after its command

@@ -4,12 +4,12 @@ from typing import Final
 
 NODES: Final = {
     "driver": "wam_driver.interface:DriverInterface",
-    "transform": "wam_control.transform_node:TransformNode",
-    "velocity_loop": "wam_control.velocity_loop_node:VelocityLoopNode",
-    "gravity": "wam_control.gravity_node:GravityNode",
-    "force_loop": "wam_control.force_loop_node:ForceLoopNode",
-    "contact_estimator": "wam_control.contact_estimator_node:ContactEstimatorNode",
-    "scenario": "wam_control.scenario_node:ScenarioNode",
+    "transform": "wam_control.velocity.transform_node:TransformNode",
+    "velocity_loop": "wam_control.velocity.velocity_loop_node:VelocityLoopNode",
+    "gravity": "wam_control.velocity.gravity_node:GravityNode",
+    "force_loop": "wam_control.force.force_loop_node:ForceLoopNode",
+    "contact_estimator": "wam_control.contact.contact_estimator_node:ContactEstimatorNode",
+    "scenario": "wam_control.task.scenario_node:ScenarioNode",
     "recorder": "wam_ros.recorder_interface:RecorderInterface",
 }
 ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each group, for each node

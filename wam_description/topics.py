@@ -44,7 +44,7 @@ HYPOTHESIS_COLUMNS: Final = (
     "moment_y",
     "moment_z",
     "residual",  # chi^2 that the contact leaves unexplained
-    "reasons",  # why the position is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
+    "reasons",  # why the position is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact.contact_inference.REASONS`
 )
 
 FRICTION_COLUMNS: Final = (
@@ -57,7 +57,7 @@ FRICTION_COLUMNS: Final = (
 )
 
 FORCE_AXIS_COLUMNS: Final = (
-    "reaction",  # number of `wam_control.force_hold.ForceReaction`: 0 where the command is obeyed
+    "reaction",  # number of `wam_control.force.force_hold.ForceReaction`: 0 where the command is obeyed
     "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
     "force_sd_limit",  # N, above which the arm holds its position
     "lever",  # m, size of the joint torques per force
@@ -68,7 +68,7 @@ FORCE_AXIS_COLUMNS: Final = (
 )
 
 TASK_COLUMNS: Final = (
-    "kind",  # number of `wam_control.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
+    "kind",  # number of `wam_control.force.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
     "joint",  # index of the joint, -1 for a point of a link
     "link",  # index of the cover in arm.covers.names, -1 for a joint
     "position",  # m along the cover; NaN of a force: the estimated position

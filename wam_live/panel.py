@@ -12,7 +12,7 @@ import viser
 from viser import uplot
 
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
-from wam_control.reaction_status import NONE, NOT_FOLLOWED
+from wam_control.force.reaction_status import NONE, NOT_FOLLOWED
 from wam_description.arm import Arm
 from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
 from wam_description.status import PAUSED, REACTION

@@ -13,7 +13,7 @@ from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.rerun_view import joint_motion
 from wam_bag.bag import BagError, TableColumns
-from wam_control.contact_table import contact_of, likely_of
+from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
 from wam_description.world import NO_SPRINGS, World
 from wam_live.object_meshes import ObjectMeshes, at_rest

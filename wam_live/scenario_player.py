@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from wam_control.scenario import load, script_file
+from wam_control.task.scenario import load, script_file
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, values

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from wam_control.contact_table import contact_of, likely_of
+from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
 from wam_description.topics import BY_NAME, STATUS

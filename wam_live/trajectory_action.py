@@ -17,8 +17,8 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from wam_control.motion import Moving
-from wam_control.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
+from wam_control.task.motion import Moving
+from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
 from wam_description.arm import Shared
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS

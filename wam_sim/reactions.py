@@ -5,9 +5,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from wam_control.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL
-from wam_control.scenario import ScenarioStep
-from wam_control.task import AxisKind, TaskAxis, TaskCommand, watched_axes
+from wam_control.force.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, watched_axes
+from wam_control.task.scenario import ScenarioStep
 
 FAULT = "fault"
 SETTLING_TIME = "limits.settling_time"

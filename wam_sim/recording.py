@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
-from wam_control.reaction_status import CONTACT_FORCE, stated
-from wam_control.scenario import FORCE_LOOP
+from wam_control.force.reaction_status import CONTACT_FORCE, stated
+from wam_control.task.scenario import FORCE_LOOP
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, DONE, ENABLED, parse

@@ -11,7 +11,7 @@ from wam_bag.cdr_encoder import encoded
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_bag.losses import RECORDING
 from wam_bag.metadata import INFINITE
-from wam_control.scenario import ScenarioStep
+from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration
 from wam_description.interface import Interface, declared

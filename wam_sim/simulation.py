@@ -9,10 +9,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from wam_control.contact_estimator import ContactEstimate
-from wam_control.reaction_status import stated
-from wam_control.scenario import FORCE_LOOP, Scenario, ScenarioStep
-from wam_control.scenario_settings import require_settings
+from wam_control.contact.contact_estimator import ContactEstimate
+from wam_control.force.reaction_status import stated
+from wam_control.task.scenario import FORCE_LOOP, Scenario, ScenarioStep
+from wam_control.task.scenario_settings import require_settings
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.scenario import FORCE_LOOP, NO_FORCE, ScenarioStep, require_playable
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.task.scenario import FORCE_LOOP, NO_FORCE, ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody

@@ -15,7 +15,7 @@ from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
-from wam_control.stability_guard import LARGEST
+from wam_control.force.stability_guard import LARGEST
 from wam_description.signals import BASE
 from wam_sim.reactions import FAULT, STEADY, TOO_MUCH, UNREACHED, RecordedReaction, too_short, unassessed, unmet, within
 from wam_sim.reactions import sentences as reaction_sentences

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
-from wam_control.force_loop_parameters import force_law, task_of
-from wam_control.friction_verdict import Domain
-from wam_control.guard_supervision import Supervision
-from wam_control.stability_guard import (
+from wam_control.force.force_loop_parameters import force_law, task_of
+from wam_control.force.friction_verdict import Domain
+from wam_control.force.guard_supervision import Supervision
+from wam_control.force.stability_guard import (
     LARGEST,
     GuardAssessment,
     GuardedContact,
@@ -29,7 +29,7 @@ TYPICAL = 10.0  # N, of a press
 
 
 class Guarded(NamedTuple):
-    """The guard's result for the sampled loop with its velocity loops, see `wam_control.sampled_loop`.
+    """The guard's result for the sampled loop with its velocity loops, see `wam_control.force.sampled_loop`.
 
     Attributes
     ----------

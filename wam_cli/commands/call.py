@@ -14,7 +14,7 @@ from typing import Any, Final
 import yaml
 
 from wam_cli.commands import at_least, namespace
-from wam_control.scenario import Push
+from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields

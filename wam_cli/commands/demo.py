@@ -21,13 +21,13 @@ from wam_cli.commands import (
     writable_directory,
 )
 from wam_cli.commands.demo_nodes import play
-from wam_control.scenario import ScenarioStep, load_for, script_file
+from wam_control.task.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, require_parameters
 from wam_description.status import DONE
-from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
 from wam_sim.recording import recorded_run
+from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
     "Exit code: 0 if it was played to its end and no result is wrong; 1 if a result is NO, as for a force that was "
@@ -150,8 +150,8 @@ def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
 
 def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import reaction_report  # for the same reason
-    from wam_experiments.tasks.pictures import save
-    from wam_experiments.thesis.evaluation import evaluate, text
+    from wam_studies.tasks.pictures import save
+    from wam_studies.thesis.evaluation import evaluate, text
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")

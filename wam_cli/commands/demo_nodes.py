@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_cli.commands import is_paced, processes_of
-from wam_control.scenario import ScenarioStep
+from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_description.nodes import ONE
 from wam_ros.program import Stop, end_at_once_on_signals

@@ -18,13 +18,13 @@ from wam_cli.commands import evaluate_identify as identify
 from wam_cli.commands import evaluate_robustness as robustness
 from wam_cli.commands import evaluate_soak as soak
 from wam_description.configuration import Configuration
-from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
-from wam_experiments.contact_benchmark.figure import figure
-from wam_experiments.contact_benchmark.page import missed, page, report
-from wam_experiments.contact_benchmark.scenarios import BenchmarkScenario, dither_values
-from wam_experiments.contact_benchmark.timing import section, times
 from wam_sim.progress import Progress
-from wam_trials.contact_scenarios import scores
+from wam_studies.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
+from wam_studies.contact_benchmark.figure import figure
+from wam_studies.contact_benchmark.page import missed, page, report
+from wam_studies.contact_benchmark.scenarios import BenchmarkScenario, dither_values
+from wam_studies.contact_benchmark.timing import section, times
+from wam_studies.contact_scenarios import scores
 
 SEEDS = (1, 2, 3)
 

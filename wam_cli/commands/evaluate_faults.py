@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 
 from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
-from wam_experiments.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
-from wam_experiments.faults.trials import FaultKind, KindResult, played
 from wam_sim.progress import Progress
-from wam_trials.faults import interruptions
-from wam_trials.faults.kinds import REPLAYED, kinds
+from wam_studies.faults import interruptions
+from wam_studies.faults.kinds import REPLAYED, kinds
+from wam_studies.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
+from wam_studies.faults.trials import FaultKind, KindResult, played
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

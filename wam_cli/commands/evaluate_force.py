@@ -17,13 +17,13 @@ from wam_cli.commands import (
     writable_file,
 )
 from wam_description.configuration import option_values
-from wam_experiments.force_benchmark.evaluation import ForceTrial, evaluate
-from wam_experiments.force_benchmark.figure import figure
-from wam_experiments.force_benchmark.page import details, page, report, required
-from wam_experiments.force_benchmark.results_file import key
-from wam_experiments.force_benchmark.tasks import SECONDS, draw, task_values
 from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
+from wam_studies.force_benchmark.evaluation import ForceTrial, evaluate
+from wam_studies.force_benchmark.figure import figure
+from wam_studies.force_benchmark.page import details, page, report, required
+from wam_studies.force_benchmark.results_file import key
+from wam_studies.force_benchmark.tasks import SECONDS, draw, task_values
 
 RESULTS = default_folder().parent / "force-benchmark.jsonl"
 

@@ -4,9 +4,9 @@ import argparse
 import sys
 
 from wam_cli.commands import at_least, batch_of, evaluation_of, take_evaluation
-from wam_experiments.faults.page import with_section
-from wam_experiments.identification.evaluation import missed, run_trial, table, trials
 from wam_sim.batch import results
+from wam_studies.faults.page import with_section
+from wam_studies.identification.evaluation import missed, run_trial, table, trials
 
 SEEDS = (1, 2, 3)
 SHORTEST = 20.0  # s of motion

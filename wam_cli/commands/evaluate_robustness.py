@@ -4,11 +4,12 @@ import argparse
 from pathlib import Path
 
 from wam_cli.commands import at_least, batch_of, evaluation_of, take_evaluation
-from wam_experiments.contact_benchmark.evaluation import evaluate_scenario
-from wam_experiments.contact_benchmark.timing import reference_time
-from wam_experiments.contact_robustness import degradations
-from wam_experiments.contact_robustness.comparison import first_tasks
-from wam_experiments.contact_robustness.evaluation import (
+from wam_sim.batch import results
+from wam_studies.contact_benchmark.evaluation import evaluate_scenario
+from wam_studies.contact_benchmark.timing import reference_time
+from wam_studies.contact_robustness import degradations
+from wam_studies.contact_robustness.comparison import first_tasks
+from wam_studies.contact_robustness.evaluation import (
     SHORTEST,
     RobustnessResult,
     average_update,
@@ -19,8 +20,7 @@ from wam_experiments.contact_robustness.evaluation import (
     page,
     report_text,
 )
-from wam_experiments.identification.evaluation import run_trial
-from wam_sim.batch import results
+from wam_studies.identification.evaluation import run_trial
 
 SEEDS = (1, 2, 3)
 

@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
-from wam_experiments.faults.page import with_section
 from wam_sim.progress import Progress
-from wam_trials.faults.soak import soak
+from wam_studies.faults.page import with_section
+from wam_studies.faults.soak import soak
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

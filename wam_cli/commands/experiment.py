@@ -6,13 +6,13 @@ import time
 from pathlib import Path
 
 from wam_cli.commands import PAGE, writable_directory, writable_file
-from wam_experiments.thesis.definition import Experiment, Run, load, names
-from wam_experiments.thesis.evaluation import evaluate, text
-from wam_experiments.thesis.figure import draw
-from wam_experiments.thesis.page import write
-from wam_experiments.thesis.rows import Result
 from wam_ros.program import Stop
-from wam_trials.experiment_runs import record
+from wam_studies.experiment_runs import record
+from wam_studies.thesis.definition import Experiment, Run, load, names
+from wam_studies.thesis.evaluation import evaluate, text
+from wam_studies.thesis.figure import draw
+from wam_studies.thesis.page import write
+from wam_studies.thesis.rows import Result
 
 PICTURE = "result.png"
 SHOWN_EVERY = 0.2  # s

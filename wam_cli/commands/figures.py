@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from wam_cli.commands import batch_of, take_batch, writable_directory
-from wam_experiments.figures.catalogue import FIGURES, file_of, known, numbers, table
+from wam_studies.figures.catalogue import FIGURES, file_of, known, numbers, table
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,12 +16,12 @@ from wam_cli.commands import (
     topic_map_of,
     writable_picture,
 )
-from wam_control.force_loop import ForceLoop
-from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.loop_design import loop_design
+from wam_control.force.force_loop import ForceLoop
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration
-from wam_experiments.stability.guard_validation import Trial, exact_trials, table, testbed_trials
-from wam_experiments.stability.map_picture import draw
+from wam_studies.stability.guard_validation import Trial, exact_trials, table, testbed_trials
+from wam_studies.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 PLANT = {  # option: what it is

@@ -29,13 +29,13 @@ from wam_cli.commands import (
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
-from wam_experiments.identification.excitation import scenario
 from wam_ros.bring_up import Composition
 from wam_ros.network import move_to_free_domain
 from wam_ros.program import Stop
 from wam_ros.run import NAMESPACE
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
+from wam_studies.identification.excitation import scenario
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
 MODEL = FileKind("a configuration", YAML_SUFFIXES, MODEL_HEADING)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from wam_cli.commands import TABLE, at_least, batch_of, rising, take_batch, writable_file
-from wam_experiments.stability.stability_map import stability_map, write_csv
+from wam_studies.stability.stability_map import stability_map, write_csv
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from wam_cli.commands import writable_picture
-from wam_experiments.plant.figure import figure
+from wam_studies.plant.figure import figure
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

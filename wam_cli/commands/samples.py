@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 from wam_cli.commands.experiment import play
-from wam_experiments.thesis.definition import Experiment, load, names, tasks
-from wam_experiments.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 from wam_ros.program import Stop
+from wam_studies.thesis.definition import Experiment, load, names, tasks
+from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 
 RECORDED = "recorded"  # in the directory of the samples: what they are cut from, by a path that is the same everywhere
 

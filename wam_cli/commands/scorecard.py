@@ -3,7 +3,7 @@
 import argparse
 
 from wam_cli.commands import configuration_of, take_configuration
-from wam_experiments.scorecard import report
+from wam_studies.scorecard import report
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -27,13 +27,13 @@ from wam_cli.commands import (
     writable_file,
     writable_picture,
 )
-from wam_control.scenario import load, script_file
+from wam_control.task.scenario import load, script_file
 from wam_description import yaml_text
 from wam_description.configuration import LONGEST, option_values
-from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
-from wam_experiments.thesis import definition, sweeping
 from wam_sim.batch import results
 from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, points, sweep
+from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
+from wam_studies.thesis import definition, sweeping
 
 RANDOM_RUNS, RANDOM_SEED = 100, 1
 SCENARIO = "demo_scenario"

@@ -15,7 +15,7 @@ from wam_cli.commands import (
     timed,
 )
 from wam_cli.commands.live import page_next_to
-from wam_control.scenario import load_for
+from wam_control.task.scenario import load_for
 from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_ros.bring_up import start

@@ -1,0 +1,1522 @@
+"""The report of a demonstration against recordings made by hand, whose answers are known."""
+
+import itertools
+import json
+import math
+import signal
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from wam_analysis import arm_picture, demo_report
+from wam_analysis.contact_comparison import NOT_RECORDED
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_PLACED, CutBy, certainty_of, listed_contacts
+from wam_analysis.demo_figure import draw_arm, draw_forces, save
+from wam_analysis.demo_report import VerdictResult, report, text
+from wam_analysis.demo_summary import DemoSummary, summarize, summary_of
+from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
+from wam_analysis.findings.analysis import analyse_bag
+from wam_analysis.findings.text import text as analysis_text
+from wam_analysis.press_positions import PositionedForce, PressPositions
+from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_cli.commands.demo import _report
+from wam_cli.main import main
+from wam_control.contact.contact_inference import REASONS, SECOND
+from wam_control.force.force_axis import ForceAxes, PressedForce
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.task.scenario import load as load_steps
+from wam_description.configuration import Configuration, packaged
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import Contact
+from wam_description.status import CHANGES
+from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
+from wam_sim.reactions import RecordedReaction, sentences
+from wam_sim.recorded_parameters import recorded_parameters
+from wam_sim.recording import recorded_run
+from wam_sim.simulated_bag import record
+from wam_studies.thesis.definition import load
+
+MS = 1_000_000
+PERIOD = 5 * MS
+START = 200 * MS
+STAMPS = START + PERIOD * np.arange(2000)  # 10 s
+POSE = [0.0, -1.2, 0.0, 0.53]
+STEPS = {"push outer": 0.0, "push inner": 2.0, "lower": 4.0, "press 8 N": 5.0, "press 4 N": 7.0, "lift": 9.0}
+REASON = REASONS[0]
+PARAMETERS = "arm: {joints: "  # not YAML
+NO_LIMIT = "without a commanded force no contact above limits.contact_force: NOT SHOWN, see below"
+NO_TASK = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(0), {"kind": np.zeros(0)})  # no axes
+
+
+class Recording:
+    """A demonstration on paper: a link, a position and a force in each of its times, and what was estimated.
+
+    Truth: pushes of 12 N at 0.28 m and of 15 N at 0.4 m; then a box, touched at 4.9 s with 3 N.
+    """
+
+    def __init__(self) -> None:
+        k = len(STAMPS)
+        self.true = [("base", (0.0, 0.0, 0.0), math.nan)] * k
+        self.estimated = list(self.true)
+        self.commanded = [("base", (0.0, 0.0, 0.0), math.nan)] * k
+        self.push = list(self.commanded)
+        self.measured = list(self.commanded)
+        self.set(self.push, 0.5, 1.5, "outer_link", (0.0, 12.0, 0.0))
+        self.set(self.true, 0.5, 1.5, "outer_link", (0.0, 12.0, 0.0), 0.28)
+        self.set(self.estimated, 0.52, 1.55, "outer_link", (0.0, 11.0, 0.0), 0.30)
+        self.set(self.push, 2.5, 3.5, "inner_link", (0.0, 15.0, 0.0))
+        self.set(self.true, 2.5, 3.5, "inner_link", (0.0, 15.0, 0.0), 0.4)
+        self.set(self.estimated, 2.5, 3.5, "inner_link", (0.0, 10.0, 0.0))
+        self.set(self.true, 4.9, 9.2, "outer_link", (-1.0, 3.0, 0.0), 0.25)
+        self.set(self.estimated, 4.93, 9.2, "outer_link", (0.0, 3.0, 0.0), 0.26)
+        for begin, end, newtons in ((5.0, 7.0, 8.0), (7.0, 9.0, 4.0)):
+            self.set(self.commanded, begin, end, "outer_link", (0.0, -newtons, 0.0))
+            self.set(self.measured, begin, end, "outer_link", (0.0, -newtons, 0.0))
+            self.set(self.true, begin, end, "outer_link", (-2.0, 1.05 * newtons, 0.0), 0.25)
+            self.set(self.estimated, begin, end, "outer_link", (0.0, 0.98 * newtons, 0.0), 0.27)
+        self.set(self.true, 5.0, 5.5, "outer_link", (0.0, 20.0, 0.0), 0.25)  # has died out in the steady state
+        self.statuses = [(name, START + round(1e9 * at), 0) for name, at in STEPS.items()]
+        self.statuses.append(("done", START + 10_000 * MS, 0))
+        self.timing: list[dict[str, str]] = []
+        self.recording: dict[str, str] = {}
+        self.namespace = "/wam"
+        self.without: tuple[str, ...] = ()
+
+    def set(
+        self, series: list[Any], begin: float, end: float, frame: str, force: Any, position: float = math.nan
+    ) -> None:
+        rows = slice(round(begin * 200), round(end * 200))
+        series[rows] = [(frame, force, position)] * len(series[rows])
+
+    def bag(self) -> Bag:
+        topics: dict[str, Columns] = {
+            "force_command": wrenches(self.commanded),
+            "force_measured": wrenches(self.measured),
+            "contact/wrench": wrenches(self.estimated),
+            "contact/point": points(self.estimated),
+            "contact/hypotheses": hypotheses(self.estimated),
+            "sim/contact/wrench": wrenches(self.true),
+            "sim/contact/point": points(self.true),
+            "sim/disturbance": wrenches(self.push),
+            "sim/joint_states": joints(),
+            "status": messages([status("driver", "braked"), *itertools.starmap(said, self.statuses)]),
+        }
+        kept = {f"{self.namespace}/{name}": columns for name, columns in topics.items() if name not in self.without}
+        kept["/diagnostics"] = messages([array(START, status("driver", "enabled", **facts)) for facts in self.timing])
+        types = {f"{self.namespace}/{name}": BY_NAME[name].type for name in topics}
+        attachments = {"parameters.yaml": PARAMETERS.encode()}
+        return Bag(Path("bag"), kept, types, attachments, {"recording": self.recording})
+
+    def summary(self) -> DemoSummary:
+        return summarize(self.bag())
+
+
+def verdict(summary):
+    return " | ".join(map(str, demo_report.verdict(summary)))
+
+
+def hypotheses(series: list[Any]) -> TableColumns:
+    """A hypothesis of 97 % for each estimated contact; on the inner link its position is unknown for a reason."""
+    rows = [i for i, (frame, _, _) in enumerate(series) if frame != "base"]
+    inner = np.array([series[i][0] == "inner_link" for i in rows], float)
+    known = {"probability": 0.97, "position_sd": 0.03, "force_sd": 0.5}
+    columns = {name: np.full(len(rows), known.get(name, 0.0)) for name in HYPOTHESIS_COLUMNS}
+    columns["reasons"] = inner * 2 ** REASONS.index(REASON)
+    columns["is_lower_bound"] = inner
+    columns["position"] = np.array([series[i][2] for i in rows])
+    frames = tuple(series[i][0] for i in rows)
+    return TableColumns(STAMPS[rows], STAMPS[rows], frames, np.arange(len(rows)), columns)
+
+
+def wrenches(series: list[Any]) -> WrenchColumns:
+    forces = np.array([force for _, force, _ in series])
+    return WrenchColumns(STAMPS, STAMPS, tuple(frame for frame, _, _ in series), forces, np.zeros_like(forces))
+
+
+def points(series: list[Any]) -> PointColumns:
+    positions = np.array([(position, 0.0, 0.0) for _, _, position in series])
+    return PointColumns(STAMPS, STAMPS, tuple(frame for frame, _, _ in series), positions)
+
+
+def joints() -> JointColumns:
+    names = ("joint1", "joint2", "joint3", "joint4")
+    pose = np.tile(POSE, (len(STAMPS), 1))
+    return JointColumns(STAMPS, STAMPS, ("",) * len(STAMPS), names, pose, pose, pose)
+
+
+def messages(decoded: list[Any]) -> Messages:
+    return Messages(np.zeros(len(decoded), np.int64), tuple(decoded))
+
+
+def status(name: str, message: str, level: int = 0, **values: str) -> Any:
+    pairs = [SimpleNamespace(key=key, value=value) for key, value in values.items()]
+    return SimpleNamespace(name=name, message=message, level=level, values=pairs)
+
+
+def said(message: str, stamp: int, level: int) -> Any:
+    return status("scenario", message, level, stamp=str(stamp))
+
+
+def array(stamp: int, *statuses: Any) -> Any:
+    time = SimpleNamespace(sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return SimpleNamespace(header=SimpleNamespace(stamp=time), status=statuses)
+
+
+def arm_of(bag: Bag) -> RecordedArm:
+    return recorded_arm(recorded_parameters(bag, "/wam"))
+
+
+def test_steps_run_from_one_status_to_the_next():
+    summary = Recording().summary()
+    assert [step.name for step in summary.steps] == list(STEPS)
+    assert [(step.begin - START) / 1e9 for step in summary.steps] == list(STEPS.values())
+    assert summary.steps[-1].end == START + 10_000 * MS
+    assert summary.outcome == "done"
+    assert summary.notes == ()
+
+
+def test_a_step_may_have_the_name_with_which_a_scenario_ends():
+    bag = Recording().bag()
+    names = ("press", "done", "brake")
+    steps = [status("scenario", name, stamp=str(START + i), step=name) for i, name in enumerate(names)]
+    bag.topics["/wam/status"] = messages([*steps, said("done", START + 3, 0)])
+    run = recorded_run(bag)
+    assert [step.name for step in run.steps] == list(names)
+    assert run.unfinished is None
+    assert run.outcome == "done"
+
+
+def test_press_is_judged_in_its_steady_last_second_along_the_force_asked_for():
+    first, second = Recording().summary().presses
+    assert (first.step, second.step) == ("press 8 N", "press 4 N")
+    assert first.commanded == 8.0
+    assert first.true == pytest.approx(8.4)  # not the 20 N of its begin, nor the friction of 2 N along the link
+    assert first.error(first.true) == pytest.approx(5.0)
+    assert first.measured == pytest.approx(8.0)
+    assert first.estimated == pytest.approx(7.84)
+    assert second.error(second.estimated) == pytest.approx(-2.0)
+
+
+def test_steady_state_is_the_last_second_of_a_long_step_and_the_last_half_of_a_short_one():
+    recording = Recording()
+    del recording.statuses[4]  # the press now lasts 4 s
+    recording.set(recording.true, 7.0, 8.0, "outer_link", (0.0, 20.0, 0.0), 0.25)
+    (long,) = recording.summary().presses
+    assert long.end - long.begin == 1000 * MS
+    assert long.true == pytest.approx(4.2)
+    recording.statuses[3] = ("press", START + 8400 * MS, 0)
+    assert recording.summary().presses[-1].begin == START + 8700 * MS
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.5, 0.9])
+def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(seconds):
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 2.0, 0.0), 0.25)  # not yet 4 N
+    recording.statuses[5] = ("lift", START + round(1e9 * (7.0 + seconds)), 0)
+    recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
+    shown = text(recording.summary())
+    assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
+    row = next(line.split() for line in shown.splitlines() if line.startswith("  press 4 N   "))
+    assert row[3:9] == ["4.00", "-", "-", "short", "-", "short"]
+    analysis = " ".join(analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100).split())
+    assert "the worst true one in the steady state is +5.0 % off (press 8 N, 8 N commanded)." in analysis
+    assert ("press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis) == (seconds > 0.3)
+    assert "press 4 N: bias" not in analysis
+
+
+def test_force_of_the_world_counts_with_the_opposite_sign_of_the_command():
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, -4.0, 0.0), 0.25)  # pulls
+    assert recording.summary().presses[1].true == pytest.approx(-4.0)
+
+
+def test_ripple_is_half_of_the_range_in_the_steady_state():
+    recording = Recording()
+    recording.set(recording.true, 8.5, 9.0, "outer_link", (0.0, 5.2, 0.0), 0.25)
+    press = recording.summary().presses[1]
+    assert press.ripple == pytest.approx(0.5)
+    assert press.true == pytest.approx((4.2 + 5.2) / 2)
+
+
+def test_a_force_that_swings_is_not_right_because_its_mean_is():
+    recording = Recording()
+    recording.set(recording.true, 8.0, 8.5, "outer_link", (0.0, 3.5, 0.0), 0.25)
+    recording.set(recording.true, 8.5, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
+    press = recording.summary().presses[1]
+    assert (press.commanded, press.true) == (4.0, pytest.approx(4.0))
+    assert "force within 10 %: NO (12.5 %, 12.5 % of it ripple)" in verdict(recording.summary())
+
+
+def test_lost_contact_while_pressing_counts_as_no_force():
+    recording = Recording()
+    recording.set(recording.true, 8.0, 9.0, "base", (0.0, 0.0, 0.0))
+    assert recording.summary().presses[1].true == 0.0
+
+
+def test_force_on_another_link_than_commanded_is_not_compared():
+    recording = Recording()
+    recording.set(recording.true, 8.0, 9.0, "inner_link", (0.0, 4.0, 0.0), 0.5)
+    assert math.isnan(recording.summary().presses[1].true)
+
+
+def test_contacts_have_link_position_force_and_latency():
+    outer, inner, press, held, lifted = Recording().summary().touches
+    assert (outer.link_true, outer.link_estimated) == ("outer_link", "outer_link")
+    assert (outer.position_true, outer.position_estimated) == pytest.approx((0.28, 0.30))
+    assert (outer.force_true, outer.force_estimated) == pytest.approx((12.0, 11.0))
+    assert outer.right == pytest.approx(196 / 200)
+    assert outer.latency == pytest.approx(0.02)
+    assert (inner.link_true, inner.latency) == ("inner_link", 0.0)
+    assert press.latency == pytest.approx(0.03)  # the contact began while lowering
+    assert held.latency is None
+    assert (lifted.step, lifted.latency, lifted.force_true) == ("lift", None, pytest.approx(math.hypot(1.0, 3.0)))
+    assert press.force_true == pytest.approx(math.hypot(2.0, 8.4))
+
+
+def test_two_contacts_in_one_step_are_compared_one_by_one_each_with_its_own_force():
+    """A light push on the inner link is missed; later in the step the outer link runs into something."""
+    recording = Recording()
+    recording.set(recording.push, 0.0, 2.0, "inner_link", (0.0, 0.05, 0.0))
+    recording.set(recording.true, 0.1, 0.5, "inner_link", (0.0, 0.05, 0.0), 0.4)
+    missed, hit, *_ = recording.summary().touches
+    assert [one.step for one in (missed, hit)] == ["push outer", "push outer"]
+    assert (missed.link_true, missed.link_estimated, missed.force_true) == ("inner_link", NO_LINK, 0.05)
+    assert (hit.link_true, hit.force_true, hit.force_estimated) == ("outer_link", 12.0, 11.0)
+    assert math.isnan(missed.force_estimated)
+    assert (hit.is_lower_bound, hit.latency) == (False, pytest.approx(0.02))
+    assert math.isnan(missed.latency or 0.0)
+
+
+def test_without_a_pause_between_them_contacts_on_two_links_are_two():
+    recording = Recording()
+    recording.set(recording.true, 1.0, 1.5, "inner_link", (0.0, 30.0, 0.0), 0.4)
+    recording.set(recording.estimated, 1.05, 1.55, "inner_link", (0.0, 25.0, 0.0))
+    outer, inner, *_ = recording.summary().touches
+    assert [(one.link_true, one.link_estimated) for one in (outer, inner)] == [
+        ("outer_link", "outer_link"),
+        ("inner_link", "inner_link"),
+    ]
+    assert (outer.force_true, outer.force_estimated, inner.force_true, inner.force_estimated) == (12, 11, 30, 25)
+    assert inner.right == pytest.approx(0.9)
+    assert inner.latency is None  # the estimate of the contact before goes on
+
+
+def test_a_contact_that_goes_on_into_a_step_that_only_moves_is_compared_there_too():
+    recording = Recording()
+    recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 30.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "inner_link", (0.0, 30.0, 0.0))
+    last = recording.summary().touches[-1]
+    assert (last.step, last.link_true, last.link_estimated, last.force_true) == (
+        "lift",
+        "outer_link",
+        "inner_link",
+        30.0,
+    )
+    assert "right link: NO (another link)" in verdict(recording.summary())
+
+
+def test_a_touch_just_before_a_press_belongs_to_the_press():
+    """Else the step that lowers the arm until it touches would be compared in the time of detection alone."""
+    recording = Recording()
+    recording.set(recording.true, 4.6, 5.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    assert [touch.step for touch in recording.summary().touches].count("lower") == 0
+    recording.set(recording.true, 4.4, 5.0, "outer_link", (0.0, 3.0, 0.0), 0.25)  # for longer
+    assert [touch.step for touch in recording.summary().touches].count("lower") == 1
+
+
+def test_the_estimate_of_the_contact_before_is_no_early_detection():
+    recording = Recording()
+    recording.set(recording.estimated, 1.55, 2.5, "outer_link", (0.0, 1.0, 0.0), 0.28)  # never released
+    assert recording.summary().touches[0].latency == pytest.approx(0.02)
+    recording.set(recording.true, 1.6, 2.5, "base", (0.0, 0.0, 0.0))
+    assert recording.summary().touches[1].latency is None
+
+
+def test_while_the_estimate_is_missing_nothing_is_missed_and_no_latency_is_known():
+    bag = Recording().bag()
+    kept = np.r_[0:95, 160:2000]  # of 0.52 to 1.55 s
+    estimated = bag.topics["/wam/contact/wrench"]
+    lost = thinned(estimated, kept)
+    touch = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost})).touches[0]
+    assert (touch.link_estimated, touch.latency) == ("outer_link", None)
+    nothing = thinned(estimated, np.r_[0:95, 320:2000])
+    touch = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": nothing})).touches[0]
+    assert (touch.link_estimated, touch.latency) == (NOT_RECORDED, None)
+
+
+def thinned(columns: WrenchColumns, kept: Any) -> WrenchColumns:
+    frames = tuple(columns.frames[i] for i in kept)
+    return WrenchColumns(STAMPS[kept], STAMPS[kept], frames, columns.force[kept], columns.torque[kept])
+
+
+def test_without_contact_point_the_position_is_that_of_the_hypotheses_and_no_force_becomes_a_lower_bound():
+    recording = Recording()
+    recording.without = ("contact/point",)
+    outer, inner, *_ = recording.summary().touches
+    assert (outer.is_lower_bound, outer.position_estimated) == (False, pytest.approx(0.30))
+    assert inner.is_lower_bound
+    assert verdict(recording.summary()) == verdict(Recording().summary())
+
+
+def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower_bound():
+    recording = Recording()
+    recording.without = ("contact/point", "contact/hypotheses")
+    summary = recording.summary()
+    assert not any(touch.is_lower_bound for touch in summary.touches)
+    assert all(math.isnan(one.force_error) for one in summary.contacts)  # the force may be the least one
+    shown = text(summary)
+    assert ">=" not in shown
+    assert "?" not in shown
+    assert f"position -: {NOT_PLACED}" in " ".join(shown.split())
+    assert "less than half" not in shown
+    section = contact_section(recording)
+    assert f"Positions of contacts: {NOT_PLACED}." in section.sentences
+    errors = [one for one in section.findings if one.quantity == "error of the size of the force"]
+    assert {one.note for one in errors} == {"not known: the force may be only the least one"}
+    recording.without = ("contact/hypotheses",)  # with contact/point it is known
+    outer, inner, *_ = recording.summary().contacts
+    assert (outer.force_error, inner.estimate.is_lower_bound) == (pytest.approx(-1.0), True)
+    assert math.isnan(inner.force_error)
+
+
+def test_a_lower_bound_has_no_error_in_the_median_either():
+    recording = Recording()
+    recording.set(recording.true, 2.1, 3.9, "inner_link", (0.0, 15.0, 0.0), 0.4)  # nearly half of all contact
+    recording.set(recording.estimated, 2.1, 3.9, "inner_link", (0.0, 5.0, 0.0))
+    recording.set(recording.true, 4.5, 10.0, "base", (0.0, 0.0, 0.0))
+    name = "size of the force error, median"
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert error.measured == pytest.approx(1.0)
+    recording.without = ("contact/point", "contact/hypotheses")
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert math.isnan(error.measured)
+
+
+def test_a_hole_in_a_recording_of_the_estimate_alone_ends_the_contact():
+    recording = without_truth(Recording())
+    bag = recording.bag()
+    lost = thinned(bag.topics["/wam/contact/wrench"], np.r_[0:1200, 1300:2000])  # from 6.0 to 6.5 s
+    topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": lost}
+    summary = summarize(bag._replace(topics=topics))
+    pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
+    assert pressed == [(CutBy.NOTHING, CutBy.GAP), (CutBy.GAP, CutBy.NOTHING)]
+
+
+def test_a_thinned_recording_has_no_gaps():
+    recording = without_truth(Recording())
+    bag = recording.bag()
+    few = thinned(bag.topics["/wam/contact/wrench"], np.r_[0:2000:40])  # every 0.2 s
+    topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": few}
+    contacts = summarize(bag._replace(topics=topics)).contacts
+    assert [one.step for one in contacts] == ["push outer", "push inner", "press 8 N", "press 4 N"]
+    assert {cut for one in contacts for cut in (one.before, one.after)} == {CutBy.NOTHING}
+
+
+def with_limits(recording: Recording) -> Bag:
+    """The same, with the parameters of the force loop and a status of it in the last step."""
+    sections = Configuration.load(packaged("wam")).sections
+    content = yaml.safe_dump({"/wam/force_loop": {"ros__parameters": {**sections["/**"], **sections["force_loop"]}}})
+    bag = recording.bag()
+    reacts = status("force_loop", "at least 81 N", stamp=str(START + 9300 * MS), reaction="contact_force")
+    stated = messages([*itertools.starmap(said, recording.statuses), reacts])
+    topics = {**bag.topics, "/wam/status": stated, "/wam/task_command": NO_TASK}
+    return bag._replace(topics=topics, attachments={"parameters.yaml": content.encode()})
+
+
+def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 80.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.2, 9.6, "outer_link", (0.0, 70.0, 0.0), 0.25)
+    assert summarize(with_limits(recording)).unplanned.hard == ()
+    recording.set(recording.true, 9.4, 9.5, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    summary = summarize(with_limits(recording))
+    assert summary.unplanned.unknown == ""
+    answer = demo_report.verdict(summary)[-1]
+    assert str(answer) == "without a commanded force no contact above 90 N: NO (157 N)"
+    sentence = (
+        "lift: TOO HARD: a contact with 157 N (true, at 9.60 s) while no force was commanded; allowed: "
+        "limits.contact_force, 90 N."
+    )
+    assert sentence in " ".join(text(summary).split())
+    (section,) = (
+        one for one in analyse_bag(with_limits(recording), lambda doing: None).sections if one.key == "contact"
+    )
+    assert sentence in section.verdict
+    assert sentence in " ".join(demo_report.reaction_text(summary).split())  # of a task, which has its own report
+
+
+def nothing_but(true: tuple[float, float, str, float], estimated: tuple[float, float, str, float]) -> Recording:
+    """A recording with one true and one estimated contact: begin, end, link and N."""
+    recording = Recording()
+    for series in (recording.true, recording.estimated, recording.push, recording.commanded, recording.measured):
+        recording.set(series, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    for series, (begin, end, link, newtons) in ((recording.true, true), (recording.estimated, estimated)):
+        recording.set(series, begin, end, link, (0.0, newtons, 0.0), 0.28)
+    return recording
+
+
+@pytest.mark.parametrize(
+    ("steps", "name"),
+    [((), ""), ((0.0, 0.9), ""), ((1.5, 5.0), "move"), ((0.0, 1.2), "move"), ((0.0, 5.0), "move")],
+    ids=["no scenario", "after it", "begins before", "goes on after", "in it"],
+)
+def test_a_contact_is_too_hard_whenever_it_is(steps, name):
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    recording = nothing_but(hit, hit)
+    stamps = [START + round(1e9 * at) for at in steps]
+    recording.statuses = [(said, stamp, 0) for said, stamp in zip(("move", "done"), stamps, strict=False)]
+    summary = summarize(with_limits(recording))
+    assert name in [hard.step for hard in summary.unplanned.hard]
+    assert demo_report.verdict(summary)[-1].result is VerdictResult.NO
+    assert "TOO HARD: a contact with 200 N" in text(summary)
+
+
+def test_where_the_allowed_force_is_not_known_no_contact_is_shown_to_be_soft_enough():
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    recording = nothing_but(hit, hit)
+    odd = with_limits(recording)
+    odd.topics["/wam/status"].messages[0].values.append(
+        SimpleNamespace(key="force_loop:limits.contact_force", value="x")
+    )
+    for bag in (recording.bag(), odd):
+        summary = summarize(bag)
+        assert str(demo_report.verdict(summary)[-1]) == NO_LIMIT
+        sentence = (
+            "Whether a contact without a commanded force was too hard is not known: limits.contact_force of the force "
+            "loop was not recorded, or cannot be read."
+        )
+        assert sentence in " ".join(text(summary).split())
+        (section,) = (one for one in analyse_bag(bag, lambda doing: None).sections if one.key == "contact")
+        assert sentence in section.verdict
+    nothing = nothing_but((1.0, 1.0, "base", 0.0), (1.0, 1.0, "base", 0.0))
+    assert summarize(nothing.bag()).unplanned == ((), "")
+    elsewhere = with_limits(recording)  # a setting of a node that was not recorded
+    elsewhere.topics["/wam/status"].messages[0].values.append(SimpleNamespace(key="driver:world.box", value="1"))
+    assert len(summarize(elsewhere).unplanned.hard) == 1
+
+
+def test_what_a_node_takes_live_is_what_is_allowed_from_then_on():
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    bag = with_limits(nothing_but(hit, hit))
+    given = {"force_loop:limits.contact_force": "250.0", CHANGES: "1"}
+    bag.topics["/wam/status"] = messages(
+        [status("force_loop", "", stamp=str(START), **given), *bag.topics["/wam/status"].messages]
+    )
+    assert summarize(bag).unplanned == ((), "")
+
+
+@pytest.mark.parametrize("lost", ["sim/disturbance", "force_command", "task_command"])
+def test_a_hard_contact_that_may_have_been_commanded_is_not_shown_to_be_too_hard(lost):
+    hit = (1.0, 2.0, "outer_link", 120.0)
+    bag = with_limits(nothing_but(hit, hit))
+    assert len(summarize(bag).unplanned.hard) == 1
+    del bag.topics[f"/wam/{lost}"]
+    summary = summarize(bag)
+    assert summary.unplanned.hard == ()
+    assert str(demo_report.verdict(summary)[-1]) == NO_LIMIT
+    sentence = f"one had 120 N, and what may have been commanded then was not recorded ({lost})"
+    assert sentence in " ".join(text(summary).split())
+    soft = (1.0, 2.0, "outer_link", 80.0)
+    bag = with_limits(nothing_but(soft, soft))
+    del bag.topics[f"/wam/{lost}"]
+    assert summarize(bag).unplanned == ((), "")  # allowed in any case
+
+
+def without_rows(bag: Bag, topic: str, begin: float, end: float) -> Bag:
+    """A bag without the messages of a topic between two times, s."""
+    columns = bag.topics[f"/wam/{topic}"]
+    time = (columns.stamp_ns - START) / 1e9
+    kept = np.flatnonzero((time < begin) | (time >= end))
+    if isinstance(columns, TableColumns):
+        frames = tuple(columns.frames[i] for i in kept)
+        rows = np.isin(columns.message, kept)
+        message = np.searchsorted(kept, columns.message[rows])
+        values = {name: column[rows] for name, column in columns.columns.items()}
+        left: Columns = TableColumns(STAMPS[kept], STAMPS[kept], frames, message, values)
+    else:
+        left = thinned(columns, kept)
+    return bag._replace(topics={**bag.topics, f"/wam/{topic}": left})
+
+
+@pytest.mark.parametrize("topic", ["sim/disturbance", "force_command", "task_command"])
+def test_within_a_gap_of_a_command_it_is_not_known_what_was_commanded(topic):
+    hit = (3.0, 4.0, "outer_link", 120.0)
+    recording = nothing_but(hit, hit)
+    hard_as_well = (6.0, 6.5, "outer_link", 110.0)
+    for series in (recording.true, recording.estimated):
+        recording.set(series, *hard_as_well[:3], (0.0, hard_as_well[3], 0.0), 0.28)
+    recording.statuses = [(said_of, at, 0) for said_of, at in (("move", START), ("done", START + 10_000 * MS))]
+    bag = without_rows(with_limits(recording), topic, 2.0, 5.0)
+    summary = summarize(bag)
+    assert [(hard.force, hard.step) for hard in summary.unplanned.hard] == [(110.0, "move")]  # outside of the gap
+    assert (
+        f"one had 120 N, and what may have been commanded then was not recorded ({topic})" in summary.unplanned.unknown
+    )
+    gap = f"{topic} was not recorded from 2.19 to 5.20 s: what was commanded then is not known."
+    assert summary.lost == (gap,)
+    assert f"INCOMPLETE: {gap}" in " ".join(text(summary).split())
+    happened = next(one for one in analyse_bag(bag, lambda doing: None).sections if one.key == "happened")
+    assert f"INCOMPLETE: {gap}" in happened.verdict
+
+
+def test_at_the_ends_of_a_scenario_a_missing_command_is_a_gap_too():
+    bag = with_limits(Recording())
+    assert summarize(bag).lost == ()
+    early, late = (summarize(without_rows(bag, "force_command", *span)).lost for span in ((0.0, 1.0), (8.0, 10.0)))
+    assert early == ("force_command was not recorded from 0.20 to 1.20 s: what was commanded then is not known.",)
+    assert late == ("force_command was not recorded from 8.20 to 10.20 s: what was commanded then is not known.",)
+
+
+def test_a_program_that_pauses_leaves_no_gap():
+    """What ends with a zero force is over, and the recorder has counted every message of what ends without one."""
+    hit = (3.0, 4.0, "outer_link", 120.0)
+    recording = nothing_but(hit, hit)
+    recording.statuses = []
+    paused = without_rows(with_limits(recording), "force_command", 2.0, 5.0)
+    assert (summarize(paused).lost, len(summarize(paused).unplanned.hard)) == ((), 1)
+    recording.set(recording.commanded, 1.0, 2.0, "outer_link", (0.0, -5.0, 0.0))
+    killed = without_rows(with_limits(recording), "force_command", 2.0, 5.0)
+    assert (len(summarize(killed).lost), summarize(killed).unplanned.hard) == (1, ())
+    number = len(killed.topics["/wam/force_command"].stamp_ns)
+    for received, dropped, gaps in ((number, 0, 0), (number + 3, 0, 1), (number, 3, 1)):
+        counts = {"/wam/force_command press received": str(received), "/wam/force_command press dropped": str(dropped)}
+        counted = killed._replace(metadata={"recording": counts}, counts={"/wam/force_command": number})
+        summary = summarize(counted)
+        assert sum("is not known" in line for line in summary.lost) == gaps
+        assert len(summary.unplanned.hard) == 1 - gaps
+
+
+def test_a_force_is_not_held_through_a_gap_of_its_command():
+    bag = without_rows(with_limits(Recording()), "force_command", 5.5, 6.5)
+    holds = analyse_bag(bag, lambda doing: None).recording.holds
+    times = [((hold.begin - START) / 1e9, (hold.end - START) / 1e9) for hold in holds]
+    assert times == [(5.0, 5.5), (6.5, 7.0), (7.0, 9.0)]
+
+
+def test_the_force_of_a_task_is_not_held_through_a_gap_of_its_command():
+    sections = Configuration.load(packaged("wam")).sections
+    content = yaml.safe_dump({"/wam/driver": {"ros__parameters": {**sections["/**"], **sections["driver"]}}})
+    row = dict(zip(TASK_COLUMNS, (1.0, -1.0, 1.0, 0.25, 0.0, -1.0, 0.0, 8.0, 0.0, 0.0, 0.0), strict=True))
+    columns = {name: np.full(len(STAMPS), value) for name, value in row.items()}
+    task = TableColumns(STAMPS, STAMPS, ("outer_link",) * len(STAMPS), np.arange(len(STAMPS)), columns)
+    bag = Recording().bag()._replace(attachments={"parameters.yaml": content.encode()})
+    bag = without_rows(bag._replace(topics={**bag.topics, "/wam/task_command": task}), "task_command", 2.0, 5.0)
+    times = [((one.begin - START) // MS, (one.end - START) // MS) for one in summarize(bag).tasks]
+    assert times == [(0, 1995), (5000, 9995)]
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 5])
+def test_a_lower_bound_stays_one_where_positions_are_recorded_less_often(every):
+    bag = Recording().bag()
+    points = bag.topics["/wam/contact/point"]
+    kept = np.arange(0, len(STAMPS), every)
+    few = PointColumns(STAMPS[kept], STAMPS[kept], tuple(points.frames[i] for i in kept), points.point[kept])
+    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/point": few}))
+    assert (summary.contacts[1].estimate.is_lower_bound, summary.touches[1].is_lower_bound) == (True, True)
+    assert not summary.contacts[0].estimate.is_lower_bound
+    assert math.isnan(summary.contacts[1].force_error)
+
+
+def test_a_contact_that_is_seen_for_a_moment_is_missed():
+    recording = nothing_but((1.0, 4.0, "outer_link", 10.0), (1.0, 1.1, "outer_link", 9.0))
+    recording.set(recording.push, 1.0, 4.0, "outer_link", (0.0, 10.0, 0.0))
+    recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
+    summary = recording.summary()
+    (touch,) = summary.touches
+    assert (touch.link_estimated, touch.right, touch.latency) == (NO_LINK, pytest.approx(1 / 30), 0.0)
+    assert math.isnan(touch.force_estimated)
+    assert "right link: NO (missed)" in verdict(summary)
+    assert "estimated none: no contact was, for most of the time" in text(summary)
+    recording.set(recording.estimated, 1.0, 2.6, "outer_link", (0.0, 9.0, 0.0), 0.28)
+    assert "right link: YES (53 %)" in verdict(recording.summary())
+
+
+def test_the_number_of_contacts_that_are_too_short_to_be_compared_is_in_the_report():
+    recording = nothing_but((1.0, 1.0, "base", 0.0), (1.0, 1.0, "base", 0.0))
+    for i in range(20):
+        recording.set(recording.true, 1 + 0.3 * i, 1.095 + 0.3 * i, "outer_link", (0.0, 10.0, 0.0), 0.2)
+        recording.set(recording.estimated, 1 + 0.3 * i, 1.095 + 0.3 * i, "inner_link", (0.0, 10.0, 0.0), 0.2)
+    summary = recording.summary()
+    assert (summary.touches, summary.uncompared) == ((), 20)
+    assert "20 true contacts are shorter than 0.1 s and not compared." in text(summary)
+    assert "not compared" not in text(Recording().summary())
+
+
+def test_a_press_that_is_touched_just_before_is_compared_once_even_if_it_is_short():
+    recording = nothing_but((1.6, 5.0, "outer_link", 10.0), (1.62, 5.0, "outer_link", 10.0))
+    recording.set(recording.commanded, 2.0, 5.0, "outer_link", (0.0, -8.0, 0.0))
+    times = {"lower": 0.0, "press 1": 2.0, "press 2": 2.3, "done": 5.0}
+    recording.statuses = [(name, START + round(1e9 * at), 0) for name, at in times.items()]
+    assert [touch.step for touch in recording.summary().touches] == ["press 1", "press 2"]
+
+
+def test_contacts_are_counted_by_link_wherever_they_are():
+    recording = nothing_but((1.0, 3.0, "outer_link", 10.0), (1.0, 3.0, "outer_link", 10.0))
+    recording.set(recording.true, 3.0, 4.0, "inner_link", (0.0, 10.0, 0.0), 0.28)
+    recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
+    bag = recording.bag()
+    summary = summarize(bag)
+    found = analyse_bag(bag, lambda doing: None)
+    assert "Something touched the arm 2 times." in [line for one in found.sections for line in one.sentences]
+    assert [touch.link_true for touch in summary.touches] == ["outer_link", "inner_link"]
+    assert [missed.link for missed in summary.missed] == ["inner_link"]
+
+
+def test_without_truth_the_estimate_shows_what_was_too_hard():
+    recording = without_truth(Recording())
+    recording.set(recording.estimated, 9.4, 9.5, "outer_link", (0.0, 115.0, 0.0), 0.25)
+    for mode in ("lockstep", "realtime"):  # of a simulated arm, which may have been pushed
+        recording.recording = {"mode": mode}
+        assert summarize(with_limits(recording)).unplanned.hard == ()
+    bag = with_limits(recording)
+    of_bus = yaml.safe_load(bag.attachments["parameters.yaml"])
+    own = of_bus["/wam/force_loop"]["ros__parameters"]
+    own["nodes"] = ["bus_driver:BusInterface" if node == "driver" else node for node in own["nodes"]]
+    (hard,) = summarize(bag._replace(attachments={"parameters.yaml": yaml.safe_dump(of_bus).encode()})).unplanned.hard
+    assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
+
+
+def test_without_parameters_lockstep_and_topics_of_the_simulator_show_a_simulation():
+    recording = without_truth(Recording())
+    for mode, is_simulated in (("lockstep", True), ("realtime", False)):
+        recording.recording = {"mode": mode}
+        assert recorded_run(recording.bag()).is_simulated is is_simulated
+    bag = recording.bag()._replace(counts={"/wam/sim/disturbance": 3})  # in the bag, and not read
+    assert recorded_run(bag).is_simulated
+
+
+def test_what_a_step_sets_is_what_is_allowed_from_then_on():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    bag = with_limits(recording)
+    stated = bag.topics["/wam/status"].messages
+    setting = SimpleNamespace(key="force_loop:limits.contact_force", value="200.0")
+    stated[3].values.append(setting)  # of a step before
+    assert summarize(bag).unplanned == ((), "")
+
+
+def test_a_contact_in_a_task_is_not_unplanned():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    bag = with_limits(recording)
+    axis = {"kind": np.zeros(len(STAMPS))}
+    task = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(len(STAMPS)), axis)
+    assert summarize(bag._replace(topics={**bag.topics, "/wam/task_command": task})).unplanned.hard == ()
+    assert len(summarize(bag._replace(topics={**bag.topics, "/wam/task_command": NO_TASK})).unplanned.hard) == 1
+
+
+def test_a_push_or_a_commanded_force_is_not_unplanned():
+    recording = Recording()
+    recording.set(recording.push, 0.5, 1.5, "outer_link", (0.0, 120.0, 0.0))
+    recording.set(recording.true, 0.5, 1.52, "outer_link", (0.0, 120.0, 0.0), 0.28)  # it ends later than its command
+    recording.set(recording.true, 5.0, 5.5, "outer_link", (0.0, 120.0, 0.0), 0.25)
+    assert summarize(with_limits(recording)).unplanned.hard == ()
+
+
+def test_a_reaction_to_what_pushes_states_how_hard_it_became():
+    """The reason is that of its first moment."""
+    recording = Recording()
+    recording.set(recording.true, 9.3, 9.8, "outer_link", (0.0, 89.0, 0.0), 0.25)
+    recording.set(recording.true, 9.6, 9.7, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.3, 9.8, "outer_link", (0.0, 85.0, 0.0), 0.25)
+    bag = with_limits(recording)
+    largest = "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)"
+    shown = " ".join(text(summarize(bag)).split())
+    assert f"{largest}; at its end: none" in shown
+    for series, newtons in ((recording.true, 155.0), (recording.estimated, 11.0)):
+        recording.set(series, 9.7, 10.0, "outer_link", (0.0, newtons, 0.0), 0.25)
+    ended = status("force_loop", "", stamp=str(START + 9900 * MS))
+    bag = with_limits(recording)
+    stated = messages([*bag.topics["/wam/status"].messages, ended])
+    shown = " ".join(text(summarize(bag._replace(topics={**bag.topics, "/wam/status": stated}))).split())
+    assert f"{largest}; at its end: 155 N (true), 11 N (estimated)" in shown
+
+
+def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
+    summary = Recording().summary()
+    inner = summary.touches[1]
+    assert math.isnan(inner.position_estimated)
+    assert inner.is_lower_bound
+    assert f"* {REASON}" in text(summary)
+    assert "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts" in verdict(summary)
+    row = next(line for line in text(summary).splitlines() if "push inner" in line)
+    assert ">=10.00" in row.split()
+
+
+def test_a_lower_bound_of_the_force_is_drawn_as_one():
+    figure = Figure()
+    axes = figure.add_subplot()
+    draw_forces(axes, Recording().summary())
+    lines = {line.get_label(): line for line in axes.lines}
+    known, bound = (np.asarray(lines[name].get_ydata()) for name in ("estimated", "at least"))
+    rows = slice(500, 700)  # the push on the inner link
+    assert np.isnan(known[rows]).all()
+    assert bound[rows] == pytest.approx(10.0)
+    assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
+
+
+@pytest.mark.slow
+def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
+    steps = [
+        {"name": "enable", "seconds": 0.1, "request": "enable"},
+        {"name": "lower onto nothing", "seconds": 0.3, "posture": POSE, "until_force": 1.5},
+    ]
+    task = load("follow-surface")
+    script, bag = tmp_path / "script.yaml", tmp_path / "bag"
+    script.write_text(json.dumps({"steps": steps}))
+    configuration = Configuration.load(packaged("wam"))
+    assert "no contact" in record(configuration, load_steps(script, configuration.shared), bag)
+    assert _report(bag, True, task).is_there
+    assert (bag / "demo.png").is_file()
+    out, err = capsys.readouterr()
+    assert "no report of task follow-surface" in err
+    assert "FAILED: step 'lower onto nothing'" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_the_report_of_a_demo_leaves_where_the_recording_is_and_how_to_report_it(number):
+    """The signal comes where the report begins, as it imports its modules."""
+    bag = Path(__file__).parents[2] / "bags" / "sample" / "wam-touch"
+    program = f"""
+import os, sys
+from pathlib import Path
+from wam_cli.commands.demo import stoppable_report
+class Signalling:
+    def find_spec(self, name, *_):
+        if name == "wam_analysis.demo_report":
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Signalling())
+stoppable_report(Path("{bag}"), False, None)
+"""
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (128 + number, "")
+    assert done.stderr.strip().endswith(f"the recording is in {bag}; to print the report: wam report {bag}")
+
+
+def test_bounce_does_not_end_a_contact():
+    recording = Recording()
+    recording.set(recording.true, 4.95, 4.99, "base", (0.0, 0.0, 0.0))
+    assert recording.summary().touches[2].latency == pytest.approx(0.03)
+    recording.set(recording.true, 4.80, 4.99, "base", (0.0, 0.0, 0.0))  # truly later: estimated before
+    assert recording.summary().touches[2].latency == pytest.approx(-0.06)
+    assert " before" in text(recording.summary())
+
+
+def test_contact_felt_without_one_is_counted():
+    summary = Recording().summary()
+    assert summary.false_contact == pytest.approx(0.05)
+    assert summary.longest_false_contact == pytest.approx(0.05)
+    assert summary.free == pytest.approx(10.0 - 1.0 - 1.0 - 4.3)
+
+
+def test_good_run_has_a_good_verdict_in_narrow_lines():
+    summary = Recording().summary()
+    assert verdict(summary) == (
+        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
+        f"false detections within 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
+    )
+    assert all(len(line) <= 100 for line in text(summary).splitlines())
+
+
+def test_verdict_comes_before_the_tables():
+    lines = text(Recording().summary()).splitlines()
+    result = lines.index("Result, worst case in brackets")
+    assert lines[result + 1] == "  force within 10 %: YES (5.0 %)"
+    assert result < next(i for i, line in enumerate(lines) if line.startswith("Force along")) < len(lines) - 5
+
+
+def test_each_fault_turns_its_own_verdict():
+    force, link, position = Recording(), Recording(), Recording()
+    force.set(force.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
+    link.set(link.estimated, 0.52, 1.5, "inner_link", (0.0, 11.0, 0.0))
+    position.set(position.estimated, 0.52, 1.5, "outer_link", (0.0, 11.0, 0.0), 0.33)
+    assert "force within 10 %: NO (12.5 %) | right link: YES" in verdict(force.summary())
+    assert "right link: NO (another link)" in verdict(link.summary())
+    assert "right link: YES" in verdict(position.summary())
+    assert "position within 4 cm: NO (5.0 cm)" in verdict(position.summary())
+
+
+def test_contact_that_is_missed_is_reported_and_wrong():
+    recording = Recording()
+    recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
+    touch = recording.summary().touches[0]
+    assert touch.link_estimated == NO_LINK
+    assert math.isnan(touch.latency or 0.0)
+    assert "missed" in text(recording.summary())
+    assert "right link: NO" in verdict(recording.summary())
+    assert "position within 4 cm: NOT SHOWN" in verdict(recording.summary())
+
+
+def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_their_uncertainty():
+    recording = Recording()
+    without_truth(recording)
+    outer, inner, *pressed = recording.summary().contacts
+    assert (outer.begin, outer.end, outer.step) == pytest.approx((0.72, 1.745, "push outer"))
+    found = outer.estimate
+    assert (found.link, found.probability, found.position, found.position_sd) == ("outer_link", 0.97, 0.30, 0.03)
+    assert (found.force, found.force_sd, found.second) == pytest.approx((11.0, 0.5, 0.0))
+    assert (found.is_lower_bound, outer.true) == (False, "")
+    assert math.isnan(outer.position_error)
+    assert (inner.estimate.is_lower_bound, inner.estimate.reasons) == (True, (REASON,))
+    assert math.isnan(inner.estimate.position)
+    assert [one.step for one in pressed] == ["press 8 N", "press 4 N", "lift"]
+    assert [one.estimate.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
+    shown = text(recording.summary())
+    row = next(line for line in shown.splitlines() if line.startswith("  push outer"))
+    assert row.split()[2:] == ["0.72", "1.75", "outer_link", "97", "30.0", "3.0", "11.00", "0.50", "0"]
+    assert f"* {REASON}" in shown
+    assert "missed" not in shown  # of what was not recorded nothing is known
+    assert all(len(line) <= 100 for line in shown.splitlines())
+
+
+def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
+    """A real arm stamps with that clock; in the simulation the arm's time begins with the run."""
+    run, summary = recorded_run(Recording().bag()), Recording().summary()
+    clock = 1_763_800_000_000_000_000
+    traces = summary.traces._replace(stamp=summary.traces.stamp + clock)
+    first, *_ = listed_contacts(traces, certainty_of(run, traces), ())
+    assert (first.begin, first.end) == pytest.approx((0.52, 1.545))
+    assert (summary.traces.zero, traces.zero) == (0, START + clock)
+    reaction = RecordedReaction(clock + START + 5000 * MS, clock + START + 7000 * MS, "not_sensed", "why")
+    assert sentences("press", [reaction], traces.zero) == ["press: refused (not_sensed) from 5.00 to 7.00 s: why"]
+
+
+def test_where_the_true_contact_is_recorded_its_error_is_next_to_each_contact():
+    outer, inner, *_ = Recording().summary().contacts
+    assert (outer.true, outer.position_error, outer.force_error) == pytest.approx(("outer_link", 0.02, -1.0))
+    assert inner.true == "inner_link"
+    assert math.isnan(inner.force_error)  # a lower bound has none
+
+
+def test_a_second_contact_that_was_suspected_is_listed_with_the_contact():
+    recording = Recording()
+    bag = recording.bag()
+    columns = bag.topics["/wam/contact/hypotheses"].columns
+    columns["reasons"][: 206 // 2] = 2.0 ** REASONS.index(SECOND)  # half of the first contact, of 206 periods
+    first, second, *_ = summarize(bag).contacts
+    assert (first.estimate.second, second.estimate.second) == pytest.approx((0.5, 0.0))
+    assert first.estimate.reasons == ()
+
+
+def without_truth(recording: Recording) -> Recording:
+    recording.without = tuple(name for name in RECORDED if name.startswith("sim/"))
+    return recording
+
+
+def contact_section(recording: Recording) -> Any:
+    (section,) = (one for one in analyse_bag(recording.bag(), lambda doing: None).sections if one.key == "contact")
+    return section
+
+
+def moved_only(recording: Recording) -> Recording:
+    """A box is touched from 0.5 to 1.5 s, in a step that neither pushes nor presses."""
+    recording.set(recording.push, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
+    return recording
+
+
+def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
+    recording = Recording()
+    recording.set(recording.estimated, 0.52, 1.55, "outer_link", (0.0, 11.0, 0.0))
+    recording.set(recording.estimated, 0.52, 0.54, "outer_link", (0.0, 11.0, 0.0), 0.30)  # 2 % of it
+    summary = recording.summary()
+    found = summary.contacts[0].estimate
+    assert math.isnan(found.position)
+    assert math.isnan(found.position_sd)
+    assert found.is_lower_bound
+    assert math.isnan(summary.touches[0].position_estimated)
+    assert "position ?: the estimator cannot observe it" in text(summary)
+    assert "position within 4 cm: YES (2.0 cm), unknown for 2 of 5 contacts" in verdict(summary)
+    recording.set(recording.estimated, 0.52, 1.2, "outer_link", (0.0, 11.0, 0.0), 0.30)  # two thirds of it
+    assert recording.summary().contacts[0].estimate.position == pytest.approx(0.30)
+
+
+def test_the_least_force_is_marked_as_such_by_the_analysis_too():
+    recording = Recording()
+    shown = analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100)
+    (row,) = [line.split() for line in shown.splitlines() if line.split()[:2] == ["force", "[N]"] and "11" in line]
+    assert row[2:5] == ["11", ">=10", "7.84"]
+
+
+def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
+    recording = Recording()
+    for series in (recording.true, recording.push, recording.estimated):
+        recording.set(series, 0.0, 1.5, "outer_link", (0.0, 12.0, 0.0), 0.28)
+    recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.26)
+    summary = recording.summary()
+    cut = [(one.before, one.after) for one in summary.contacts]
+    whole = (CutBy.NOTHING, CutBy.NOTHING)
+    assert cut == [(CutBy.RECORDING, CutBy.NOTHING), whole, whole, whole, (CutBy.NOTHING, CutBy.RECORDING)]
+    assert summary.touches[0].latency is None
+    shown = text(summary)
+    rows = [line.split() for line in shown.splitlines()]
+    assert ["push", "outer", "<=0.20", "1.75"] in [row[:4] for row in rows]
+    assert ["lift", "9.20", ">=10.20"] in [row[:3] for row in rows]
+    assert any(row[:2] == ["push", "outer"] and row[-1] == "-" for row in rows)
+    assert "from <=: it began before the recording\n  to >=: it goes past the end of the recording\n" in shown
+    sentences = contact_section(recording).sentences
+    assert "1 outer_link: it began before the recording." in sentences
+    assert "5 outer_link: it goes past the end of the recording." in sentences
+
+
+def test_a_contact_is_cut_where_the_estimate_was_lost():
+    bag = Recording().bag()
+    kept = np.r_[0:1200, 1260:2000]  # from 6.0 to 6.3 s nothing came
+    estimated = bag.topics["/wam/contact/wrench"]
+    lost = WrenchColumns(
+        STAMPS[kept],
+        STAMPS[kept],
+        tuple(estimated.frames[i] for i in kept),
+        estimated.force[kept],
+        estimated.torque[kept],
+    )
+    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}))
+    pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
+    assert pressed == [(CutBy.NOTHING, CutBy.GAP), (CutBy.GAP, CutBy.NOTHING)]
+    shown = text(summary)
+    assert "from <=, to >= within the recording: the estimate is missing there, and comes again" in shown
+    assert "it began before the recording" not in shown
+    assert "it goes past the end of the recording" not in shown
+    found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}), lambda doing: None)
+    stated = [sentence for section in found.sections for sentence in section.sentences]
+    assert "3 outer_link: the estimate is missing after it." in stated
+    assert "4 outer_link: the estimate is missing before it." in stated
+
+
+def test_a_contact_that_is_missed_in_a_step_that_only_moves_is_reported_and_wrong():
+    recording = moved_only(Recording())
+    recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
+    summary = recording.summary()
+    assert "  push outer: MISSED: a contact of outer_link with 12 N, 0.70 to 1.70 s." in text(summary).splitlines()
+    assert "right link: NO (missed)" in verdict(summary)
+    assert (
+        "push outer: MISSED: a contact of outer_link with 12 N, 0.70 to 1.70 s." in contact_section(recording).verdict
+    )
+
+
+def test_a_touch_in_a_step_that_only_moves_is_compared_with_the_true_contact():
+    recording = moved_only(Recording())
+    first = recording.summary().touches[0]
+    assert (first.step, first.link_true, first.link_estimated) == ("push outer", "outer_link", "outer_link")
+    assert first.latency == pytest.approx(0.02)
+    recording.statuses.insert(1, ("rest", START + 700 * MS, 0))
+    assert recording.summary().touches[0].step == "push outer"  # in which it began
+    recording.set(recording.estimated, 0.52, 1.5, "inner_link", (0.0, 11.0, 0.0))
+    assert "right link: NO (another link)" in verdict(recording.summary())
+    recording.set(recording.true, 0.55, 1.5, "base", (0.0, 0.0, 0.0))  # 50 ms are too short to be compared
+    assert "push outer" not in [touch.step for touch in recording.summary().touches]
+
+
+def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
+    recording = Recording()
+    recording.without = ("contact/wrench", "contact/point", "contact/hypotheses")
+    summary = recording.summary()
+    shown = text(summary).splitlines()
+    assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  the estimated contact was not recorded"
+    assert "  false detections: not known, the estimated contact was not recorded" in shown
+    assert "missed" not in "\n".join(shown)
+    assert {touch.latency for touch in summary.touches} == {None}
+    assert all(math.isnan(touch.right) for touch in summary.touches)
+    recording.without += without_truth(Recording()).without
+    assert "The estimated contact was not recorded." in contact_section(recording).sentences
+    recording = Recording()
+    recording.set(recording.estimated, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    shown = text(recording.summary()).splitlines()
+    assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
+
+
+@pytest.mark.parametrize("sensors", [True, False])
+def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observed(sensors):
+    recording = Recording()
+    recording.set(recording.true, 8.0, 10.0, "outer_link", (0.0, 4.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "base", (0.0, 0.0, 0.0))
+    bag = recording.bag()
+    braked = status("driver", "braked", mode="braked", stamp=str(START + 9000 * MS))
+    stated = messages([*itertools.starmap(said, recording.statuses), braked])
+    sections = Configuration.load(packaged("wam")).sections
+    own = {**sections["/**"], **sections["contact_estimator"], "use_joint_sensors": sensors}
+    content = yaml.safe_dump({"/wam/contact_estimator": {"ros__parameters": own}})
+    summary = summarize(
+        bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
+    )
+    assert ("right link: NO (missed)" in verdict(summary)) == sensors
+    assert ("right link: YES (98 %)" in verdict(summary)) != sensors
+    assert ([touch.step for touch in summary.touches][-1] == "lift") == sensors
+    assert any("contacts under the brakes are not compared" in note for note in summary.notes) != sensors
+
+
+@pytest.mark.parametrize(("seconds", "answer"), [(0.3, "YES (9.5 %)"), (0.35, "NO (10.8 %)"), (0.9, "NO (25.7 %)")])
+def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
+    recording = Recording()
+    recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
+    assert f"false detections within 10 % of the time without contact: {answer}" in verdict(recording.summary())
+
+
+def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detection():
+    recording = Recording()
+    recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    answer = "of the time without contact: NOT SHOWN, 200 ms, as a contact that ends may take"
+    assert answer in verdict(recording.summary())
+
+
+@pytest.mark.parametrize("true", [PositionedForce(0.26, 4.0), PositionedForce()])
+def test_a_position_that_is_not_shown_has_a_reason(true):
+    summary = Recording().summary()
+    at = PositionedForce(0.28, 4.1)
+    presses = tuple(one._replace(positions=PressPositions(at, at, true, 0.28, 0.01)) for one in summary.presses)
+    shown = text(summary._replace(presses=presses))
+    assert ("  -: not known, on another link or beyond the ends of this one" in shown) == math.isnan(true.force)
+
+
+def test_what_did_not_happen_is_stated_in_words():
+    recording = Recording()
+    for series in (recording.true, recording.estimated):
+        recording.set(series, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "Nothing touched the arm." in sentences
+    assert any("s of /wam, not known whether in lockstep or in realtime." in line for line in sentences)
+    recording.without = without_truth(recording).without
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "No contact was estimated." in sentences
+
+
+def test_answers_that_are_no_are_those_and_not_a_text():
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
+    force, link, position, _, _ = demo_report.verdict(recording.summary())
+    assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
+    assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
+    assert position.remark == "unknown for 1 of 5 contacts"
+
+
+def test_a_press_on_nothing_is_neither_a_contact_nor_a_missed_one():
+    recording = Recording()
+    recording.set(recording.true, 4.8, 9.5, "base", (0.0, 0.0, 0.0))
+    recording.set(recording.estimated, 4.8, 9.5, "base", (0.0, 0.0, 0.0))
+    summary = recording.summary()
+    assert [touch.step for touch in summary.touches] == ["push outer", "push inner"]
+    assert "right link: YES" in verdict(summary)
+    found = analyse_bag(recording.bag(), lambda doing: None)
+    sentences = [line for section in found.sections for line in section.sentences]
+    assert "Something touched the arm 2 times." in sentences
+    assert not any("MISSED" in line for line in sentences)
+
+
+def test_what_is_estimated_in_a_press_on_nothing_is_wrong():
+    recording = Recording()
+    recording.set(recording.true, 4.8, 9.5, "base", (0.0, 0.0, 0.0))
+    touch = recording.summary().touches[-1]
+    assert (touch.link_true, touch.link_estimated) == (NO_LINK, "outer_link")
+    assert "right link: NO" in verdict(recording.summary())
+    assert recording.summary().contacts[-1].true == NO_LINK
+
+
+def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another_is_none():
+    recording = Recording()
+    recording.set(recording.estimated, 1.0, 1.55, "inner_link", (0.0, 25.0, 0.0))
+    recording.set(recording.estimated, 0.7, 0.75, "inner_link", (0.0, 5.0, 0.0))
+    outer, inner, *_ = recording.summary().contacts
+    assert [outer.estimate.link, inner.estimate.link] == ["outer_link", "inner_link"]
+    assert (outer.begin, outer.end, inner.begin) == pytest.approx((0.72, 1.195, 1.2))
+    assert (outer.estimate.force, inner.estimate.force) == pytest.approx((11.0, 25.0))
+
+
+def test_without_a_scenario_each_commanded_force_has_a_contact_of_its_own():
+    recording = Recording()
+    recording.without = ("status",)
+    recording.set(recording.commanded, 7.0, 7.3, "outer_link", (0.0, -6.0, 0.0))  # a ramp of one step
+    traces = recording.summary().traces
+    contacts = listed_contacts(traces, certainty_of(recorded_run(recording.bag()), traces), ())
+    forces = [one.estimate.force for one in contacts]
+    assert forces == pytest.approx([11.0, 10.0, 7.84, 3.92, 3.0], abs=0.01)  # the last one with none
+
+
+def test_a_position_on_another_link_is_no_position_on_the_true_one():
+    recording = Recording()
+    recording.set(recording.estimated, 2.5, 2.9, "outer_link", (0.0, 12.0, 0.0), 0.26)
+    touch = recording.summary().touches[1]
+    assert touch.link_true == touch.link_estimated == "inner_link"
+    assert math.isnan(touch.position_estimated)
+
+
+def test_without_its_topic_it_is_reported_that_nothing_is_known_of_the_certainty():
+    recording = Recording()
+    assert NOT_CERTAIN not in demo_report.text(recording.summary()).replace("\n    ", " ")
+    recording.without = ("contact/hypotheses",)
+    assert NOT_CERTAIN in demo_report.text(recording.summary()).replace("\n    ", " ")
+    (section,) = (one for one in analyse_bag(recording.bag(), lambda doing: None).sections if one.key == "contact")
+    assert NOT_CERTAIN in section.sentences
+    assert any("contact/hypotheses" in line for line in section.lacking)
+
+
+def test_without_free_time_false_detections_are_not_known_for_that_reason():
+    recording = Recording()
+    recording.set(recording.true, 0.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    assert "false detections: not known, the arm was in contact all the time" in demo_report.text(recording.summary())
+
+
+def test_without_truth_contacts_are_listed_where_no_force_was_commanded():
+    """A program need not command a force in all the time: what is estimated then is listed, too."""
+    recording = Recording()
+    without_truth(recording)
+    bag = recording.bag()
+    commands = bag.topics["/wam/force_command"]
+    late = slice(1000, 1800)
+    bag.topics["/wam/force_command"] = WrenchColumns(
+        STAMPS[late], STAMPS[late], commands.frames[late], commands.force[late], commands.torque[late]
+    )
+    assert summarize(bag).contacts[0].estimate.link == "outer_link"
+    assert summarize(bag).contacts[0].begin == pytest.approx(0.72)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in TOPICS_READ if not name.startswith("/")])
+def test_missing_topic_is_said_and_nothing_is_invented(name, tmp_path):
+    recording = Recording()
+    recording.without = (name,)
+    summary = recording.summary()
+    assert text(summary)
+    save(tmp_path / "demo.png", summary, arm_of(recording.bag()), gl=())
+    if name in RECORDED:
+        assert name in summary.notes[-1]
+    if name == "sim/contact/wrench":
+        assert {touch.link_true for touch in summary.touches} == {NOT_RECORDED}
+        assert "force within 10 %: NOT SHOWN | right link: NOT SHOWN" in verdict(summary)
+    if name == "contact/wrench":
+        assert {touch.link_estimated for touch in summary.touches} == {NOT_RECORDED}
+        assert all(math.isnan(press.estimated) for press in summary.presses)
+
+
+def test_empty_bag_gives_a_report_and_a_picture(tmp_path):
+    empty = Bag(Path("bag"), {}, {}, {}, {})
+    summary = summarize(empty)
+    assert "NOT SHOWN" in verdict(summary)
+    assert "no pressing step was recorded" in text(summary)
+    assert save(tmp_path / "demo.png", summary, arm_of(empty), gl=())
+    assert (tmp_path / "demo.png").stat().st_size > 10_000
+
+
+def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was_recorded_before_it():
+    """Latched topics are kept from before the part; no joint state is."""
+    recording, kept = Recording(), slice(1200, 2000)  # from 6.0 s
+    bag = recording.bag()
+    holds = status("force_loop", "not sensed", reaction="not_sensed")
+    logged = [*(at for _, at, _ in recording.statuses[:4]), START + 5002 * MS, recording.statuses[4][1]]
+    stated = [*itertools.starmap(said, recording.statuses[:4]), holds, said(*recording.statuses[4])]
+    states = JointColumns(*(column[kept] for column in joints()[:3]), joints().names, *(c[kept] for c in joints()[4:]))
+    topics = {"/wam/status": Messages(np.array(logged), tuple(stated)), "/wam/joint_states": states}
+    run = recorded_run(bag._replace(topics={**bag.topics, **topics}))
+    assert [stamp for stamp, _ in run.stamped_statuses()][-2:] == [START + 5000 * MS, START + 7000 * MS]
+    (reaction,) = summary_of(run).reactions
+    assert reaction.begin == START + 5000 * MS
+    assert "lower: refused" not in text(summary_of(run))
+
+
+def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
+    recording = Recording()
+    recording.statuses = [(name, at, 0) for name, at in (("move", START), ("move", START + 4000 * MS))]
+    bag = recording.bag()
+    reacts = [
+        status("force_loop", message, stamp=str(START + at * MS), reaction=reaction)
+        for at, reaction, message in ((1000, "joint_end", "joint1 is at its end"), (1500, "none", ""))
+    ]
+    stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
+    found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/status": stated}), lambda doing: None)
+    (force,) = (section for section in found.sections if section.key == "force")
+    assert any(line.startswith("move: reported (joint_end) from 1.20 to 1.70 s") for line in force.sentences)
+
+
+def test_failed_scenario_says_why_and_ends_its_last_step():
+    recording = Recording()
+    recording.statuses = [*recording.statuses[:3], ("step 'lower': no contact estimated", START + 4900 * MS, 2)]
+    summary = recording.summary()
+    assert [step.name for step in summary.steps] == ["push outer", "push inner", "lower"]
+    assert summary.steps[-1].end == START + 4900 * MS
+    assert "FAILED: step 'lower': no contact estimated" in text(summary)
+
+
+def test_recording_that_ends_early_says_so():
+    recording = Recording()
+    recording.statuses = recording.statuses[:-1]
+    summary = recording.summary()
+    assert summary.outcome.startswith("not finished")
+    assert summary.steps[-1].end == STAMPS[-1]
+
+
+def test_signal_that_stops_is_unknown_after_a_while():
+    recording = Recording()
+    bag = recording.bag()
+    estimated = bag.topics["/wam/contact/wrench"]
+    assert isinstance(estimated, WrenchColumns)
+    cut = WrenchColumns(*(column[:1500] for column in estimated))  # at 7.5 s
+    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": cut}))
+    assert math.isnan(summary.presses[1].estimated)
+    assert summary.presses[0].estimated == pytest.approx(7.84)
+
+
+def test_of_several_arms_one_is_chosen_and_the_others_are_named():
+    recording, other = Recording(), Recording()
+    recording.namespace, other.namespace = "/left", "/right"
+    other.set(other.true, 7.0, 9.0, "outer_link", (0.0, 5.0, 0.0), 0.25)
+    bag = recording.bag()
+    bag = bag._replace(topics=other.bag().topics | bag.topics, types=other.bag().types | bag.types)
+    assert summary_of(recorded_run(bag)).presses[1].true == pytest.approx(4.2)
+    chosen = summary_of(recorded_run(bag, "right"))
+    assert (chosen.namespace, chosen.presses[1].true) == ("/right", pytest.approx(5.0))
+    assert "this is /right alone; other arms in this bag: --namespace left" in chosen.notes
+    verdict_of = analyse_bag(bag, lambda doing: None, "right").sections[0]
+    assert "This is /right alone; other arms in this bag: --namespace left." in verdict_of.sentences
+    with pytest.raises(BagError, match="has no arm in the namespace /middle; its arms: /left, /right"):
+        recorded_run(bag, "middle")
+
+
+@pytest.mark.parametrize("namespace", ["", "/left", "/lab/left"])
+def test_namespace_is_found(namespace):
+    recording = Recording()
+    recording.namespace = namespace
+    assert recording.summary().namespace == namespace
+    assert len(recording.summary().presses) == 2
+
+
+def test_timing_is_that_of_the_driver():
+    recording = Recording()
+    recording.timing = [
+        {"latency p50 [us]": p50, "latency p99 [us]": p99, "rate [Hz]": "998.5", "missed periods": m, "periods": n}
+        for p50, p99, m, n in (("300", "900", "5", "1000"), ("nan", "nan", "6", "2000"), ("500", "1500", "9", "3000"))
+    ]
+    recording.recording = {"mode": "realtime", "/a b received": "10", "/a b dropped": "2", "/c d received": "5"}
+    summary = recording.summary()
+    assert summary.loop[:7] == ("realtime", 998.5, 400.0, 1200.0, 1500.0, 9, 3000)
+    assert (summary.received, summary.dropped) == (15, 2)
+    assert "missed 9 of 3000 periods (0.3 %)" in " ".join(text(summary).split())
+    assert "15 recorded, 2 dropped" in text(summary)
+
+
+def test_lockstep_has_no_timing():
+    recording = Recording()
+    recording.recording = {"mode": "lockstep"}
+    said = " ".join(text(recording.summary()).split())
+    assert "lockstep: the driver waits for every command" in said
+    assert "real-time factor" not in said
+
+
+def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
+    recording = Recording()
+    recording.recording = {"mode": "lockstep"}
+    facts = [("0.000", "0.0", "0"), ("1.000", "4.0", "0"), ("0.500", "20.4", "7"), ("1.000", "1.0", "7")]
+    recording.timing = [{"real-time factor": f, "behind [ms]": b, "slips": n} for f, b, n in facts]
+    said = " ".join(text(recording.summary()).split())
+    assert "real-time factor 0.75, at most 20 ms behind, 7 periods too late to be made up for" in said
+
+
+def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():
+    arm = Configuration.load(packaged("wam")).shared.arm
+    point, force = arm_picture.contact_on_surface(arm, POSE, Contact("outer_link", 0.25, (-2.0, 8.0, 0.0)))
+    pose = RigidBody(arm).cover_pose(POSE, "outer_link")
+    radius = arm.covers.radius[arm.covers.names.index("outer_link")]
+    np.testing.assert_allclose(pose.rotation.T @ (point - pose.position), [0.25, -radius, 0.0], atol=1e-12)
+    np.testing.assert_allclose(pose.rotation.T @ force, [-2.0, 8.0, 0.0], atol=1e-12)
+
+
+def test_view_keeps_lengths_across_and_shows_everything():
+    shared = Configuration.load(packaged("wam")).shared
+    obstacles = arm_of(Recording().bag()).obstacles
+    view = arm_picture.side_view(shared.arm, POSE, obstacles, aspect=1.2)
+    np.testing.assert_allclose(view.axes @ view.axes.T, np.eye(3), atol=1e-12)
+    assert view.width / view.height == pytest.approx(1.2)
+    for tube in arm_picture.tubes(shared.arm, POSE):
+        for end in view.project(np.array([tube.start, tube.end])):
+            assert abs(end[0]) + tube.radius < view.width / 2
+            assert abs(end[1]) + tube.radius < view.height / 2
+
+
+def test_a_force_that_points_out_of_the_view_of_the_arm_is_drawn_whole_with_its_label():
+    run = recorded_run(read(Path(__file__).parents[2] / "bags" / "sample" / "wam-touch", TOPICS_READ, may_lack=True))
+    figure = Figure(figsize=(5.6, 4.2))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_arm(axes, summary_of(run), recorded_arm(run.parameters), gl=(), letter=None)
+    labels = {text.get_text(): text for text in axes.texts}
+    assert "true 12.0 N" in labels
+    renderer, box = FigureCanvasAgg(figure).get_renderer(), axes.get_window_extent()
+    for label in labels.values():
+        assert box.contains(*axes.transData.transform(label.xy))  # else nothing of it is drawn
+        assert box.contains(*label.get_window_extent(renderer).max)
+
+
+def test_a_recording_that_begins_later_than_its_scenario_is_drawn_from_its_begin():
+    recording = Recording()
+    summary = recording.summary()
+    later = summary.traces.stamp >= START + 6_000 * MS
+    part = [ForceSignal(*(column[later] for column in signal)) for signal in summary.traces[1:]]
+    axes = Figure().add_subplot()
+    draw_forces(axes, summary._replace(traces=Traces(summary.traces.stamp[later], *part)))
+    assert axes.get_xlim() == pytest.approx((6.0, 10.0))
+    shown = [text.get_text().replace("\n", " ") for text in axes.texts]
+    assert "press 4 N" in shown
+    assert "push outer" not in shown
+
+
+def test_box_has_six_faces_that_look_outwards():
+    obstacles = arm_of(Recording().bag()).obstacles
+    faces = list(arm_picture.faces(obstacles))
+    centre = np.array(obstacles.positions[:3])
+    assert len(faces) == 6
+    for face in faces:
+        outwards = face.corners.mean(axis=0) - centre
+        assert face.normal @ outwards == pytest.approx(np.linalg.norm(outwards))
+
+
+def with_outcome(folder, *statuses: tuple[str, str, int]):
+    """A bag on disk with these statuses alone: node, message, level; one a second."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
+    kind = "diagnostic_msgs/msg/DiagnosticStatus"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/wam/status", kind, typestore=store)
+        for stamp, (node, text, level) in enumerate(statuses, 1):
+            facts = {"stamp": str(stamp * 10**9), **({"fault": text} if level and node == "driver" else {})}
+            values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
+            message = kinds["DiagnosticStatus"](level, node, text, "", values)
+            writer.write(connection, stamp, store.serialize_cdr(message, kind))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("last", "failure"),
+    [
+        (("scenario", "done", 0), ""),
+        (("scenario", "step 'lower': no contact of 1.5 N detected within 0.7 s", 2), "step 'lower': no contact"),
+        (("driver", "speed of joint4 is above its limit", 2), "speed of joint4"),
+        (("driver", "enabled", 0), ""),  # the recording ends before the scenario does
+    ],
+)
+def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys, last, failure):
+    bag = with_outcome(tmp_path / "bag", ("scenario", "lower", 0), last)
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(bag)])
+    assert ended.value.code == int(bool(failure))
+    assert ("not as it should be" in capsys.readouterr().out) is bool(failure)
+    assert [one.partition(failure)[:2] for one in report(bag).unmet] == [("FAILED: ", failure)] * bool(failure)
+
+
+def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
+    kind = "diagnostic_msgs/msg/DiagnosticStatus"
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = [writer.add_connection(f"/wam/{name}", kind, typestore=store) for name in ("status", "other")]
+        for stamp, said in ((1, "release the brakes"), (2, "done")):
+            values = [kinds["KeyValue"]("stamp", str(stamp * 10**9))]
+            message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
+            for connection in connections:
+                writer.write(connection, stamp, store.serialize_cdr(message, kind))
+    before = sorted((tmp_path / "bag").iterdir())
+    first = "Demonstration of /wam: 1 step, 1.0 s, mode not known, done"
+    assert first in report(tmp_path / "bag").text
+    assert sorted((tmp_path / "bag").iterdir()) == before
+    assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png").text
+    assert (tmp_path / "drawn.png").is_file()
+    assert list(read(tmp_path / "bag", TOPICS_READ, may_lack=True).topics) == ["/wam/status"]
+
+
+def test_a_recording_of_something_else_is_refused_and_nothing_is_written_into_it(tmp_path, capsys):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kind = "std_msgs/msg/String"
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/chat", kind, typestore=store)
+        writer.write(connection, 1, store.serialize_cdr(store.types[kind]("hello"), kind))
+    before = sorted((tmp_path / "bag").iterdir())
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(tmp_path / "bag")])
+    assert ended.value.code == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "is not a recording of the demonstration" in said.err
+    assert f"no step of a scenario; 'wam analyse {tmp_path}/bag' analyses any recording" in said.err
+    assert "/chat" not in said.err, "a recording of the stack has 37 topics, which would hide the hint"
+    assert sorted((tmp_path / "bag").iterdir()) == before
+
+
+def test_arm_is_drawn_with_the_parameters_in_the_bag():
+    sections = Configuration.load(packaged("wam")).sections
+    flat = {**sections["/**"], **sections["driver"], "arm.covers.radius": [0.1, 0.05]}
+    content = yaml.safe_dump({"/wam/driver": {"ros__parameters": flat}}).encode()
+    recorded = arm_of(Recording().bag()._replace(attachments={"parameters.yaml": content}))
+    assert recorded.note == ""
+    assert recorded.arm.covers.radius == (0.1, 0.05)
+    assert recorded.obstacles.names == ("foam_box",)
+
+
+def test_arm_of_the_package_is_drawn_and_said_where_the_bag_does_not_tell():
+    recorded = arm_of(Recording().bag())
+    assert recorded.arm == Configuration.load(packaged("wam")).shared.arm
+    assert "packaged configuration 'wam'" in recorded.note
+
+
+@pytest.mark.slow
+def test_drawn_picture_is_written_and_the_same_every_time(tmp_path, recwarn):
+    recording = Recording()
+    summary, recorded = recording.summary(), arm_of(recording.bag())
+    for name in ("a.png", "b.png"):
+        save(tmp_path / name, summary, recorded, gl=())
+    picture = (tmp_path / "a.png").read_bytes()
+    width, height = struct.unpack(">II", picture[16:24])
+    assert (width, height) == (1800, 800)
+    assert len(picture) > 50_000
+    assert picture == (tmp_path / "b.png").read_bytes()
+    assert not recwarn.list
+
+
+@pytest.mark.slow
+def test_broken_opengl_falls_back_to_a_drawing(tmp_path):
+    recording = Recording()
+    recorded = arm_of(recording.bag())
+    view = arm_picture.side_view(recorded.arm, POSE, recorded.obstacles, aspect=1.2)
+    assert arm_picture.render(recorded.arm, POSE, recorded.obstacles, view, ("no_such_gl",)) is None
+    save(tmp_path / "demo.png", recording.summary(), recorded, gl=("no_such_gl",))
+    assert (tmp_path / "demo.png").stat().st_size > 50_000
+
+
+def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_each_position():
+    """A force of 8.4 N at 0.25 m, measured at the configured 0.28 m: less there, 8.4 N at the true position."""
+    sample = read(Path(__file__).parents[2] / "bags" / "sample" / "wam-touch", ["status"], may_lack=True)
+    configuration = Configuration.load(packaged("wam"))
+    arm = configuration.shared.arm
+    body = RigidBody(arm)
+    axes = ForceAxes(arm, body, configuration.node("force_loop", ForceLoopParameters).sensing)
+    recording, direction = Recording(), body.cover_pose(POSE, "outer_link").rotation @ (0.0, -1.0, 0.0)
+    torque = -8.4 * axes.lever(POSE, "outer_link", 0.25, direction)
+    measured = -float(axes.axis(POSE, PressedForce("outer_link", 0.28, 0.05, direction, 8.0)).sense @ torque)
+    recording.set(recording.measured, 5.0, 7.0, "outer_link", (0.0, -measured, 0.0))
+    bag = recording.bag()
+    every = joints()._replace(effort=np.tile(torque, (len(STAMPS), 1)))
+    columns = {"position": np.full(len(STAMPS), 0.28), "position_sd": np.full(len(STAMPS), 0.05)}
+    axis = TableColumns(STAMPS, STAMPS, ("outer_link",) * len(STAMPS), np.arange(len(STAMPS)), columns)
+    topics = bag.topics | {"/wam/external_joint_torques": every, "/wam/force_axis": axis}
+    summary = summarize(bag._replace(topics=topics, attachments=sample.attachments))
+    found = summary.presses[0].positions
+    assert [one.position for one in found.forces] == pytest.approx([0.28, 0.27, 0.25])
+    assert found.true.force == pytest.approx(8.4, rel=1e-6)
+    assert found.configured.force < found.estimated.force < found.true.force - 0.1
+    lines = text(summary).splitlines()
+    title = "Force from the same torques, for three assumed contact positions"
+    table = lines.index(title)
+    (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
+    assert "25.0  8.40" in row
+    assert "  position used by the force loop, +- its standard deviation [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
+    assert all(len(line) <= 100 for line in lines)
+    assert title not in text(Recording().summary()), "nothing is invented"

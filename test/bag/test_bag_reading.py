@@ -1,0 +1,766 @@
+"""The reader against readers that are not ours, on every type and way of writing, whole and broken."""
+
+import itertools
+import os
+import random
+import struct
+from collections.abc import Callable, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+import zstandard
+from bag_mutations import break_bags
+from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Chunk, ChunkIndex
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+from test_bag import QOS
+
+from wam_analysis.findings.analysis import analyse
+from wam_bag import bag_file, safe_yaml
+from wam_bag.bag import (
+    Bag,
+    BagError,
+    BoolColumns,
+    ClockColumns,
+    JointColumns,
+    Messages,
+    PointColumns,
+    TableColumns,
+    WrenchColumns,
+    raw,
+    read,
+)
+from wam_bag.bag_writer import BagWriter
+from wam_bag.contents import contents, mode_of
+from wam_bag.cut import Cut, cut
+from wam_bag.errors import BROKEN
+from wam_bag.losses import losses
+from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC, chunk_index, serialized
+from wam_bag.message_groups import Grouping
+from wam_bag.message_text import definitions
+from wam_bag.repair import repair
+from wam_studies.faults.bag_faults import MEMORY, limits
+
+JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+
+
+def in_order(samples: Sequence[Sample]) -> dict[str, list[Sample]]:
+    """Samples by topic in the order of their times."""
+    found: dict[str, list[Sample]] = {}
+    for sample in sorted(samples, key=lambda sample: sample.time):
+        found.setdefault(sample.topic, []).append(sample)
+    return found
+
+
+def decoded(samples: Sequence[Sample]) -> list[Any]:
+    """What rosbags makes of them."""
+    return [STORE.deserialize_cdr(sample.data, sample.type) for sample in samples]
+
+
+def nanoseconds(time: Any) -> int:
+    return int(time.sec) * 10**9 + int(time.nanosec)
+
+
+def xyz(vectors: Sequence[Any]) -> np.ndarray[Any, Any]:
+    return np.array([[v.x, v.y, v.z] for v in vectors])
+
+
+def assert_joints(columns: JointColumns, messages: Sequence[Any]) -> None:
+    assert columns.names == tuple(dict.fromkeys(name for message in messages for name in message.name))
+    for field in ("position", "velocity", "effort"):
+        array = getattr(columns, field)
+        assert array.shape[1] in (0, len(columns.names))
+        for row, message in zip(array, messages, strict=True):
+            expected = dict(zip(message.name, getattr(message, field).tolist(), strict=False))
+            np.testing.assert_array_equal(row, [expected.get(name, np.nan) for name in columns.names[: len(row)]])
+            assert len(row) or not expected
+
+
+def assert_equal(ours: Any, theirs: Any) -> None:
+    """An object of ours against one of another reader: every field, every value."""
+    if hasattr(ours, "_fields"):
+        for field in ours._fields:
+            assert_equal(getattr(ours, field), getattr(theirs, field))
+    elif isinstance(ours, list | np.ndarray) and not isinstance(theirs, bytes):
+        assert len(ours) == len(theirs)
+        for one, other in zip(ours, theirs, strict=True):
+            assert_equal(one, other)
+    elif isinstance(ours, float | np.floating):
+        assert ours == theirs or (np.isnan(ours) and np.isnan(theirs))
+        assert np.signbit(ours) == np.signbit(theirs) or np.isnan(ours)
+    elif isinstance(theirs, bytes):
+        assert bytes(ours) == theirs
+    else:
+        assert ours == theirs
+
+
+def assert_table(columns: TableColumns, messages: Sequence[Any]) -> None:
+    """Rows of a table against each point of each message, taken from its bytes one by one."""
+    assert columns.message.tolist() == [i for i, m in enumerate(messages) for _ in range(m.height * m.width)]
+    assert columns.row_stamp_ns.tolist() == [nanoseconds(messages[i].header.stamp) for i in columns.message]
+    row = 0
+    for message in messages:
+        for line, place in itertools.product(range(message.height), range(message.width)):
+            for field in message.fields:
+                start = line * message.row_step + place * message.point_step + field.offset
+                form = (">" if message.is_bigendian else "<") + "bBhHiIfd"[field.datatype - 1] * field.count
+                values = struct.unpack_from(form, message.data.tobytes(), start)
+                np.testing.assert_array_equal(
+                    columns.columns[field.name][row], values if field.count > 1 else values[0]
+                )
+            row += 1
+    assert row == len(columns.message)
+
+
+def assert_columns(columns: Any, samples: Sequence[Sample]) -> None:
+    """Columns of a topic against what rosbags decodes."""
+    messages = decoded(samples)
+    assert columns.log_time_ns.tolist() == [sample.time for sample in samples]
+    if isinstance(columns, Messages):
+        assert_equal(list(columns.messages), messages)
+        return
+    if isinstance(columns, BoolColumns):
+        assert columns.data.tolist() == [message.data for message in messages]
+        return
+    if isinstance(columns, ClockColumns):
+        assert columns.stamp_ns.tolist() == [nanoseconds(message.clock) for message in messages]
+        return
+    assert columns.stamp_ns.tolist() == [nanoseconds(message.header.stamp) for message in messages]
+    assert columns.frames.tolist() == [message.header.frame_id for message in messages]
+    if isinstance(columns, JointColumns):
+        assert_joints(columns, messages)
+    elif isinstance(columns, TableColumns):
+        assert_table(columns, messages)
+    elif isinstance(columns, WrenchColumns):
+        np.testing.assert_array_equal(columns.force, xyz([message.wrench.force for message in messages]))
+        np.testing.assert_array_equal(columns.torque, xyz([message.wrench.torque for message in messages]))
+    else:
+        assert isinstance(columns, PointColumns)
+        np.testing.assert_array_equal(columns.point, xyz([message.point for message in messages]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", WAYS)
+def test_every_value_of_every_type_is_that_of_rosbags(tmp_path: Path, way: str) -> None:
+    samples = random_samples([*OURS, *FOREIGN], 25, seed=len(way))
+    bag = read(write(tmp_path / "bag.mcap", samples, WAYS[way]))
+    expected = in_order(samples)
+    assert bag.topics.keys() == expected.keys()
+    for topic, columns in bag.topics.items():
+        assert_columns(columns, expected[topic])
+    assert bag.attachments == {"note.txt": b"written by a test"}
+    assert bag.metadata == {"note": {"by": "a test"}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", WAYS)
+def test_a_part_of_a_bag_is_that_part_however_it_was_written(tmp_path: Path, way: str) -> None:
+    samples = random_samples(OURS, 60, seed=9)
+    bag = read(write(tmp_path / "bag.mcap", samples, WAYS[way]), ["jointstate", "string"], 30_000_000, 45_000_000)
+    expected = in_order([sample for sample in samples if 30_000_000 <= sample.time < 45_000_000])
+    assert bag.topics.keys() == {"/jointstate", "/string"}
+    for topic, columns in bag.topics.items():
+        assert_columns(columns, expected[topic])
+
+
+@pytest.mark.slow
+def test_every_value_is_that_of_mcap_ros2(tmp_path: Path) -> None:
+    kinds = [kind for kind in [*OURS, *FOREIGN] if kind != "std_msgs/msg/Empty"]
+    path = write(tmp_path / "bag.mcap", random_samples(kinds, 25, seed=7))
+    messages: dict[str, list[Any]] = {}
+    with path.open("rb") as stream:
+        for item in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            messages.setdefault(item.channel.topic, []).append(item.decoded_message)
+    bag = read(path)
+    for topic, columns in bag.topics.items():
+        if isinstance(columns, JointColumns):
+            assert columns.stamp_ns.tolist() == [nanoseconds(message.header.stamp) for message in messages[topic]]
+        if isinstance(columns, WrenchColumns):
+            np.testing.assert_array_equal(columns.force, xyz([m.wrench.force for m in messages[topic]]))
+        if isinstance(columns, Messages):
+            assert_equal(list(columns.messages), messages[topic])
+
+
+@pytest.mark.parametrize("kind", [*OURS, *FOREIGN])
+def test_many_messages_of_one_layout_are_the_same_as_one_by_one(tmp_path: Path, kind: str) -> None:
+    samples = random_samples([kind], 80, seed=3, lengths=(2,))
+    bag = read(write(tmp_path / "bag.mcap", samples))
+    ((topic, columns),) = bag.topics.items()
+    assert_columns(columns, in_order(samples)[topic])
+
+
+def joints(time: int, frame: str, names: list[str], values: list[float]) -> Sample:
+    stamp = STORE.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
+    header = STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+    arrays = [np.array(values, float), np.array([]), -np.array(values, float)]
+    message = STORE.types[JOINTS](header, names, *arrays)
+    return Sample("/js", JOINTS, time, bytes(STORE.serialize_cdr(message, JOINTS)))
+
+
+@pytest.mark.parametrize("layouts", [1, 2, 3, 200])
+def test_layouts_may_change_from_message_to_message(tmp_path: Path, layouts: int) -> None:
+    samples = [
+        joints(k, f"frame{k % layouts}", ["a", "b"] if k % layouts % 2 else ["b", "a"], [k, 0.5 * k])
+        for k in range(600)
+    ]
+    columns = read(write(tmp_path / "bag.mcap", samples)).topics["/js"]
+    assert_columns(columns, samples)
+
+
+def test_padding_that_was_never_set_is_no_layout(tmp_path: Path) -> None:
+    chance = random.Random(1)
+    samples = []
+    for k in range(200):
+        data = bytearray(joints(k, "ab", ["a"], [k]).data)
+        data[2:4] = chance.randbytes(2)  # options of the encapsulation
+        data[19:20] = chance.randbytes(1)  # before the names
+        samples.append(Sample("/js", JOINTS, k, bytes(data)))
+    bag = read(write(tmp_path / "bag.mcap", samples))
+    columns = bag.topics["/js"]
+    assert isinstance(columns, JointColumns)
+    assert columns.position[:, 0].tolist() == list(range(200))
+
+
+def test_messages_of_one_layout_are_one_group_whatever_their_padding_is() -> None:
+    chance = random.Random(2)
+    buffer, starts = bytearray(), []
+    for k in range(50):
+        data = bytearray(joints(k, "ab", ["a"], [k]).data)
+        data[19] = chance.randrange(256)
+        starts.append(len(buffer) + 8)
+        buffer += bytes(8) + data
+    grouping = Grouping(JOINTS, definitions(JOINTS, STORE.generate_msgdef(JOINTS, ros_version=2)[0].encode()))
+    sizes = np.full(50, len(data))
+    (group,) = grouping(np.frombuffer(bytes(buffer) + bytes(16), np.uint8), np.array(starts), sizes)
+    assert group.numbers("position")[:, 0].tolist() == list(range(50))
+
+
+def cloud(time: int, points: int, lines: int = 1, **changed: Any) -> Sample:
+    message = random_cloud(random.Random(time), points, lines)
+    for name, value in changed.items():
+        setattr(message, name, value)
+    return Sample("/cloud", CLOUD, time, bytes(STORE.serialize_cdr(message, CLOUD, little_endian=time % 2 == 0)))
+
+
+def test_point_clouds_of_any_number_of_points_are_one_table(tmp_path: Path) -> None:
+    samples = [
+        cloud(k, points, lines) for k, (points, lines) in enumerate([(3, 1), (0, 1), (2, 4), (0, 0), (1, 1)] * 30)
+    ]
+    columns = read(write(tmp_path / "bag.mcap", samples[::-1])).topics["/cloud"]
+    assert isinstance(columns, TableColumns)
+    assert_columns(columns, samples)
+    assert {name: column.dtype.str[1:] for name, column in columns.columns.items()} == {
+        "x": "f8",
+        "n": "i2",
+        "ab": "f4",
+    }
+    assert columns.columns["ab"].shape == ((3 + 8 + 1) * 30, 3)
+
+
+def test_clouds_without_points_are_columns_without_rows(tmp_path: Path) -> None:
+    columns = read(write(tmp_path / "bag.mcap", [cloud(1, 0), cloud(2, 0)])).topics["/cloud"]
+    assert isinstance(columns, TableColumns)
+    assert columns.stamp_ns.shape == (2,)
+    assert {name: column.shape for name, column in columns.columns.items()} == {"x": (0,), "n": (0,), "ab": (0, 3)}
+    nothing = read(write(tmp_path / "bag.mcap", [cloud(1, 3)]), begin_ns=2).topics["/cloud"]
+    assert isinstance(nothing, TableColumns)
+    assert (nothing.columns, nothing.message.shape) == ({}, (0,))
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"row_step": 81}, "row_step 81 and"),
+        ({"width": 4}, "1 rows of 4 points"),
+        ({"height": 2}, "2 rows of 3 points"),
+        ({"point_step": 0}, "point_step 0"),
+        ({"point_step": 30}, "field 'ab' of a point cloud ends at byte 32 of points of 30 bytes"),
+        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 9, 1)]}, "datatype 9; allowed: 1 to 8"),
+        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 8, 1)] * 2}, "two fields of the same name"),
+        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("y", 0, 8, 1)]}, "have the fields x, n, ab and y"),
+    ],
+)
+def test_point_clouds_whose_sizes_do_not_fit_are_refused(tmp_path: Path, changed: dict[str, Any], words: str) -> None:
+    path = write(tmp_path / "bag.mcap", [cloud(1, 3), cloud(2, 3, **changed)])
+    with pytest.raises(BagError, match=rf"bag\.mcap.*/cloud.*{words}"):
+        read(path)
+
+
+def test_a_flipped_bit_in_the_summary_is_found(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 30, seed=1))
+    data = bytearray(path.read_bytes())
+    data[data.rindex(b"/jointstate") + 1] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(BagError, match="its summary does not match its checksum"):
+        read(path)
+
+
+def test_messages_that_are_missing_are_missed(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 30, seed=1), Way(crcs=False))
+    counts = struct.pack("<IHQ", 10, 1, 30)
+    assert path.read_bytes().count(counts) == 1
+    path.write_bytes(path.read_bytes().replace(counts, struct.pack("<IHQ", 10, 1, 31)))
+    with pytest.raises(BagError, match="topic /jointstate has 30 messages instead of 31"):
+        read(path)
+    with pytest.raises(BagError, match="30 messages instead of 31"):
+        read(path, ["jointstate"])
+
+
+def three_chunks(tmp_path: Path) -> tuple[Path, list[Sample]]:
+    """A bag whose chunks hold joint states, then wrenches, then joint states."""
+    chance = random_samples([WRENCH], 40, seed=5)
+    samples = [joints(k, "a", ["x"], [k]) for k in range(40)]
+    samples += [sample._replace(time=100 + k) for k, sample in enumerate(chance)]
+    samples += [joints(200 + k, "a", ["x"], [k]) for k in range(40)]
+    return write(tmp_path / "bag.mcap", samples, Way(chunk_size=1500, compression=CompressionType.NONE)), samples
+
+
+def test_topics_and_times_that_are_not_asked_for_are_not_read(tmp_path: Path) -> None:
+    path, samples = three_chunks(tmp_path)
+    part = read(path, begin_ns=110, end_ns=220)
+    assert part.topics["/js"].log_time_ns.tolist() == list(range(200, 220))
+    assert_columns(part.topics["/wrenchstamped"], [s for s in samples if s.type == WRENCH and s.time >= 110])
+    assert (
+        list(read(path, ["wrenchstamped"]).topics) == list(read(path, ["/wrenchstamped"]).topics) == ["/wrenchstamped"]
+    )
+    assert read(path, ["stamped"], may_lack=True).topics == {}
+    with path.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    assert len(chunks) > 4
+    broken = bytearray(path.read_bytes())
+    broken[broken.index(chunks[-1].data) + 50] ^= 1
+    path.write_bytes(broken)
+    with pytest.raises(BagError, match="checksum"):
+        read(path)
+    with pytest.raises(BagError, match="checksum"):
+        read(path, ["js"])
+    assert len(read(path, ["wrenchstamped"]).topics["/wrenchstamped"].log_time_ns) == 40
+    assert len(read(path, end_ns=100).topics["/js"].log_time_ns) == 40
+
+
+def test_what_is_not_there_is_no_empty_answer(tmp_path: Path) -> None:
+    path, _ = three_chunks(tmp_path)
+    for look in (read, raw):
+        with pytest.raises(BagError, match=r"no topic 'nosuch'; its topics: /js, /wrenchstamped\. .*may_lack"):
+            look(path, ["js", "nosuch"])
+    assert list(read(path, ["js", "nosuch"], may_lack=True).topics) == ["/js"]
+    with pytest.raises(ValueError, match="from 9 ns to 8 ns; the end must not be before the start"):
+        read(path, begin_ns=9, end_ns=8)
+
+
+def test_all_topics_are_counted_also_those_that_are_not_read(tmp_path: Path) -> None:
+    for way in ("zstd", "no summary"):
+        path = write(tmp_path / f"{way}.mcap", three_chunks(tmp_path)[1], WAYS[way])
+        assert read(path, ["wrenchstamped"]).counts == {"/js": 80, "/wrenchstamped": 40}
+
+
+def test_one_topic_on_two_channels_is_one_topic(tmp_path: Path) -> None:
+    with (tmp_path / "bag.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        schema = writer.register_schema(JOINTS, "ros2msg", STORE.generate_msgdef(JOINTS, ros_version=2)[0].encode())
+        channels = [writer.register_channel("/js", "cdr", schema, {"publisher": str(i)}) for i in range(2)]
+        for k in range(20):
+            writer.add_message(channels[k % 2], k // 2, joints(k, "", ["a"], [k]).data, k)
+        writer.finish()
+    columns = read(tmp_path / "bag.mcap").topics["/js"]
+    assert isinstance(columns, JointColumns)
+    assert columns.position[:, 0].tolist() == list(range(20))
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"),
+    [(JOINTS, "header.frame_id"), ("rosgraph_msgs/msg/Clock", "clock.sec"), ("std_msgs/msg/String", "data")],
+)
+def test_serialized_messages_are_handed_out_too(tmp_path: Path, kind: str, field: str) -> None:
+    samples = random_samples([kind], 9, seed=2)
+    ((_, series),) = raw(write(tmp_path / "bag.mcap", samples)).items()
+    assert series.data == [sample.data for sample in samples]
+    assert series.log_time_ns.tolist() == [sample.time for sample in samples]
+    assert_equal(series.decode(series.data[3]), decoded(samples)[3])
+    assert field.split(".")[0] in series.decode(series.data[0])._fields
+
+
+def test_any_field_of_other_messages_is_a_column(tmp_path: Path) -> None:
+    samples = random_samples(["sensor_msgs/msg/Imu", "std_msgs/msg/String"], 40, seed=4)
+    bag = read(write(tmp_path / "bag.mcap", samples))
+    imu, text = bag.topics["/imu"], bag.topics["/string"]
+    assert isinstance(imu, Messages)
+    assert isinstance(text, Messages)
+    expected = decoded(in_order(samples)["/imu"])
+    np.testing.assert_array_equal(imu.column("angular_velocity.x"), [m.angular_velocity.x for m in expected])
+    assert imu.column("orientation_covariance").shape == (40, 9)
+    assert text.column("data").tolist() == [m.data for m in decoded(in_order(samples)["/string"])]
+
+
+def split_bag(path: Path) -> list[Sample]:
+    """A bag of three files, as rosbag2 splits it."""
+    path.mkdir()
+    samples = [joints(k, "a", ["x"], [k]) for k in range(90)]
+    for i in range(3):
+        write(path / f"{path.name}_{i}.mcap", samples[30 * i : 30 * i + 30])
+    names = [f"{path.name}_{i}.mcap" for i in range(3)]
+    information = {"version": 9, "relative_file_paths": names, "files": [{"path": name} for name in names]}
+    (path / "metadata.yaml").write_text(yaml.safe_dump({"rosbag2_bagfile_information": information}))
+    return samples
+
+
+def test_a_split_bag_is_read_as_one_and_a_missing_file_is_named(tmp_path: Path) -> None:
+    samples = split_bag(tmp_path / "bag")
+    assert_columns(read(tmp_path / "bag").topics["/js"], samples)
+    (tmp_path / "bag" / "bag_1.mcap").unlink()
+    with pytest.raises(BagError, match=r"lacks its file bag_1\.mcap; copy the whole"):
+        read(tmp_path / "bag")
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    assert len(read(tmp_path / "bag").topics["/js"].log_time_ns) == 60
+
+
+@pytest.mark.parametrize("name", ["/{}/elsewhere.mcap", "../elsewhere.mcap", "a/../../elsewhere.mcap"])
+def test_files_outside_the_bag_are_not_read(tmp_path: Path, name: str) -> None:
+    samples = split_bag(tmp_path / "bag")
+    (tmp_path / "bag" / "a").mkdir()
+    write(tmp_path / "elsewhere.mcap", samples)
+    file = tmp_path / "bag" / "metadata.yaml"
+    outside = name.format(str(tmp_path)[1:])
+    file.write_text(file.read_text().replace("- bag_1.mcap", f"- {outside}"))
+    with pytest.raises(
+        BagError, match=r"metadata\.yaml lists .*elsewhere\.mcap, which is outside the bag; 'wam bag repair"
+    ):
+        read(tmp_path / "bag")
+    repair(tmp_path / "bag")
+    assert_columns(read(tmp_path / "bag").topics["/js"], samples)
+
+
+def test_a_chunk_index_is_parsed_as_by_the_library() -> None:
+    index = ChunkIndex(1, 2, "zstd", 3, 4, 5, {i: i * 7 for i in range(35)}, 6, 7)
+    content = serialized(index)[9:]
+    assert chunk_index(content) == index == ChunkIndex.read(ReadDataStream(BytesIO(content)))
+    for end in range(len(content)):
+        with pytest.raises(BROKEN):
+            chunk_index(content[:end])
+
+
+@pytest.mark.parametrize("length", [0, 8])
+def test_an_index_that_names_a_record_without_a_head_is_refused(tmp_path: Path, length: int) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 3, seed=1), Way(crcs=False))
+    data = bytearray(path.read_bytes())
+    index = data.rindex(struct.pack("<BQ", Opcode.METADATA_INDEX, 8 + 8 + 4 + len("note")))
+    start, whole = struct.unpack_from("<QQ", data, index + 9)
+    struct.pack_into("<QQ", data, index + 9, start, length)
+    struct.pack_into("<BQ", data, start + length, 0x80, whole - length - 9)  # the rest is a record to be skipped
+    path.write_bytes(data)
+    with pytest.raises(BagError, match=r"is damaged \(a record at byte \d+ is shorter than its head\); copy it again"):
+        read(path)
+
+
+def test_a_file_that_is_listed_twice_is_not_read_twice(tmp_path: Path) -> None:
+    split_bag(tmp_path / "bag")
+    file = tmp_path / "bag" / "metadata.yaml"
+    file.write_text(file.read_text().replace("- bag_1.mcap", "- bag_1.mcap\n  - bag_0.mcap"))
+    with pytest.raises(BagError, match="lists a file twice"):
+        read(tmp_path / "bag")
+
+
+@pytest.mark.slow
+def test_a_small_file_that_decompresses_to_much_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    text = STORE.generate_msgdef("std_msgs/msg/String", ros_version=2)[0].encode()
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", text))
+        writer.add_message(channel, 1, bytes(LARGEST_CHUNK), 1)
+        writer.finish()
+    before = path.read_bytes()
+    assert len(before) < 100_000
+    for look in (read, raw, lambda path: cut(path, tmp_path / "part", Cut()), repair):
+        with (
+            limits(MEMORY // 16),
+            pytest.raises(BagError, match=r"bag\.mcap .*is to hold \d+ bytes; chunks of at most"),
+        ):
+            look(path)
+    assert path.read_bytes() == before
+
+
+def test_an_attachment_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 3, seed=1))
+    data = bytearray(path.read_bytes())
+    content = b"written by a test"
+    start = data.index(content) - data[: data.index(content)][::-1].index(b"\x09") - 1
+    assert data[start] == Opcode.ATTACHMENT
+    del data[start:]
+    extra = LARGEST_ATTACHMENT
+    with path.open("wb") as stream:  # a sparse file: it takes no space on disk
+        stream.write(data)
+        stream.write(struct.pack("<BQ", Opcode.ATTACHMENT, extra))
+        stream.seek(extra, os.SEEK_CUR)
+        stream.write(struct.pack("<BQI", Opcode.DATA_END, 4, 0))
+        stream.write(struct.pack("<BQQQI", Opcode.FOOTER, 20, 0, 0, 0) + MAGIC)
+    with limits(MEMORY // 16), pytest.raises(BagError, match=r"the attachment at byte \d+ has \d+ bytes; at most"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    "text", [b"a: " + b"[" * 50_000, b"a: &a [1]\nb: [*a, *a]\n", b"- " * 40_000, b"\xff", b"{" * 3000]
+)
+def test_yaml_that_would_take_much_memory_or_end_the_process_is_refused(text: bytes) -> None:
+    with pytest.raises((yaml.YAMLError, UnicodeDecodeError)):
+        safe_yaml.load(text)
+    assert mode_of({}, text) == "unknown"
+
+
+def test_yaml_that_is_too_long_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    for text in ("!!bool x", "!!timestamp x", "2001-99-99", '!!int ""'):
+        with pytest.raises(yaml.YAMLError, match="does not fit its tag, or is no date"):
+            safe_yaml.load(text)
+    long = b"- 1\n" * (safe_yaml.LONGEST // 4 + 1)
+    with pytest.raises(yaml.YAMLError, match="bytes; at most"):
+        safe_yaml.load(long)
+    assert mode_of({}, long) == "unknown"
+    split_bag(tmp_path / "bag")
+    with (tmp_path / "bag" / "metadata.yaml").open("a") as stream:
+        stream.truncate(2**32)  # sparse
+    with limits(MEMORY // 16), pytest.raises(BagError, match="at most 67108864 are read"):
+        read(tmp_path / "bag")
+
+
+def hostile(path: Path, schema: str, *messages: bytes, **metadata: dict[str, str]) -> Path:
+    """A bag of one topic with any schema and any messages."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/a", "cdr", writer.register_schema("a/msg/T", "ros2msg", schema.encode()))
+        for k, message in enumerate(messages):
+            writer.add_message(channel, k, b"\0\1\0\0" + message, k)
+        for name, values in metadata.items():
+            writer.add_metadata(name, values)
+        writer.finish()
+    return path
+
+
+def doubling(depth: int, last: str) -> str:
+    """Types that each have two of the next one: 2^depth numbers."""
+    parts = [f"{'=' * 80}\nMSG: a/B{i}\nB{i + 1} x\nB{i + 1} y\n" for i in range(depth)]
+    return "B0 x\n" + "".join(parts) + f"{'=' * 80}\nMSG: a/B{depth}\n{last}\n"
+
+
+@pytest.mark.parametrize(
+    ("schema", "reason"),
+    [
+        (doubling(40, "uint8 z"), "a message ends early"),
+        (doubling(40, ""), "a message ends early"),
+        ("float64[1000000000000] x", "a message ends early"),
+        ("string[] x", "a message ends early"),
+        ("uint8 a\nuint8 a", "has a field twice"),
+        (f"uint8[{'9' * 5000}] x", "with a schema that cannot be read"),
+    ],
+)
+def test_a_hostile_schema_is_refused_in_no_time(schema: str, reason: str, tmp_path: Path) -> None:
+    path = hostile(tmp_path / "bag.mcap", schema, b"\xff" * 4 + bytes(100))
+    with limits(MEMORY // 16), pytest.raises(BagError, match=reason):
+        list(read(path).topics["/a"].messages)  # type: ignore[union-attr]
+
+
+def test_hostile_records_of_the_recorder_are_no_more_than_text(tmp_path: Path) -> None:
+    digits = "9" * 6000
+    path = hostile(
+        tmp_path / "bag.mcap",
+        "uint8 z",
+        b"\0",
+        recording={"/a d received": digits, "/a d dropped": digits, "/a d lost_at_end": digits},
+        repaired={"f": "[" * 100_000},
+        rosbag2={"serialized_metadata": "a: " + "[" * 50_000},
+    )
+    bag = read(path)
+    found = losses(path, bag.metadata, bag.attachments, bag.counts)
+    assert found.sentences(0) == ["f was repaired; the record of its losses cannot be read."]
+
+
+def test_a_file_that_decompresses_to_a_thousand_times_its_size_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    message = struct.pack("<I", 2**23) + bytes(2**23)
+    path = hostile(tmp_path / "bag.mcap", "uint8[] z", *[message] * 4)
+    assert path.stat().st_size < 10_000
+    assert len(read(path).topics["/a"].log_time_ns) == 4, "so little may be that small"
+    monkeypatch.setattr(bag_file, "LARGEST_BOMB", 2**24)
+    with pytest.raises(BagError, match="bytes decompress to more than 1000 times as many"):
+        read(path)
+
+
+@pytest.mark.slow
+def test_a_broken_metadata_file_is_refused_or_read_never_a_crash(tmp_path: Path) -> None:
+    samples = split_bag(tmp_path / "bag")
+    file = tmp_path / "bag" / "metadata.yaml"
+    whole, chance = file.read_bytes(), random.Random(1)
+    refused = 0
+    for _ in range(300):
+        text = bytearray(whole)
+        for _ in range(chance.randint(1, 3)):
+            text[chance.randrange(len(text))] = chance.choice(b"\0\xff\t[]{}:&*!-x0\n")
+        file.write_bytes(text)
+        try:
+            assert len(read(tmp_path / "bag").topics["/js"].log_time_ns) == len(samples)
+        except BagError:
+            refused += 1
+    assert refused > 50
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.STORAGE])
+def test_bags_of_rosbags_are_read(tmp_path: Path, mode: CompressionMode) -> None:
+    samples = random_samples([JOINTS, WRENCH], 30, seed=6)
+    target = RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
+    if mode != CompressionMode.NONE:
+        target.set_compression(mode, CompressionFormat.ZSTD)
+    with target as writer:
+        connections = {
+            kind: writer.add_connection("/" + kind.split("/")[-1].lower(), kind, typestore=STORE)
+            for kind in (JOINTS, WRENCH)
+        }
+        for sample in sorted(samples, key=lambda sample: sample.time):
+            writer.write(connections[sample.type], sample.time, sample.data)
+    bag = read(tmp_path / "bag")
+    for topic, expected in in_order(samples).items():
+        assert_columns(bag.topics[topic], expected)
+
+
+def test_files_that_were_compressed_as_a_whole_are_refused_and_read_once_they_are_decompressed(tmp_path: Path) -> None:
+    split_bag(bag := tmp_path / "bag")
+    whole = len(read(bag).topics["/js"].log_time_ns)
+    files = sorted(bag.glob("*.mcap"))
+    for file in files:
+        file.with_name(f"{file.name}.zstd").write_bytes(zstandard.compress(file.read_bytes()))
+        file.unlink()
+    described = bag / "metadata.yaml"
+    described.write_text(described.read_text().replace(".mcap", ".mcap.zstd"))
+    commands = rf"decompress it with 'zstd -d --rm {bag}/\*.mcap.zstd', then 'wam bag repair {bag}'"
+    for use in (read, contents, lambda path: analyse(path, lambda doing: None)):
+        with pytest.raises(BagError, match=commands):
+            use(bag)
+    with pytest.raises(BagError, match=r"compressed as a whole"):
+        read(bag / f"{files[0].name}.zstd")
+    with pytest.raises(BagError, match=commands):
+        repair(bag)
+    for file in files:
+        compressed = file.with_name(f"{file.name}.zstd")
+        file.write_bytes(zstandard.decompress(compressed.read_bytes()))
+        compressed.unlink()
+    repair(bag)
+    assert len(read(bag).topics["/js"].log_time_ns) == whole
+
+
+def _with(sample: Sample, change: Callable[[bytearray], None]) -> Sample:
+    data = bytearray(sample.data)
+    change(data)
+    return sample._replace(data=bytes(data))
+
+
+def _huge_count(data: bytearray) -> None:
+    struct.pack_into("<I", data, 12, 2**32 - 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: data.__delitem__(slice(40, None)), "a message ends early"),
+        (_huge_count, "a message ends early"),
+        (lambda data: data.__setitem__(1, 7), "encapsulation 0007; plain CDR is read"),
+        (lambda data: data.clear(), "encapsulation none"),
+    ],
+)
+@pytest.mark.parametrize("topic", ["/js", "/js_decoded"])
+def test_a_message_that_is_none_is_named(
+    tmp_path: Path, change: Callable[[bytearray], None], words: str, topic: str
+) -> None:
+    kind = JOINTS if topic == "/js" else "sensor_msgs/msg/MultiDOFJointState"
+    good = joints(5, "abc", ["a"], [1.0])
+    if topic != "/js":
+        good = random_samples([kind], 1, seed=1, lengths=(3,))[0]
+    path = write(tmp_path / "bag.mcap", [good, _with(good, change)], Way(crcs=False))
+
+    def look() -> Bag:
+        bag = read(path)
+        for columns in bag.topics.values():
+            if isinstance(columns, Messages):
+                list(columns.messages)
+        return bag
+
+    with pytest.raises(BagError, match=words) as caught:
+        look()
+    assert "bag.mcap" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "schema", "text", "words"),
+    [
+        ("json", "ros2msg", b"int32 x", "in encoding 'json'; only 'cdr' is read; name the topics"),
+        ("cdr", "ros2idl", b"module x {}", "in 'ros2idl'; only 'ros2msg' is read; name the topics"),
+        ("cdr", "ros2msg", b"wstring x", "field 'x' of a_msgs/msg/A is a wstring, which is not read"),
+        ("cdr", "ros2msg", b"B x", "type a_msgs/msg/B of field 'x' of a_msgs/msg/A is not defined"),
+        ("cdr", "ros2msg", b"A x", "type a_msgs/msg/A contains itself"),
+    ],
+)
+def test_a_topic_that_cannot_be_read_is_named_and_leaves_the_others(
+    tmp_path: Path, encoding: str, schema: str, text: bytes, words: str
+) -> None:
+    with (tmp_path / "bag.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        odd = writer.register_channel("/odd", encoding, writer.register_schema("a_msgs/msg/A", schema, text))
+        known = STORE.generate_msgdef("std_msgs/msg/Bool", ros_version=2)[0].encode()
+        good = writer.register_channel("/good", "cdr", writer.register_schema("std_msgs/msg/Bool", "ros2msg", known))
+        writer.add_message(odd, 1, b"\0\1\0\0\0\0\0\0", 1)
+        writer.add_message(good, 1, b"\0\1\0\0\1", 1)
+        writer.finish()
+    with pytest.raises(BagError, match=words):
+        read(tmp_path / "bag.mcap")
+    assert read(tmp_path / "bag.mcap", ["/good"]).topics["/good"].log_time_ns.tolist() == [1]
+
+
+def test_a_chunk_that_claims_to_be_huge_takes_no_memory(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 30, seed=1), Way(summary=False, crcs=False))
+    whole = path.read_bytes()
+    with path.open("rb") as stream:
+        chunk = next(record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk))
+    claim = struct.pack("<Q", chunk.uncompressed_size)
+    for size in (2**63, 2**40, 2**30, 2**29):
+        path.write_bytes(whole.replace(claim, struct.pack("<Q", size), 1))
+        with limits(), pytest.raises(BagError, match=r"is to hold|instead of"):
+            read(path)
+
+
+@pytest.mark.slow
+def test_broken_bags_are_refused_and_none_gives_a_wrong_value_unseen(tmp_path: Path) -> None:
+    results = break_bags(400, 11, tmp_path)
+    verdicts = [verdict for _, verdict in results]
+    assert verdicts.count("refused") == len(WAYS)
+    assert "differs" in verdicts, "without checksums some damage is not seen: values are compared"
+    assert "same" in verdicts
+
+
+def test_a_topic_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path) -> None:
+    split_bag(bag := tmp_path / "bag")
+    found = read(bag)
+    with pytest.raises(KeyError, match=f"no topic '/nosuch'; its topics: {', '.join(found.topics)}"):
+        found.topics["/nosuch"]
+    assert "/nosuch" not in found.topics
+
+
+@pytest.mark.parametrize("topics", [[], ["/wam/motor_states", "/wam/joint_states"]])
+def test_a_bag_without_a_message_is_not_analysed_but_called_empty(topics: list[str], tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for name in topics:
+            bag.add_topic(name, "sensor_msgs/msg/JointState", QOS)
+    with pytest.raises(BagError, match="bag is empty: it has no message; record again while the nodes publish"):
+        analyse(tmp_path / "bag", lambda doing: None)

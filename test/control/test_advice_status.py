@@ -1,0 +1,52 @@
+"""What would help a refused force is in the status of the force loop, which looks for it in several periods."""
+
+from wam_control.task.scenario import ScenarioStep
+from wam_description.configuration import Configuration, packaged
+from wam_description.signals import BASE, ForceCommand, NodeStatus
+from wam_sim.simulation import Simulation
+
+
+def test_the_status_of_a_refused_force_states_what_would_help() -> None:
+    steps = [
+        ScenarioStep("release", 0.05, request="enable"),
+        ScenarioStep("press", 1.0, force=ForceCommand(BASE, (0.2, 0.0, 0.0))),
+    ]
+    run = Simulation(Configuration.load(packaged("wam")), steps)
+    seen: list[NodeStatus] = []
+    run.listen("status", lambda _, status: seen.append(status), "force_loop")
+    assert run.play() == ""
+    refused = [status.message for status in seen if status.facts.get("reaction") == "not_sensed"]
+    assert refused[0].endswith("the arm holds its position")  # at once
+    assert refused[-1].startswith(f"{refused[0]}: turn joint")
+
+
+def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
+    def pressing(newtons: float) -> ScenarioStep:
+        return ScenarioStep("press", 0.1, force=ForceCommand("outer_link", (0.0, -newtons, 0.0)))
+
+    steps = [ScenarioStep("release", 0.05, request="enable"), pressing(70.0), pressing(90.0)]
+    run = Simulation(Configuration.load(packaged("wam")), steps)
+    seen: list[str] = []
+    run.listen("status", lambda _, status: seen.append(status.message), "force_loop")
+    assert run.play() == ""
+    refusals = [message.partition(";")[0] for message in seen if "force_limit" in message]
+    assert refusals == [f"{newtons} N is commanded" for newtons in (70, 90)]
+
+
+def test_a_force_that_began_while_the_arm_moved_has_the_reason_of_the_arm_at_rest() -> None:
+    heavy = Configuration.load(packaged("wam")).with_values({"driver:mismatch.payload": 0.3})
+    steps = [
+        ScenarioStep("release", 0.1, request="enable"),
+        ScenarioStep("move", 0.8, posture=(0.0, -1.2, 0.0, 1.6)),
+        ScenarioStep("press", 1.5, force=ForceCommand("outer_link", (0.0, -8.0, 0.0))),
+    ]
+    run = Simulation(heavy.with_values({"force_loop:joint_speed_limit": 2.0}), steps)
+    seen: list[str] = []
+    run.listen("status", lambda _, status: seen.append(status.message), "force_loop")
+    assert run.play() == ""
+    fast, loaded = (
+        [k for k, message in enumerate(seen) if text in message]
+        for text in ("the arm moved faster than 0.3 rad/s as the force began", "the arm at rest already measures")
+    )
+    assert fast[0] < loaded[0]
+    assert run.unmet.startswith("press refused: the arm at rest already measures")

@@ -1,0 +1,185 @@
+"""Several moments of one contact: against the whole covariance at once, and what they may and may not gain."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_truth import torques
+from scipy.stats import multivariate_normal
+
+from wam_control.contact import contact_fusion
+from wam_control.contact.contact_estimator import ContactEstimatorParameters
+from wam_control.contact.contact_fusion import EVERY, MOST, SLIDES, ContactFusion, Guess, Torques, probability_of_slide
+from wam_control.contact.contact_inference import ContactInference, Hypothesis
+from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
+
+CONFIGURATION = Configuration.load(Path(__file__).parents[2] / "config" / "wam.yaml")
+ARM = CONFIGURATION.shared.arm
+INFERENCE = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
+SMOOTH = dataclasses.replace(INFERENCE, friction=1e-3, moment_arm_offset=1e-3)
+START, SPEED = np.array([0.2, -1.05, 0.3, 0.6]), np.array([0.6, 0.5, -0.6, 0.7])  # rad, rad/s
+SD, STEP = 0.05, 0.0301  # N m; s
+FORCE, PLACE = (0.0, 6.0, 5.0), 0.28
+
+Errors = Callable[[np.random.Generator], np.ndarray]
+
+
+def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> None:
+    """By the inverse of the covariance of all rows, whose blocks are written out here."""
+    random = np.random.default_rng(3)
+    shared = np.diag(random.uniform(0.5, 2.0, 5))
+    same = random.standard_normal(4)
+    moments = []
+    for k in range(4):
+        own = np.diag(random.uniform(0.1, 0.4, 4))
+        at = Torques(k * 1.1 * EVERY, same, random.standard_normal((4, 5)), shared, own, np.full(4, 0.01 * k))
+        rows = random.standard_normal((2, 7, 4))
+        rows[:, 0] = same
+        moments.append((rows, at))
+    fusion = ContactFusion(1.0)
+    for rows, at in moments[:-1]:
+        fusion.remember(rows, at, [Guess(0.2, 0.0)], 0.0)
+    rows, now = moments[-1]
+    gram = fusion.gram(rows, now)
+    assert gram is not None
+    assert fusion.count == 3  # the last but one is too young
+    used = [*moments[:2], moments[-1]]
+    effects = np.concatenate([at.effects for _, at in used])
+    covariance = effects @ shared @ effects.T
+    for k, (_, at) in enumerate(used):
+        covariance[4 * k : 4 * k + 4, 4 * k : 4 * k + 4] += at.own
+    whole = np.concatenate([rows for rows, _ in used], axis=2)
+    assert gram == pytest.approx(whole @ np.linalg.inv(covariance) @ whole.transpose(0, 2, 1), rel=1e-9)
+
+
+def played(
+    random: np.random.Generator,
+    stays: float,
+    moves: bool = True,
+    count: int = 7,
+    duration: float = 1.0,
+    slides: float = 0.0,
+) -> tuple[list[Hypothesis], ContactFusion]:
+    """The best explanation at each moment of a push, whose torques err by a part that stays and one that changes."""
+    inference, fusion = ContactInference(ARM, RigidBody(ARM), SMOOTH), ContactFusion(duration)
+    own, staying = np.eye(4) * SD**2 * (1.0 - stays), np.eye(4) * SD**2 * stays
+    bias = SD * np.sqrt(stays) * random.standard_normal(4)
+    found = []
+    for k in range(count):
+        q = START + moves * k * STEP * SPEED
+        error = bias + SD * np.sqrt(1.0 - stays) * random.standard_normal(4)
+        place = PLACE - slides * (count - 1 - k) * STEP
+        seen = torques(q, "outer_link", (place, 0.0, 0.0), FORCE) + error
+        now = Torques(k * STEP, seen, np.eye(4), staying, own, q)
+        found.append(inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0])
+    return found, fusion
+
+
+def errors(stays: float) -> np.ndarray:
+    """(pushes, 2, 2): error of the position and its sd, m, by the first moment alone and by the last with all."""
+    random = np.random.default_rng(11)
+    ends = [played(random, stays)[0] for _ in range(150)]
+    return np.array([[(one.position - PLACE, one.position_sd) for one in (found[0], found[-1])] for found in ends])
+
+
+def test_errors_that_change_average_out_and_the_stated_ones_with_them() -> None:
+    found = errors(0.0)
+    error = np.quantile(np.abs(found[:, :, 0]), 0.68, axis=0)
+    assert error[1] < 0.7 * error[0]  # of 6 moments 0.41 if it could not slide
+    ratio = np.abs(found[:, 1, 0]) / found[:, 1, 1]
+    assert 0.6 < np.quantile(ratio, 0.68) < 1.0
+    assert np.mean(ratio < 2.0) > 0.9
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.8])
+def test_a_contact_that_slides_along_the_link_is_where_it_has_come_to(speed: float) -> None:
+    """And one that stays there is known as well as stated, too."""
+    random = np.random.default_rng(13)
+    slid, stayed = ([played(random, 0.0, slides=slides)[0][-1] for _ in range(60)] for slides in (speed, 0.0))
+    ratio = [
+        np.quantile([abs(one.position - PLACE) / one.position_sd for one in ends], 0.68) for ends in (slid, stayed)
+    ]
+    assert max(ratio) < 1.6  # 2.4 and 4.0 of one that is taken to stay
+
+
+def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> None:
+    """Against the densities of both normal distributions."""
+    random = np.random.default_rng(7)
+    half = random.standard_normal((6, 6))
+    covariance, slide = half @ half.T + np.eye(6), random.standard_normal(6)
+    for size in (0.0, 1.0, 4.0):
+        torques = size * slide + random.standard_normal(6)
+        without, with_it = (
+            multivariate_normal(np.zeros(6), each).pdf(torques)
+            for each in (covariance, covariance + np.outer(slide, slide))
+        )
+        expected = SLIDES * with_it / (SLIDES * with_it + (1.0 - SLIDES) * without)
+        assert probability_of_slide(torques, covariance, slide) == pytest.approx(expected, rel=1e-9)
+
+
+def test_errors_that_stay_are_not_taken_for_new_knowledge() -> None:
+    found = errors(0.9)
+    stated = np.median(found[:, :, 1], axis=0)
+    assert stated[1] > 0.85 * stated[0]
+    ratio = np.abs(found[:, 1, 0]) / found[:, 1, 1]
+    assert np.quantile(ratio, 0.68) < 1.05
+
+
+def test_an_arm_that_does_not_move_shows_nothing_new() -> None:
+    found, fusion = played(np.random.default_rng(5), 0.5, moves=False)
+    assert fusion.count == 1
+    assert found[-1].position_sd == pytest.approx(found[0].position_sd, rel=0.5)
+
+
+def test_no_more_moments_than_allowed_count_and_none_without_time() -> None:
+    _, fusion = played(np.random.default_rng(5), 0.0, count=12)
+    assert fusion.count == 1 + MOST
+    _, short = played(np.random.default_rng(5), 0.0, count=12, duration=3.5 * STEP)
+    assert short.count == 1 + 3
+    _, none = played(np.random.default_rng(5), 0.0, count=12, duration=0.0)
+    assert none.count == 1
+
+
+def test_a_contact_from_another_side_forgets_the_one_before() -> None:
+    inference, fusion = ContactInference(ARM, RigidBody(ARM), SMOOTH), ContactFusion(1.0)
+    for k in range(9):
+        q = START + k * STEP * SPEED
+        force = np.array(FORCE) * (1.0 if k < 8 else -1.0)
+        seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force.tolist())
+        now = Torques(k * STEP, seen, np.eye(4), 0.0 * np.eye(4), SD**2 * np.eye(4), q)
+        best = inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0]
+    assert fusion.count == 1
+    assert best.force == pytest.approx(force, abs=1.0)
+
+
+def test_a_force_that_grows_is_followed_at_once() -> None:
+    inference, fusion = ContactInference(ARM, RigidBody(ARM), SMOOTH), ContactFusion(1.0)
+    for k in range(9):
+        q = START + k * STEP * SPEED
+        force = np.array(FORCE) * (1.0 if k < 8 else 2.0)
+        seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force.tolist())
+        now = Torques(k * STEP, seen, np.eye(4), 0.0 * np.eye(4), SD**2 * np.eye(4), q)
+        best = inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0]
+    assert fusion.count > contact_fusion.MOST
+    assert best.force == pytest.approx(force, rel=0.05, abs=0.3)
+    assert best.position == pytest.approx(PLACE, abs=0.01)
+
+
+@pytest.mark.parametrize("sd", [1e-6, 1e-5, 1e-4, 1e-3])
+def test_errors_so_small_that_rounding_counts_end_no_estimate(sd: float) -> None:
+    """A mass uncertainty keeps the covariance of one moment large, that of what changes is tiny."""
+    random, inference = np.random.default_rng(2), ContactInference(ARM, RigidBody(ARM), INFERENCE)
+    for _ in range(8):
+        fusion = ContactFusion(1.0)
+        force = random.uniform(-40.0, 40.0, 3).tolist()
+        for k in range(12):
+            q = START + k * STEP * SPEED
+            seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force)
+            weight = np.diag(0.3 * random.uniform(0.5, 5.0, 4))
+            now = Torques(k * STEP, seen, np.hstack((weight, sd * np.eye(4))), np.eye(8), sd**2 * np.eye(4), q)
+            precision = np.linalg.inv(weight @ weight.T + 2.0 * sd**2 * np.eye(4))
+            found = inference.infer(q.tolist(), seen.tolist(), precision, None, fusion, now)
+            assert sum(one.probability for one in found) == pytest.approx(1.0)

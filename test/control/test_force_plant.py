@@ -1,0 +1,129 @@
+"""The force loop on the simulated arm where nothing is touched, behind poor amplifiers, with a load, led by a hand."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_control.force.force_hold import ForceReaction
+from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
+from wam_control.force.stability_guard import StabilityGuard
+from wam_control.force.task import AxisKind, TaskCommand, joint_axes
+from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import ForceCommand
+from wam_sim.simulation import Simulation
+from wam_studies.force_benchmark.outcome import TaskEnd
+from wam_studies.force_benchmark.surfaces import Surface
+from wam_studies.force_benchmark.tasks import RELEASE, Task, triple
+from wam_studies.force_benchmark.trial import perform
+
+BODY = RigidBody(WAM)
+OUTER = "outer_link"
+FAR_AWAY = {"driver:world.obstacles.positions": [3.0, 3.0, 3.0]}
+POSE = (0.3, -1.2, 0.2, 1.0)
+MOTORS = {
+    "arm.joint_sensors": False,
+    "contact_estimator:use_joint_sensors": False,
+    "force_loop:feedback": "contact_estimate",
+    "timing.dither_cycle": 40,
+}
+
+
+def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simulation:
+    """A simulation of the arm released in free space, at its start."""
+    given = {"arm.joints.start": list(q), "force_loop:guard.posture": list(q), **FAR_AWAY, **changes}
+    return Simulation(CONFIGURATION.with_values(given), [ScenarioStep("release", RELEASE, request="enable"), step])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("q", "newtons"),
+    [
+        *(
+            ((0.0, -1.0, 0.0, math.pi / 2.0 - bend), newtons)
+            for bend, newtons in ((0.15, 5.0), (0.2, 15.0), (0.4, 15.0))
+        ),
+        ((-2.2, -1.03, 1.34, 0.7), 15.0),
+        ((-2.15, -0.26, -0.09, -0.66), 15.0),
+    ],
+)
+def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...], newtons: float) -> None:
+    """Near a straight elbow a force along the arm turned the joints back and forth by 3.9 to 5 rad/s."""
+    tip = BODY.point(q, OUTER, (WAM.covers.length[-1], 0.0, 0.0))
+    command = ForceCommand("base", triple(newtons * tip / np.linalg.norm(tip)))
+    given = {"force_loop:contact_source": "pinned", "force_loop:contact_position": 0.4, "force_loop:guard.mode": "warn"}
+    run = free_arm(q, ScenarioStep("press", 1.2, force=command), **given)
+    speeds = []
+    while not run.step():
+        speeds.append(run.driver.plant.qd)
+    pressed = np.array(speeds)[round(1e3 * RELEASE) :]
+    assert np.abs(pressed).max() < 1.2, "rad/s"
+    signs = np.sign(np.where(np.abs(pressed) < 0.3, 0.0, pressed)).T
+    assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 2, "turns at more than 0.3 rad/s"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("q", "place", "newtons"),
+    [
+        ((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)),
+        ((-0.57, 1.55, 0.41, 1.16), 0.39, (-23.5, 24.9, 2.4)),
+        ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9)),
+    ],
+)
+def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
+    q: tuple[float, ...], place: float, newtons: tuple[float, ...]
+) -> None:
+    """Up to 240 N were measured in free space, at up to 2.4 rad/s, as the apparent mass has either sign here."""
+    given = {"force_loop:contact_source": "pinned", "force_loop:contact_position": place}
+    run = free_arm(q, ScenarioStep("press", 2.5, force=ForceCommand("base", triple(np.array(newtons)))), **given)
+    speeds, loop = [], run.nodes["force_loop"]
+    while not run.step():
+        speeds.append(run.driver.plant.qd)
+        assert loop.force_reaction not in (ForceReaction.CYCLE, ForceReaction.CONTACT_FORCE)
+    measured = [math.hypot(*row.values[:3]) for row in run.rows["force_measured"]]
+    assert max(measured) < 0.2 * math.hypot(*newtons), "nothing is touched"
+    signs = np.sign(np.where(np.abs(speeds) < 0.3, 0.0, speeds)).T
+    assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 1, "turns at more than 0.3 rad/s"
+
+
+@pytest.mark.slow
+def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
+    """0.2 A: the integral of the velocity loop was lost where the current was 0, and 6.6 N stayed of 5."""
+    x, y, z = (-BODY.cover_pose(POSE, OUTER).rotation[:, 1]).tolist()
+    task = Task(POSE, Surface(OUTER, 0.28, (x, y, z), 4000.0, 0.3, is_plane=False), 5.0)
+    result = perform(CONFIGURATION, task, 2.5, {"driver:amplifier.deadband": [0.2] * 4})
+    assert result.outcome is TaskEnd.DONE
+    assert result.mean == pytest.approx(5.0, rel=0.06)
+
+
+def test_the_guard_counts_a_payload() -> None:
+    """Its margin is that of the loaded arm."""
+    own = CONFIGURATION.node("force_loop", ForceLoopParameters)
+    scales = []
+    for mass in (0.0, 0.5):
+        loaded = replace(WAM, payload=mass)
+        guard = StabilityGuard(
+            loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, sensing_of(own)
+        )
+        contacts = guard.contacts(own.guard.posture, OUTER, 0.28, 0.0)
+        scales.append(min(guard.scales(task_of(own, force_law(own)), contacts)))
+    assert abs(scales[1] / scales[0] - 1.0) > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("newtons", "least", "most"), [(1.0, 50.0, 200.0), (0.4, 0.0, 3.0)])
+def test_a_hand_leads_the_arm_from_its_motors_with_the_dither(newtons: float, least: float, most: float) -> None:
+    """Down to what friction allows: without the dither 3 N move it by 0.8 mm."""
+    task = TaskCommand("base", joint_axes(AxisKind.IMPEDANCE, [None] * 4, 5.0))
+    push = Push(OUTER, 0.35, (0.0, newtons, 0.0), 0.5, 1.5)
+    run = free_arm(POSE, ScenarioStep("lead", 1.6, task=task, push=push), **MOTORS)
+    places = []
+    while not run.step():
+        places.append(BODY.point(run.driver.plant.q, OUTER, (0.35, 0.0, 0.0)))
+    moved = 1e3 * float(np.linalg.norm(places[2000] - places[1000]))
+    assert least <= moved <= most, "mm"

@@ -1,0 +1,95 @@
+"""What pushes an arm that moves or presses is given way to: a rod that comes from the side, on the simulated arm."""
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from arms import CONFIGURATION
+from test_force_lasting import BODY, DIRECTION, OUTER, POSE, press
+
+from wam_control.force.force_hold import ForceReaction
+from wam_control.task.scenario import ScenarioStep
+from wam_sim.simulation import Simulation
+from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
+from wam_studies.force_benchmark.tasks import RELEASE, triple
+from wam_studies.force_benchmark.trial import with_accepted_gain
+
+pytestmark = pytest.mark.slow  # seconds each: the plant in contact
+
+SPEED, WAY = 0.02, 0.02  # m/s, m: a rod that comes so fast, to both sides of where it would touch
+INNER = "inner_link"
+UNBOUND = {"force_loop:limits.whole_force": 1e9}
+
+
+def pushed(
+    step: ScenarioStep, cover: str, place: float, pinned: bool = False, **changes: Any
+) -> tuple[float, set[ForceReaction], str]:
+    """Largest force of a rod of 40 000 N/m from the side, N, what the arm reports once it comes, and why at last."""
+    aside = -BODY.cover_pose(POSE, cover).rotation[:, 2]
+    still = Surface(OUTER, 0.25, DIRECTION, 4000.0, 0.3, False)
+    moves = triple(-WAY * aside), SPEED / (2.0 * math.pi * WAY), 2.0
+    rod = Surface(cover, place, triple(aside), 40000.0, 0.3, False, *moves)
+    given = {
+        "arm.joints.start": list(POSE),
+        "force_loop:guard.posture": list(POSE),
+        "force_loop:contact_source": "pinned" if pinned else "estimated",
+        "force_loop:contact_cover": OUTER,
+        "force_loop:contact_position": 0.25,
+        **obstacles(BODY, POSE, [still, rod]),
+        **changes,
+    }
+    configuration = with_accepted_gain(CONFIGURATION.with_values(given))
+    run = Simulation(configuration, [ScenarioStep("release", RELEASE, request="enable"), step])
+    model, data, loop = run.driver.plant.model, run.driver.plant.data, run.nodes["force_loop"]
+    geom, wrench, peak, periods = model.geom(NAMES[1]).id, np.zeros(6), 0.0, 0
+    found, reason = set(), ""
+    while not run.step():
+        periods += 1
+        for i in range(data.ncon):
+            if geom in data.contact.geom[i]:
+                mujoco.mj_contactForce(model, data, i, wrench)
+                peak = max(peak, abs(float(wrench[0])))
+        if periods > 1e3 * (RELEASE + 2.0):
+            found.add(loop.force_reaction)
+            reason = loop.reason or reason
+    return peak, found, reason
+
+
+@pytest.mark.parametrize(
+    ("cover", "place", "pinned", "most", "before"),
+    [(OUTER, 0.35, False, 20.0, 60.0), (INNER, 0.35, True, 25.0, 38.0)],
+)
+def test_a_rod_that_comes_from_the_side_to_an_arm_that_presses_is_given_way_to(
+    cover: str, place: float, pinned: bool, most: float, before: float
+) -> None:
+    """8 N are pressed, 12 N are allowed; at a position that is not known, where it takes the least force for them."""
+    peak, reactions, _ = pushed(press(8.0, 3.5), cover, place, pinned)
+    assert peak < most
+    assert ForceReaction.CONTACT_FORCE in reactions
+    peak, _, _ = pushed(press(8.0, 3.5), cover, place, pinned, **UNBOUND)
+    assert peak > before
+
+
+def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() -> None:
+    step = ScenarioStep("rest", 3.5)
+    peak, reactions, reason = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 20.0})
+    assert peak < 30.0
+    assert ForceReaction.CONTACT_FORCE in reactions
+    assert "gives way by limits.free_travel" in reason
+    peak, _, _ = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 1e6})
+    assert peak > 100.0
+
+
+def test_the_force_with_which_the_brakes_stop_the_arm_is_no_push() -> None:
+    start = CONFIGURATION.shared.arm.joints.start
+    steps = [
+        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("turn", 0.5, posture=(start[0], start[1] - 0.4, start[2], start[3] + 0.5)),
+        ScenarioStep("back", 0.4, posture=(*start[:3], start[3] + 0.2)),
+        ScenarioStep("brake", 0.2, request="disable"),
+    ]
+    run = Simulation(CONFIGURATION, steps)
+    assert not run.play()
+    assert not run.reactions

@@ -1,0 +1,492 @@
+"""What the guard accepts, how it refuses the rest, and that it is right."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import LEVER, changed, one_joint
+
+from wam_control.force.contact_position import anywhere_sd, position_is_certain
+from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
+from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
+from wam_control.force.guard_watch import Watch
+from wam_control.force.stability_guard import GuardedContact, GuardedTask, StabilityGuard
+from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.arm import Servo, Timing
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_description.signals import NO_CONTACT, Contact, State
+from wam_sim.simulation import Simulation
+from wam_studies.stability.guard_validation import DIVERGES, exact_trials, table
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
+
+WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
+ARM, CLOCK = WAM.shared.arm, WAM.shared.timing
+PACKAGED = WAM.node("force_loop", ForceLoopParameters)
+# the sensors of these tests are those of no arm at rest: no zero
+OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0))
+SERVO = WAM.shared.servo
+Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
+UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)
+OUTER = CLOCK.outer_period_ns / 1e9  # s
+POUND_INCH = 0.1129848  # N m
+
+
+def guarded(own: ForceLoopParameters, **values: Any) -> ForceLoopParameters:
+    return replace(own, guard=replace(own.guard, **values))
+
+
+def bench(**values: Any) -> ForceLoopParameters:
+    own = TESTBED.node("force_loop", ForceLoopParameters)
+    return guarded(replace(own, **values), mode="refuse")
+
+
+def bench_loop(own: ForceLoopParameters) -> ForceLoop:
+    return ForceLoop(TESTBED.shared.arm, TESTBED.shared.servo, own, TESTBED.shared.timing)
+
+
+# ------------------------------------------------------------------------------ one friction node
+def section_5_6(friction: float) -> FrictionNode:
+    """The testbed of section 5.6, lb, in, s, with its damping ratio of 0.05."""
+    inertia, ktr, kc = 4.0, 14443.0, 12960.0
+    damping = 2.0 * 0.05 * math.sqrt(inertia * (ktr + kc))
+    return FrictionNode(inertia, damping, ktr, kc, friction, friction)
+
+
+def test_hold_and_delay_move_the_margin_as_the_errata_say() -> None:
+    at_50_hz = IntegralLoop(1e-3, sample_period=0.02)
+    assert linear_margin(section_5_6(8.4), IntegralLoop(1e-3)) == pytest.approx(1.21e-3, rel=0.01)
+    assert linear_margin(section_5_6(8.4), at_50_hz) == pytest.approx(1.73e-3, rel=0.01)
+    assert linear_margin(section_5_6(8.4), replace(at_50_hz, delay_samples=1)) == pytest.approx(4.89e-3, rel=0.01)
+
+
+def test_domains_are_those_of_figure_5_8() -> None:
+    """J = b = K = 1: gamma is the gain; zeta 0.25, domain III from 2.186 on."""
+    node = FrictionNode(1.0, 1.0, 2.0, 2.0, 1.0, 1.0)
+    found = {gain: friction_verdict(node, IntegralLoop(gain)) for gain in (0.95, 1.1, 1.5, 2.0, 2.3)}
+    assert [str(verdict.domain) for verdict in found.values()] == ["I", "II", "II", "II", "III"]
+    assert found[0.95].stable_error == math.inf
+    assert found[2.3].stable_error == 0.0
+    for gain, largest_step in ((1.1, 25.3), (1.5, 3.45), (2.0, 1.17)):
+        assert 0.3 * largest_step < found[gain].stable_error < largest_step
+
+
+def test_in_domain_i_a_cycle_above_the_saturation_is_stated() -> None:
+    """Close to its margin a loop with delay is kept swinging by Coulomb friction, with any step."""
+    node = FrictionNode(1.0, 1.5012051, 2.1646104, 43.5124522, 1.0, 1.0)
+    loop = IntegralLoop(0.1, 0.56938673, sample_period=0.7614, delay_samples=4)
+    margin = linear_margin(node, loop)
+    near = friction_verdict(node, replace(loop, gain=0.98052509 * margin))
+    assert near.domain is Domain.I
+    assert near.saturated_cycle == pytest.approx(2.1 * loop.error_limit, rel=0.05)
+    assert friction_verdict(node, replace(loop, gain=0.5 * margin)).saturated_cycle == 0.0
+
+
+def test_a_loop_that_saturates_at_the_largest_stable_step_shakes_after_a_larger_one() -> None:
+    node = FrictionNode(1.0, 1.0, 2.0, 2.0, 1.0, 1.0)
+    largest_step = 3.45  # of gamma 1.5, by bisection
+    at_the_step = IntegralLoop(1.5, error_limit=0.99 * largest_step)
+    assert assess(node, at_the_step, 0.9 * largest_step).verdict is Verdict.SETTLED
+    shakes = [assess(node, at_the_step, part * largest_step) for part in (1.5, 2.0, 3.0, 5.0, 10.0)]
+    assert max(shake.peak_to_peak for shake in shakes if shake.verdict is Verdict.LIMIT_CYCLE) > 2.0 * largest_step
+    accepted = replace(at_the_step, error_limit=stable_errors(node, IntegralLoop(1.5)).stable)
+    for part in (1.5, 2.0, 3.0, 5.0, 10.0):
+        assert assess(node, accepted, part * largest_step).verdict is Verdict.SETTLED
+
+
+def test_the_deadband_it_reports_removes_the_stiction_cycle() -> None:
+    node, gain = FrictionNode(1.0, 0.5, 40.0, 20.0, 0.8, 1.2), 1e-3
+    cycle = friction_verdict(node, IntegralLoop(gain)).cycle
+    without = assess(node, IntegralLoop(gain), 3.0)
+    assert without.verdict is Verdict.LIMIT_CYCLE
+    assert cycle.peak_to_peak == pytest.approx(without.peak_to_peak, rel=0.05)
+    assert cycle.deadband == pytest.approx(cycle.peak_to_peak / 2.0)
+    with_it = IntegralLoop(gain, deadband=1.05 * cycle.deadband)
+    assert assess(node, with_it, 3.0).verdict is Verdict.SETTLED
+    too_small = IntegralLoop(gain, deadband=0.5 * cycle.deadband)
+    assert assess(node, too_small, 3.0).verdict is Verdict.LIMIT_CYCLE
+
+
+@pytest.mark.slow
+def test_nothing_accepted_diverges_and_without_the_guard_much_would() -> None:
+    found = table(exact_trials(seed=8, count=10))
+    assert found.accepted_and_diverged == 0
+    assert sum(count for (_, _, end), count in found.counts.items() if end == DIVERGES) >= 2
+    accepted = sum(count for (_, is_accepted, _), count in found.counts.items() if is_accepted)
+    assert accepted >= 5, "a guard that refuses everything is none"
+
+
+# --------------------------------------------------------------------------------------- the arm
+def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_stays() -> None:
+    loop = Loop(OWN)
+    with pytest.raises(ParameterError) as refusal:
+        loop.tune(replace(OWN, force_gain=(0.5,)))
+    text = str(refusal.value)
+    for part in (
+        "force_gain [0.5, 0.5, 0.5] is ",
+        "times the largest linearly stable one",
+        "force along [0.343, 0, 0.939] in the base frame at 0.28 m of outer_link, posture [0, -1.8, 0, 1.45] rad",
+        "domain beyond I",
+        "allowed: ",
+    ):
+        assert part in text
+    assert loop.parameters == OWN
+    allowed = float(text.split("force_gain up to [")[1].split(",")[0])
+    loop.tune(replace(OWN, force_gain=(allowed,)))
+    with pytest.raises(ParameterError):
+        loop.tune(replace(OWN, force_gain=(1.02 * allowed,)))
+    Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="off"))
+    warned = Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="warn"))
+    assert warned.report.is_warning
+    assert warned.report.message.startswith("not stable: at most 0.8 of the largest linearly stable gain is accepted")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gain", [0.3, 0.5, 0.87])
+def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
+    for make, own, group in (
+        (Loop, OWN, "force"),
+        (Loop, replace(OWN, mode="joint_torque"), "torque"),
+        (bench_loop, guarded(bench(), mode="refuse"), "force"),
+    ):
+        name = f"{group}_gain"
+        with pytest.raises(ParameterError) as refusal:
+            make(replace(own, **{name: (gain,)}))
+        reported = str(refusal.value).split(f"{name} up to [")[1].split("]")[0]
+        assert make(replace(own, **{name: (float(reported.split(",")[0]),)})).assessment is not None
+
+
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str) -> None:
+    found = Loop(replace(OWN, feedback=feedback)).assessment
+    assert found is not None
+    assert found.domain is Domain.I
+
+
+def test_a_bad_set_stops_the_loop_at_its_start() -> None:
+    with pytest.raises(ParameterError, match=r"torque_gain .* times the largest linearly stable one"):
+        Loop(replace(OWN, mode="joint_torque", torque_gain=(0.1,)))
+    assert Loop(replace(OWN, mode="joint_torque")).assessment is not None
+    assert Loop(replace(OWN, mode="open_loop", force_gain=(9.0,))).assessment is None
+
+
+@pytest.mark.slow
+def test_a_stiffer_surface_leaves_less_gain_and_a_lag_of_the_feedback_no_more() -> None:
+    def scale(own: ForceLoopParameters) -> float:
+        assessment = Loop(guarded(own, mode="warn")).assessment
+        assert assessment is not None
+        return assessment.scale
+
+    fast = replace(OWN, force_gain=(0.05,), feedback="contact_estimate")
+    assert scale(guarded(fast, contact_stiffness=16000.0)) < 0.9 * scale(guarded(fast, contact_stiffness=1000.0))
+    assert scale(guarded(fast, feedback_lag=0.02)) == pytest.approx(scale(guarded(fast, feedback_lag=0.0)), rel=0.01), (
+        "a lag that steadies the loop is not relied on"
+    )
+
+
+STIFF = Servo(*(tuple(2.0 * gain for gain in gains) for gains in (SERVO.proportional_gain, SERVO.integral_gain)))
+
+
+@pytest.mark.slow
+def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() -> None:
+    own = guarded(replace(OWN, feedback="contact_estimate"), contact_stiffness=1e5, mode="warn")
+    own = guarded(own, posture=(-2.07, -0.11, -0.26, 1.58))
+    margins = []
+    for cycle in (0, 40):
+        found = ForceLoop(ARM, SERVO, own, replace(CLOCK, dither_cycle=cycle)).assessment
+        assert found is not None
+        margins.append(found.scale)
+    assert margins[1] < 0.6 * margins[0]
+
+
+@pytest.mark.slow
+def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
+    own = replace(OWN, force_gain=(0.09,))
+    loop = Loop(own)
+    before, report = loop.assessment, loop.report
+    assert before is not None
+    with pytest.raises(ParameterError, match="times the largest linearly stable one"):
+        ForceLoop(ARM, STIFF, own, CLOCK)
+    with pytest.raises(ParameterError, match="times the largest linearly stable one"):
+        loop.retune_servo(STIFF)
+    assert (loop.assessment, loop.report, loop.parameters) == (before, report, own), "nothing has changed"
+    loop.tune(own)
+    assert loop.assessment == before, "and the old gains are still the ones relied on"
+    slightly = Servo(tuple(0.9 * gain for gain in SERVO.proportional_gain), SERVO.integral_gain)
+    loop.retune_servo(slightly)
+    assert loop.assessment is not None
+    assert loop.assessment.scale != before.scale
+    assert loop.assessment == ForceLoop(ARM, slightly, own, CLOCK).assessment
+    assert loop.report is not report
+
+
+def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_off() -> None:
+    warned, silent = (Loop(guarded(replace(OWN, force_gain=(0.09,)), mode=mode)) for mode in ("warn", "off"))
+    for loop in (warned, silent):
+        loop.retune_servo(STIFF)
+    assert warned.report.is_warning
+    silent.retune_servo(SERVO)
+    assert silent.assessment is None
+
+
+def test_servo_gains_of_a_wrong_number_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"'servo.integral_gain' has 1 value; 4 names need 4"):
+        Loop(OWN).retune_servo(Servo(SERVO.proportional_gain, (0.8,)))
+
+
+# ----------------------------------------------------------------------------------- the testbed
+def pushed_far(gain: float, limit: float) -> float:
+    """Peak to peak of the testbed's force some seconds after a vigorous push, as in 5.6, N."""
+    extra = {"driver:amplifier.thermal_time": 1e6, "force_loop:guard.mode": "off"}
+    conf = TESTBED.with_values({**extra, "force_loop:force_gain": [gain], "force_loop:force_error_limit": [limit]})
+    command, push = ForceCommand("base", (0.0, 0.0, -50.0)), Push("link", 0.8, (0.0, -100.0, 0.0), 0.0, 0.3)
+    steps = [ScenarioStep("press", 3.0, force=command), ScenarioStep("push", 0.3, force=command, push=push)]
+    last = ScenarioStep("rest", 5.0, force=command)
+    run = Simulation(conf, [ScenarioStep("release", 0.2, request="enable"), *steps, last])
+    assert run.play() == ""
+    return float(np.ptp([row.values[2] for row in run.rows["force_measured"][-41:-1]]))
+
+
+@pytest.mark.slow
+def test_in_domain_ii_the_saturation_is_held_below_the_stable_error_and_the_testbed_rests() -> None:
+    gain = 0.05  # 1.27 of the margin
+    with pytest.raises(ParameterError, match=r"domain II; allowed: .* or force_error_limit up to") as refusal:
+        bench_loop(bench(force_gain=(gain,)))
+    error = float(str(refusal.value).split("force_error_limit up to ")[1].split()[0])
+    accepted = bench_loop(bench(force_gain=(gain,), force_error_limit=(error,)))
+    assert accepted.assessment is not None
+    assert accepted.assessment.domain is Domain.II
+    limited = bench_loop(guarded(bench(force_gain=(gain,)), mode="limit"))
+    assert limited.assessment is not None
+    assert limited.assessment.stable_error == pytest.approx(error, rel=0.01)
+    q, still, driven = [-0.001], [0.0], [1.0]
+    command = ForceCommand("base", (0.0, 0.0, -150.0))
+    out = limited.step(State(q, still, driven), State(q, still, driven), NO_CONTACT, None, command, None, None, 0.02)
+    assert math.hypot(*out.limited) == pytest.approx(error, rel=0.01)
+    assert pushed_far(gain, error) < 2.0
+    assert pushed_far(gain, 1000.0) > 20.0
+
+
+def test_domain_iii_is_refused_with_any_saturation() -> None:
+    with pytest.raises(ParameterError, match="domain III; allowed: force_gain up to"):
+        bench_loop(guarded(bench(force_gain=(0.2,), force_error_limit=(0.01,)), mode="limit"))
+
+
+# ------------------------------------------------------------------------------- while it moves
+def follow(
+    loop: ForceLoop,
+    q: Sequence[float],
+    contact: Contact = NO_CONTACT,
+    periods: int = 300,
+    force: tuple[float, float, float] = (0.0, 0.0, -6.0),
+) -> float:
+    """Factor of the gains after a while at a pose with a force commanded across the outer link."""
+    state = State(list(q), [0.0] * len(q), [1.0] * len(q))
+    cover = loop.parameters.contact_cover
+    for _ in range(periods):
+        loop.step(
+            state,
+            state,
+            contact,
+            [0.0] * len(q),
+            ForceCommand(cover, force),
+            None,
+            [0.0] * len(q),
+            0.005,
+        )
+    assert loop.watch is not None
+    return loop.watch.factor
+
+
+STIFF_POSE = (-0.5, -0.3, 0.3, 1.3)  # where the joint sensors see the foam through a lesser margin than at the box
+
+
+@pytest.mark.slow
+def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_back() -> None:
+    own = replace(OWN, force_gain=(0.09,))
+    loop = Loop(own)
+    here = list(own.guard.posture)
+    assert loop.report.facts["margin here, assessed"].startswith("not assessed yet: it is while a force is commanded")
+    assert follow(loop, here) == 1.0
+    assert loop.watch is not None
+    assert loop.report.facts["margin here"] == f"{loop.watch.scale:.4g}", "also where the factor stays"
+    factor = follow(loop, STIFF_POSE)
+    assert factor < 0.75
+    assert loop.report.facts["margin here, assessed"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
+    assert f"gains scaled by {factor:.3g}:" in loop.report.message
+    guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
+    task = loop_task(loop)
+    touch = GuardedContact(STIFF_POSE, "outer_link", 0.28, UNSURE, normal(guard, STIFF_POSE), 6.0)
+    taken = replace(task.law, gain=tuple(factor * gain for gain in task.law.gain))
+    share = own.guard.stability_fraction
+    assert min(guard.scales(task._replace(law=taken), [touch])) == pytest.approx(1.0 / share, rel=0.02)
+    assert min(guard.scales(task, [touch])) < 1.0 / share, "without the factor the margin is spent"
+    assert follow(loop, here) == 1.0
+    warned = Loop(guarded(own, mode="warn"))
+    follow(warned, STIFF_POSE)
+    assert warned.report.facts["gain factor"] == "1"
+
+
+@pytest.mark.parametrize("schedule", ["off", "position"])
+def test_gains_without_any_margin_are_followed_where_the_guard_only_warns(schedule: str) -> None:
+    own = guarded(bench(force_gain=(5.0,), schedule=schedule), mode="warn")
+    loop = bench_loop(own)
+    assert loop.assessment is not None
+    assert loop.assessment.scale == 0.0
+    assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
+    assert loop.report.facts["gain factor"] == "1"
+
+
+def loop_task(loop: ForceLoop) -> GuardedTask:
+    from wam_control.force.force_loop_parameters import force_law, task_of
+
+    return task_of(loop.parameters, force_law(loop.parameters))
+
+
+def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, float]:
+    """Of the command of `follow`."""
+    x, y, z = guard.contacts(q, "outer_link", 0.28, UNSURE)[-1].direction
+    return -x, -y, -z
+
+
+FREE = replace(OWN.limits, joint_gain=0.0, contact_force=1e9, impact=0.0, free_travel=1e3)
+
+
+def test_the_velocity_obeys_the_factor() -> None:
+    loop = Loop(
+        replace(OWN, force_gain=(0.09,), blend_time=0.0, force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE)
+    )
+    follow(loop, OWN.guard.posture)
+    state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -6.0))
+    speeds = []
+    for _ in range(300):
+        out = loop.step(state, state, NO_CONTACT, None, command, list(STIFF_POSE), None, 0.005)
+        speeds.append(float(np.linalg.norm(out.velocity)) / abs(out.error[2]))
+    assert loop.watch is not None
+    assert loop.watch.factor < 0.75
+    assert speeds[-1] == pytest.approx(loop.watch.factor * speeds[0], rel=1e-6)
+
+
+# ----------------------------------------------------------------------------------- scheduling
+ROD = changed(one_joint(), motors={"inertia": (2e-3,)}, joints={"viscous_friction": (4.0,)})
+FAST = Timing("lockstep", 1e-4, 1, 10, 0, 10, 0, 5.0, 0.0, 0, 0)
+
+
+def rod(schedule: str) -> ForceLoop:
+    """The joint-torque loop of one joint behind a firm servo, at 1 kHz, tuned for a contact at the tip."""
+    own = replace(TESTBED.node("force_loop", ForceLoopParameters), contact_source="estimated")
+    guard = replace(
+        own.guard, mode="refuse", contact_stiffness=1500.0, stability_fraction=1.0, feedback_lag=0.0,
+    )  # fmt: skip
+    own = replace(
+        own, mode="joint_torque", feedback="contact_estimate", torque_gain=(0.004,), torque_error_limit=(10.0,),
+        contact_cover="tube", contact_position=LEVER, schedule=schedule, guard=guard,
+    )  # fmt: skip
+    return ForceLoop(ROD, Servo((10.0,), (1000.0,)), own, FAST)
+
+
+@pytest.mark.parametrize("place", [0.4, 0.6])
+def test_a_scheduled_gain_keeps_the_margin_as_the_contact_moves(place: float) -> None:
+    """Routh, (5.15): the margin is b/J (1/k_tr + 1/k_c), and k_c at the joint goes with the square of the place.
+
+    The loop samples, at 1 kHz, and its servo is not rigid, which takes some per cent.
+    """
+    ktr = 14.0**2 * 8.33
+    expected = (1.0 / ktr + 1.0 / (1500.0 * place**2)) / (1.0 / ktr + 1.0 / (1500.0 * LEVER**2))
+    found = follow(rod("position"), [0.0], Contact("tube", place, (0.0, 1.0, 0.0)))
+    assert found == pytest.approx(expected, rel=0.1)
+    assert follow(rod("off"), [0.0], Contact("tube", place, (0.0, 1.0, 0.0))) == 1.0
+
+
+def test_an_uncertain_position_counts_as_the_worst() -> None:
+    loop = rod("position")
+    assert follow(loop, [0.0], Contact("tube", 0.4, (0.0, 1.0, 0.0))) > 1.5
+    assert follow(loop, [0.0], Contact("tube", math.nan, (0.0, 1.0, 0.0))) == pytest.approx(1.0, rel=0.01)
+    assert follow(loop, [0.0]) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_position_is_certain_where_it_is_known_closely_enough() -> None:
+    assert position_is_certain(0.2, 0.02, 0.03)
+    assert position_is_certain(0.2, math.nan, 0.03), "no uncertainty is published"
+    assert not position_is_certain(0.2, 0.04, 0.03)
+    assert not position_is_certain(math.nan, 0.0, 0.03)
+
+
+@pytest.mark.slow
+def test_a_force_that_turns_is_judged_again_though_the_arm_is_at_rest() -> None:
+    own = guarded(replace(OWN, force_gain=(0.09,)), mode="warn")
+    along_y, along_z = (0.0, -6.0, 0.0), (0.0, 0.0, -6.0)
+    fresh = {}
+    for force in (along_y, along_z):
+        loop = Loop(own)
+        follow(loop, STIFF_POSE, force=force)
+        assert loop.watch is not None
+        fresh[force] = loop.watch.scale
+    assert abs(fresh[along_y] / fresh[along_z] - 1.0) > 0.1
+    for force in (along_y, along_z):
+        follow(loop, STIFF_POSE, force=force)
+        assert loop.watch is not None
+        assert loop.watch.scale == fresh[force]
+
+
+def assessed_again(before: GuardedContact, after: GuardedContact) -> bool:
+    """Whether the guard of a moving arm assesses the loop again where one contact has become another."""
+    watch = Loop(OWN).watch
+    assert watch is not None
+    found = []
+    for contact in (before, after):
+        for _ in range(200):
+            watch.step(lambda contact=contact: [contact], OUTER)  # type: ignore[misc]
+        found.append(watch.assessed[0])
+    return found[0] is not found[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("little", "much"),
+    [
+        ({"q": (0.0, -1.71, 0.0, 1.45)}, {"q": (0.0, -1.69, 0.0, 1.45)}),
+        ({"direction": (0.09, 0.0, -1.0)}, {"direction": (0.11, 0.0, -1.0)}),
+        ({"position": 0.219}, {"position": 0.221}),
+        ({"position_sd": 0.019}, {"position_sd": 0.021}),
+        ({"force": 7.4}, {"force": 7.6}),
+        ({"force": 3.4}, {"force": 3.3}),
+        ({}, {"cover": "inner_link"}),
+    ],
+    ids=["pose", "direction", "position", "certainty", "more force", "less force", "link"],
+)
+def test_the_loop_is_assessed_again_where_one_thing_about_the_contact_has_changed(
+    little: dict[str, Any], much: dict[str, Any]
+) -> None:
+    contact = GuardedContact((0.0, -1.8, 0.0, 1.45), "outer_link", 0.2, 0.0, (0.0, 0.0, -1.0), 5.0)
+    assert not assessed_again(contact, contact._replace(**little))
+    assert assessed_again(contact, contact._replace(**much))
+
+
+def test_a_judgement_is_distributed_over_periods_and_not_repeated_at_rest() -> None:
+    loop = Loop(replace(OWN, force_gain=(0.09,)))
+    assert isinstance(loop.watch, Watch)
+    computed = []
+    scales = StabilityGuard.scales
+
+    def counted(self: StabilityGuard, *given: Any) -> Any:
+        for scale in scales(self, *given):
+            computed.append(scale)
+            yield scale
+
+    StabilityGuard.scales = counted  # type: ignore[method-assign]
+    try:
+        follow(loop, OWN.guard.posture, periods=1)
+        assert len(computed) == 1, "one part of the assessment in a period"
+        follow(loop, OWN.guard.posture, periods=200)
+        done = len(computed)
+        follow(loop, OWN.guard.posture, periods=200)
+        assert len(computed) == done
+        follow(loop, STIFF_POSE, periods=200)
+        assert len(computed) == 2 * done
+    finally:
+        StabilityGuard.scales = scales  # type: ignore[method-assign]

@@ -1,0 +1,65 @@
+"""The transform as the joint side uses it: power is neither made nor lost, nothing is invented."""
+
+import numpy as np
+import pytest
+
+from wam_control.velocity.transform import Transform
+from wam_description.configuration import Configuration, packaged
+from wam_description.signals import State
+
+ARM = Configuration.load(packaged("wam")).shared.arm
+MATRIX = np.reshape(ARM.joint_from_motor, (4, 4))
+RANDOM = np.random.default_rng(4)
+
+
+def numbers() -> list[float]:
+    return RANDOM.uniform(-10.0, 10.0, 4).tolist()
+
+
+def test_power_of_the_motors_is_power_of_the_joints() -> None:
+    transform = Transform(ARM)
+    for _ in range(100):
+        thetad, torque = numbers(), numbers()
+        joints = transform.joint_state(State(numbers(), thetad, torque))
+        assert np.dot(joints.velocity, joints.effort) == pytest.approx(np.dot(thetad, torque), rel=1e-12, abs=1e-11)
+
+
+def test_power_of_a_joint_command_is_power_of_the_motor_command() -> None:
+    transform = Transform(ARM)
+    for _ in range(100):
+        velocity, gravity, effort = numbers(), numbers(), numbers()
+        asked = np.dot(velocity, np.add(gravity, effort))
+        given = np.dot(transform.motor_velocity(velocity), transform.motor_effort(gravity, effort))
+        assert given == pytest.approx(asked, rel=1e-12, abs=1e-10)
+
+
+def test_commands_come_back_as_states() -> None:
+    transform = Transform(ARM)
+    velocity, torque = numbers(), numbers()
+    motors = State(numbers(), transform.motor_velocity(velocity), transform.motor_effort(torque, [0.0] * 4))
+    joints = transform.joint_state(motors)
+    assert joints.position == pytest.approx(MATRIX @ motors.position, rel=1e-13)
+    assert joints.velocity == pytest.approx(velocity, rel=1e-12)
+    assert joints.effort == pytest.approx(torque, rel=1e-12)
+
+
+def test_gravity_and_effort_add_up() -> None:
+    transform = Transform(ARM)
+    gravity, effort = numbers(), numbers()
+    expected = MATRIX.T @ np.add(gravity, effort)
+    assert transform.motor_effort(gravity, effort) == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_empty_velocity_stays_empty_and_zero_stays_zero() -> None:
+    transform = Transform(ARM)
+    assert transform.motor_velocity([]) == []
+    assert transform.motor_velocity([0.0] * 4) == [0.0] * 4
+
+
+@pytest.mark.parametrize("wrong", [[1.0], [1.0] * 5])
+def test_a_wrong_number_of_values_is_refused(wrong: list[float]) -> None:
+    transform = Transform(ARM)
+    with pytest.raises(ValueError, match="values for 4 motors and joints"):
+        transform.motor_velocity(wrong)
+    with pytest.raises(ValueError):  # noqa: PT011
+        transform.motor_effort([0.0] * 4, wrong)

@@ -1,0 +1,422 @@
+"""Configurations read from parameter files without ROS."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from wam_control.task.scenario_values import number
+from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.parameters import ParameterError, build, parameter
+from wam_sim.simulation import Simulation
+
+WAM = Configuration.load(packaged("wam"))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Parameters of a node in these tests."""
+
+    gain: float = parameter("gain", low=0.0)
+    names: tuple[str, ...] = parameter("names")
+
+
+LOOP = "/**/loop:\n  ros__parameters:\n    gain: 2.5\n    names: [a, b]\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The WAM's configuration with one more node."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(LOOP + packaged("wam").read_text())
+    return path
+
+
+def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
+    configuration = Configuration.load(file)
+    assert configuration.shared.arm.name == "wam"
+    assert configuration.shared.timing.period_ns == 1_000_000
+    assert configuration.node("loop", Loop) == Loop(2.5, ("a", "b"))
+    assert configuration.text == file.read_text()
+    assert len(configuration.sha256) == 64
+
+
+def test_lists_of_whole_and_other_numbers_become_what_ros_reads(file: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "overlay.yaml"
+    overlay.write_text("base: mine.yaml\n/**: {ros__parameters: {arm.gravity: [0, 0.5, -9]}}\n")
+    whole = tmp_path / "whole.yaml"
+    whole.write_text(file.read_text().replace("gravity: [0.0, 0.0, -9.80665]", "gravity: [0, 0.5, -9]"))
+    set_later = Configuration.load(file).with_values({"arm.gravity": [0, 0.5, -9]})
+    for configuration in (Configuration.load(overlay), Configuration.load(whole), set_later):
+        written = yaml.safe_load(configuration.text)["/**"]["ros__parameters"]["arm"]["gravity"]
+        assert [repr(value) for value in written] == ["0.0", "0.5", "-9.0"]
+        assert configuration.shared.arm.gravity == (0.0, 0.5, -9.0)
+
+
+@pytest.mark.slow
+def test_replaced_values_leave_the_original_alone(file: Path) -> None:
+    original = Configuration.load(file)
+    changed = original.with_values({"timing.mode": "realtime", "loop:gain": 3.0, "loop:names": ("c",)})
+    assert changed.shared.timing.mode == "realtime"
+    assert changed.node("loop", Loop) == Loop(3.0, ("c",))
+    assert original.shared.timing.mode == "lockstep"
+    assert original.node("loop", Loop).gain == 2.5
+    assert changed.sha256 != original.sha256
+    assert changed.path == original.path
+
+
+def test_a_number_in_place_of_a_list_is_each_of_its_values() -> None:
+    changed = WAM.with_values(
+        {"force_loop:force_gain": 0.01, "arm.tool": 0.5, "force_loop:guard.stability_fraction": 1}
+    )
+    assert changed.sections["force_loop"]["force_gain"] == [0.01]
+    assert changed.sections["/**"]["arm.tool"] == [0.5] * 3
+    assert changed.sections["force_loop"]["guard.stability_fraction"] == 1
+    assert WAM.with_values({"force_loop:force_gain": "abc"}).sections["force_loop"]["force_gain"] == "abc"
+
+
+def test_text_of_a_changed_configuration_gives_the_same_values(file: Path, tmp_path: Path) -> None:
+    changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.5, 0.0, 1 / 3)})
+    (tmp_path / "again.yaml").write_text(changed.text)
+    again = Configuration.load(tmp_path / "again.yaml")
+    assert again.sections == changed.sections
+    assert again.shared == changed.shared
+
+
+def test_sections_cannot_be_written(file: Path) -> None:
+    with pytest.raises(TypeError):
+        Configuration.load(file).sections["loop"]["gain"] = 1.0  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        (
+            "timing.mod",
+            r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'",
+        ),
+        (
+            "loop:gian",
+            r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'loop:gain'",
+        ),
+        ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
+    ],
+)
+def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        Configuration.load(file).with_values({key: 1})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1,", "is not YAML"),
+        ("? [a]\n: 1", "is not YAML"),
+        ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
+        ("/**: 2001-99-99", "is not YAML: one of its values does not fit its tag, or is no date: month must"),
+        ("/**: !!timestamp x", "is not YAML: one of its values does not fit its tag"),
+        ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
+        ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
+        ("/**:\n  ros__parameters:\n    a: &a {b: [*a]}", r"is not YAML: \*a is inside of what it refers to"),
+        ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
+        (
+            "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",
+            "section '/.*': 'a.b' is empty; give it a value, or leave it",
+        ),
+        ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
+        ("", r"has no section '/\*\*'"),
+        ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
+        ("bsae: wam", r"has the key 'bsae'; did you mean 'base'\?"),
+        ("bsae: wam\n/**: {ros__parameters: {}}", r"has the key 'bsae'; did you mean 'base'\?"),
+        ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
+        ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
+        ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
+        (
+            "driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
+            r"section 'driver' is not allowed; write",
+        ),
+        (
+            "/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
+            r"section '/\*\*/a/b' is not allowed; write",
+        ),
+    ],
+)
+def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=rf"odd\.yaml.*{message}"):
+        Configuration.load(path)
+
+
+def test_a_replaced_value_is_not_blamed_on_the_file() -> None:
+    loaded = Configuration.load(packaged("wam"))
+    with pytest.raises(
+        ParameterError, match=r"^an option or a replaced value in place of that in .*wam\.yaml, section"
+    ):
+        loaded.with_values({"timing.real_time_factor": -3.0}).shared  # noqa: B018 - it is built here
+
+
+def test_a_value_of_the_file_is_blamed_on_it(tmp_path: Path) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text("base: wam\n/**: {ros__parameters: {timing: {real_time_factor: -3.0}}}\n")
+    with pytest.raises(ParameterError, match=rf"^{path}, section"):
+        Configuration.load(path).with_values({"timing.timeout": 3.0}).shared  # noqa: B018 - it is built here
+
+
+def test_missing_file_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"none\.yaml is not a file"):
+        Configuration.load(tmp_path / "none.yaml")
+
+
+def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) -> None:
+    file.write_text(file.read_text().replace("gain:", "gian:").replace("period:", "perod:"))
+    configuration = Configuration.load(file)
+    with pytest.raises(ParameterError, match=r"mine\.yaml, section '/\*\*/loop': missing .*'gain'.*unknown .*'gian'"):
+        configuration.node("loop", Loop)
+    with pytest.raises(ParameterError, match=r"mine\.yaml, section '/\*\*': missing parameter 'timing.period'"):
+        _ = configuration.shared
+    with pytest.raises(ParameterError, match="no section"):
+        configuration.node("pool", Loop)
+
+
+def test_unknown_packaged_configuration_is_refused_with_those_that_exist() -> None:
+    assert packaged("wam").name == "wam.yaml"
+    with pytest.raises(ParameterError, match=r"no configuration 'wum' comes with wam_stack; there are: .*wam"):
+        packaged("wum")
+
+
+def test_a_file_that_would_win_over_the_command_line_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(packaged("wam").read_text() + LOOP)
+    with pytest.raises(ParameterError, match=r"section '/\*\*/loop' comes after '/\*\*'"):
+        Configuration.load(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["own prefix", "ament prefix"])
+def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str) -> None:
+    source = Path(__file__).resolve().parents[2]
+    prefix = tmp_path / "prefix"
+    packages = prefix / "lib" / "site-packages" if way == "own prefix" else tmp_path / "elsewhere"
+    for package in ("wam_description", "wam_theory"):
+        shutil.copytree(source / package, packages / package)
+    share = prefix / "share" / "wam_stack" / "config"
+    share.mkdir(parents=True)
+    shutil.copy(source / "config" / "wam.yaml", share)
+    environment = {**os.environ, "PYTHONPATH": str(packages)}
+    environment["AMENT_PREFIX_PATH"] = f"/nowhere{os.pathsep}{prefix}" if way == "ament prefix" else ""
+    code = "from wam_description.configuration import packaged; print(packaged('wam'))"
+    found = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert Path(found.stdout.strip()) == share / "wam.yaml"
+
+
+def test_every_packaged_configuration_is_plain_yaml_with_a_shared_part() -> None:
+    for path in packaged("wam").parent.glob("*.yaml"):
+        if "/**" in (yaml.safe_load(path.read_text()) or {}):
+            assert Configuration.load(path).shared.arm.motors.names
+
+
+def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
+    overlay = tmp_path / "mine.yaml"
+    overlay.write_text(
+        "base: wam\n/**/mine: {ros__parameters: {gain: 2.0}}\n/**/driver: {ros__parameters: {watchdog: 0.03}}\n"
+        "/**: {ros__parameters: {timing: {mode: realtime}, nodes: [driver, 'my_package.mine:Mine']}}\n"
+    )
+    found, base = Configuration.load(overlay), Configuration.load(packaged("wam"))
+    assert found.sections["mine"] == {"gain": 2.0}
+    assert found.sections["driver"] == {**base.sections["driver"], "watchdog": 0.03}
+    assert found.shared.timing.mode == "realtime"
+    assert yaml.safe_load(found.text)["/**/driver"]["ros__parameters"]["watchdog"] == 0.03
+    assert list(found.sections)[-1] == "/**", "the shared section is the last one, else it would win over -p"
+    other = tmp_path / "other.yaml"
+    other.write_text("base: mine.yaml\n/**/mine: {ros__parameters: {gain: 3.0}}\n")
+    assert Configuration.load(other).sections["mine"] == {"gain": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
+        ("base: nothing\n", "no configuration 'nothing' comes with wam_stack"),
+        ("base: odd.yaml\n", "base is the file itself"),
+        ("base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n", r"section '/\*\*/drivr' is of no node in 'nodes'"),
+        ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
+        ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
+        ("base: wam\ndriver: {ros__parameters: {}}\n", "section 'driver' is not allowed"),
+    ],
+)
+def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=message):
+        Configuration.load(path)
+
+
+def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path) -> None:
+    """It was left out in silence, and with it a limit of the force."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "base: wam\n/**/force_lop: {ros__parameters: {force_limit: 5.0}}\n"
+        "/**: {ros__parameters: {nodes: [driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
+    )
+    found = Configuration.load(path)
+    with pytest.raises(ParameterError, match=r"section '/\*\*/force_lop' is of no node.*did you mean 'force_loop'"):
+        Simulation(found, [])
+
+
+def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "deep.yaml").write_text("{" * 3_000)
+    with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: it is nested more than 50 levels deep$"):
+        Configuration.load(tmp_path / "deep.yaml")
+
+
+def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_path: Path) -> None:
+    for k in range(100):
+        (tmp_path / f"{k}.yaml").write_text(f"base: {k + 1}.yaml\n")
+    with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; put some"):
+        Configuration.load(tmp_path / "0.yaml")
+
+
+@pytest.mark.parametrize(("divisor", "age"), [(36, 0.035), (5, 0.004)])
+def test_an_outer_period_after_which_every_input_is_absent_is_refused(divisor: int, age: float) -> None:
+    """It braked in the first period with the advice to list a node that runs."""
+    values = {"timing.outer_divisor": divisor, "ages.feedback": age}
+    with pytest.raises(ParameterError, match=f"ages.feedback is {age} s, less than an outer period, 0.0"):
+        WAM.with_values(values).shared  # noqa: B018 - refuses
+    assert WAM.with_values({**values, "ages.feedback": divisor * 1e-3}).shared.ages.feedback == divisor * 1e-3
+
+
+def test_a_section_may_be_empty(tmp_path: Path) -> None:
+    """That of a node without parameters is."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: wam\n/**/gravity: {ros__parameters: {}}\n/**: {ros__parameters: {}}\n")
+    assert Configuration.load(path).sections == WAM.sections
+
+
+@pytest.mark.parametrize("factor", [1e-300, 9e-4])
+def test_a_real_time_factor_at_which_nothing_seems_to_move_is_refused(factor: float) -> None:
+    """The driver ended with a traceback of rclpy, whose timers count nanoseconds."""
+    with pytest.raises(ParameterError, match=r"timing.real_time_factor is .*; allowed: 0.001 to 100, or 0 for as fast"):
+        _ = WAM.with_values({"timing.real_time_factor": factor}).shared
+    assert WAM.with_values({"timing.real_time_factor": 0.001}).shared.timing.real_time_factor == 0.001
+
+
+def test_a_configuration_without_nodes_is_refused() -> None:
+    empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
+    with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):
+        empty.shared  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"arm.tool": [0.3, 0.0, 0.0]}, "by arm.covers.length it ends at (0.4064, 0, 0) m"),
+        ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
+        ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
+        ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "the tube ends at 0.5 m, arm.covers.end"),
+        ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "by arm.joints.offset of joint3, at (0, 0, -0.7)"),
+    ],
+)
+def test_a_link_whose_numbers_do_not_meet_is_refused_with_the_others_to_change(
+    values: dict[str, list[float]], message: str
+) -> None:
+    with pytest.raises(ParameterError) as refused:
+        _ = WAM.with_values(values).shared
+    assert message in str(refused.value)
+    assert "a longer " in str(refused.value)
+
+
+def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:
+    longer = {"arm.covers.length": [0.5588, 0.5], "arm.covers.end": [0.5588, 0.0, 0.04064, 0.5, 0.0, 0.0]}
+    assert WAM.with_values({**longer, "arm.tool": [0.6, 0.0, 0.0]}).shared.arm.covers.length == (0.5588, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
+        ("[" * 3000, "nested more than 50 levels deep"),
+        ("[" * 60 + "]" * 60, "nested more than 50 levels deep"),
+        ("!!bool x", "one of its values does not fit its tag"),
+        ("!!timestamp x", "one of its values does not fit its tag"),
+        ("2001-99-99", "no date: month must be in 1..12"),
+        ("9" * 5000, "one of its values does not fit its tag"),
+        ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
+        ("\udcff", "character 1 is no UTF-8"),
+        ("&a [*a]", r"\*a is inside of what it refers to"),
+        ("{1: 2}", "the key 1 is no text"),
+        ("*a", "undefined alias"),
+        ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
+        ("[1.0, 1:30]", "1:30 is 90 in YAML"),
+        ("1:30.5", "1:30.5 is 90.5 in YAML"),
+    ],
+)
+def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: str, reason: str) -> None:
+    with pytest.raises(ParameterError, match=rf"--set loop:gain: '.*' is no value of YAML: .*{reason}") as refusal:
+        option_values([f"loop:gain={value}"])
+    assert len(str(refusal.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("value", "hint"),
+    [
+        ("1e-3", "; YAML takes '1e-3' for a text: write 0.001"),
+        ("1e-7", "; YAML takes '1e-7' for a text: write 1.0e-07"),
+        (".5e3", "; YAML takes '.5e3' for a text: write 500"),
+        ("1e22", "; YAML takes '1e22' for a text: write 1.0e+22"),
+        ("'4'", "; YAML takes '4' for a text: write 4"),
+        ("fast", ""),
+        ("1e400", ""),
+        ("nan", ""),
+    ],
+)
+def test_a_text_that_looks_like_a_number_is_refused_with_what_to_write(value: str, hint: str) -> None:
+    read = option_values([f"gain={value}"])["gain"]
+    with pytest.raises(ParameterError) as refusal:
+        build(Loop, {"gain": read, "names": ["a"]})
+    assert str(refusal.value) == f"parameter 'gain' is {read!r}; allowed: a number{hint}"
+    if hint:
+        written = option_values([f"gain={hint.rpartition(' ')[2]}"])["gain"]
+        assert build(Loop, {"gain": written, "names": ["a"]}).gain == float(read)
+    with pytest.raises(ParameterError) as refusal:
+        number("step 1", "seconds", read)
+    assert str(refusal.value) == f"step 1: seconds is {read!r}; it must be a finite number{hint}"
+
+
+@pytest.mark.parametrize("value", [{}, {"a": 1}, {"a"}, b"a", bytearray(b"a"), memoryview(b"a"), "a"])
+def test_what_is_no_list_is_none_for_a_parameter_either(value: Any) -> None:
+    with pytest.raises(ParameterError, match=r"parameter 'names' is .*; it must be a list of str"):
+        build(Loop, {"gain": 1.0, "names": value})
+
+
+def test_an_int_above_every_float_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"parameter 'gain' is 10000*; allowed"):
+        build(Loop, {"gain": 10**400, "names": ["a"]})
+    with pytest.raises(ParameterError, match=r"seconds is 10000*; it must be a finite number"):
+        number("step 1", "seconds", 10**400)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("07", 7), ("0", 0), ("-00", 0), ("0x10", 16), ("1_000", 1000), ("-8", -8)]
+)
+def test_other_numbers_of_yaml_are_read(text: str, value: int) -> None:
+    assert option_values([f"a={text}"]) == {"a": value}
+
+
+def test_a_node_that_is_listed_already_is_not_added_again() -> None:
+    listed = Configuration.load(packaged("wam")).with_nodes("scenario", "recorder")
+    assert listed.shared.nodes[-2:] == ("scenario", "recorder")
+    assert listed.with_nodes("recorder", "scenario").shared.nodes == listed.shared.nodes

@@ -1,0 +1,422 @@
+"""Parameters: refused by name, described to ROS, changed as a set or not at all."""
+
+import math
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from conftest import LONG
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+
+from wam_description.arm import Servo, Shared
+from wam_description.configuration import SHARED, Configuration, packaged
+from wam_description.interface import declared
+from wam_description.nodes import NODES
+from wam_description.parameters import ParameterError, build, fields, like, parameter, require, tunable, values
+from wam_description.synchroniser import Inputs
+from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_description.wiring import SetParameters as SetParametersRequest
+from wam_ros.bring_up import parameter_file
+from wam_ros.node import AdaptedNode, make_node
+from wam_ros.requests import refusal_of
+
+ROOT = Path(__file__).parents[2]
+WAM = Configuration.load(packaged("wam"))
+FILES = [path for path in sorted((ROOT / "config").glob("*.yaml")) if "/**" in yaml.safe_load(path.read_text())]
+
+
+@dataclass(frozen=True)
+class Gains:
+    gain: float = parameter("gain", "1/s", low=0.0, high=2.0, live=True)
+    names: tuple[str, ...] = parameter("names")
+    weights: tuple[float, ...] = parameter("weights", "kg", low=0.0)
+
+    def __post_init__(self) -> None:
+        require(len(self.names) == len(self.weights), f"{len(self.names)} names, {len(self.weights)} weights")
+
+
+@dataclass(frozen=True)
+class Example:
+    mode: str = parameter("mode", choices=("soft", "hard"))
+    count: int = parameter("count", low=1, high=9)
+    is_on: bool = parameter("switch")
+    inner: Gains
+
+
+GOOD: dict[str, Any] = {
+    "mode": "soft",
+    "count": 3,
+    "is_on": True,
+    "inner.gain": 0.5,
+    "inner.names": ["a", "b"],
+    "inner.weights": [1.0, 2],
+}
+
+
+def test_values_of_what_was_built_are_what_it_was_built_from() -> None:
+    example = build(Example, GOOD)
+    assert example == Example("soft", 3, True, Gains(0.5, ("a", "b"), (1.0, 2.0)))
+    assert build(Example, values(example)) == example
+    assert list(values(example)) == [field.name for field in fields(Example)]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"speed": 1.0}, "unknown parameter 'speed'"),
+        ({"inner.gian": 1.0}, "unknown parameter 'inner.gian'"),
+        ({"inner.gain": None, "inner.gian": 0.5}, "missing parameter 'inner.gain'; unknown parameter 'inner.gian'"),
+        ({"count": None, "mode": None}, "missing parameter 'mode'; missing parameter 'count'"),
+        ({"mode": "medium"}, "parameter 'mode' is 'medium'; allowed: one of soft, hard"),
+        ({"mode": 3}, "parameter 'mode' is 3; allowed: a str"),
+        ({"count": 0}, "parameter 'count' is 0; allowed: 1 to 9"),
+        ({"count": 10}, "parameter 'count' is 10; allowed: 1 to 9"),
+        ({"count": 2.5}, "parameter 'count' is 2.5; allowed: a whole number"),
+        ({"count": True}, "parameter 'count' is True; allowed: a number"),
+        ({"count": [3]}, r"parameter 'count' is \[3\]; allowed: a number"),
+        ({"is_on": 1}, "parameter 'is_on' is 1; allowed: a bool"),
+        ({"is_on": "yes"}, "parameter 'is_on' is 'yes'; allowed: a bool"),
+        ({"inner.gain": math.nan}, "parameter 'inner.gain' is nan 1/s; allowed: 0 to 2"),
+        ({"inner.gain": math.inf}, "parameter 'inner.gain' is inf 1/s; allowed: 0 to 2"),
+        ({"inner.gain": -0.1}, "parameter 'inner.gain' is -0.1 1/s; allowed: 0 to 2"),
+        ({"inner.gain": "0.5"}, "parameter 'inner.gain' is '0.5' 1/s; allowed: a number"),
+        ({"inner.weights": [1.0, math.nan]}, "parameter 'inner.weights' is nan kg; allowed: at least 0"),
+        ({"inner.weights": 1.0}, "parameter 'inner.weights' is 1.0; it must be a list of float"),
+        ({"inner.names": "ab"}, "parameter 'inner.names' is 'ab'; it must be a list of str"),
+        ({"inner.weights": [1.0]}, "2 names, 1 weights"),
+    ],
+)
+def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], text: str) -> None:
+    flat = {name: value for name, value in {**GOOD, **change}.items() if value is not None}
+    with pytest.raises(ParameterError, match=text):
+        build(Example, flat)
+
+
+@dataclass(frozen=True)
+class Derived:
+    gain: float = parameter("gain", low=0.0, high=2.0)
+    copy: float = like(Gains, "gain", "copy")
+
+
+@dataclass(frozen=True)
+class Late:
+    late: float = tunable("came later", "N", before=0.5)
+    counted: tuple[float, ...] = tunable("the same", "N", high=2.0, before=lambda others: (0.5,) * others["n"])
+
+
+def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
+    assert build(Derived, {"gain": 1.5}) == Derived(1.5, 1.5)
+    assert build(Derived, {"gain": 1.5, "copy": 0.5}) == Derived(1.5, 0.5)
+    with pytest.raises(ParameterError, match="missing parameter 'gain'; missing parameter 'copy'"):
+        build(Derived, {})
+
+
+def test_a_derived_parameter_has_unit_and_range_of_the_other_one_and_its_meaning_unless_another_is_given() -> None:
+    _, copy = fields(Derived)
+    assert (copy.doc, copy.unit, copy.low, copy.high, copy.live) == ("copy", "1/s", 0.0, 2.0, False)
+    found = like(Late, "a.late").metadata
+    assert (found["doc"], found["unit"], found["high"]) == ("came later", "N", 1e9)
+
+
+@pytest.mark.parametrize(("name", "value"), [("a.late", 0.5), ("a.counted", (0.5, 0.5))])
+def test_a_derived_parameter_of_a_recording_is_what_the_other_one_was_before_it_existed(name: str, value: Any) -> None:
+    derived = like(Late, name).metadata["derived"]
+    assert derived({"n": 2}) == value
+    assert derived({"n": 2, name: 0.7}) == 0.7
+
+
+def test_a_tunable_is_live_and_not_negative() -> None:
+    late, counted = fields(Late)
+    assert (late.low, late.high, late.live, late.before) == (0.0, 1e9, True, 0.5)
+    assert (counted.high, counted.is_array) == (2.0, True)
+
+
+@pytest.mark.parametrize("node", ["", *NODES])
+def test_every_number_has_a_finite_range(node: str) -> None:
+    numbers = [field for field in fields(own_class(node) if node else Shared) if field.kind in (int, float)]
+    endless = [field.name for field in numbers if not -1e18 < field.low <= field.high < 1e18]
+    assert not endless, "give each a low and a high that an arm can have; 1e308 is a value, too"
+
+
+def own_class(node: str) -> Any:
+    """The parameter class of a node."""
+    return declared(node).parameter_class
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_section_of_every_configuration_builds_the_class_of_its_node(path: Path) -> None:
+    configuration = Configuration.load(path)
+    shared = configuration.sections["/**"]
+    assert build(Shared, shared) == configuration.shared
+    derived = {field.name for field in fields(Shared) if field.derived}
+    assert set(values(configuration.shared)) == set(shared) | derived, "nothing is left over"
+    assert not derived & set(shared), "they have their home elsewhere"
+    sections = set(configuration.sections) - {"/**"}
+    listed = {declared(entry).name: entry for file in FILES for entry in Configuration.load(file).shared.nodes}
+    assert sections <= set(NODES) | set(listed), "every section is that of a node"
+    assert {declared(entry).name for entry in configuration.shared.nodes} <= sections, "every node has one"
+    for name in sections:
+        built = configuration.node(name, own_class(listed.get(name, name)))
+        assert set(values(built)) == set(configuration.sections[name])
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("name", [name for name in NODES if name != "recorder"])
+def test_every_node_starts_with_its_section_of_every_configuration(path: Path, name: str, ros: Any) -> None:
+    configuration = Configuration.load(path)
+    with parameter_file(configuration) as file:  # ROS does not know overlays
+        node = make(ros, name, file)
+    for key, value in {**configuration.sections["/**"], **configuration.sections[name]}.items():
+        there = node.get_parameter(key).value
+        assert there == value if isinstance(value, str) else pytest.approx(value) == there
+
+
+def make(ros: Any, name: str, path: Path = WAM.path) -> Any:
+    return ros.add(
+        make_node(
+            name,
+            context=ros.context,
+            namespace="/wam",
+            cli_args=["--ros-args", "--params-file", str(path)],
+            use_global_arguments=False,
+        )
+    )
+
+
+def call(ros: Any, kind: Any, service: str, request: Any) -> Any:
+    client = ros.node("asker").create_client(kind, service)
+    ros.wait(client.service_is_ready, what=service)
+    future = client.call_async(request)
+    ros.wait(future.done, what=f"answer of {service}")
+    return future.result()
+
+
+def test_every_parameter_is_described_to_ros(ros: Any) -> None:
+    make(ros, "driver")
+    described = [*fields(Shared), *fields(own_class("driver"))]
+    names = [field.name for field in described]
+    answer = call(ros, DescribeParameters, "driver/describe_parameters", DescribeParameters.Request(names=names))
+    assert [d.name for d in answer.descriptors] == names
+    for field, there in zip(described, answer.descriptors, strict=True):
+        assert there.description.startswith(field.doc)
+        assert (f"[{field.unit}]" in there.description) == bool(field.unit)
+        assert there.read_only is (not field.live or field.name.startswith("servo."))
+        assert there.additional_constraints == field.allowed
+        for limits in (*there.floating_point_range, *there.integer_range):
+            assert limits.from_value == max(field.low, -1e308)
+            assert limits.to_value == min(field.high, 1e308)
+    by_name = {d.name: d for d in answer.descriptors}
+    assert by_name["watchdog"].floating_point_range[0].to_value == 0.05
+    assert "[s]" in by_name["watchdog"].description
+    assert by_name["timing.outer_delay"].integer_range[0].to_value == 1
+    assert by_name["timing.mode"].additional_constraints == "one of lockstep, realtime"
+
+
+def change(ros: Any, node: str, **given: Any) -> Any:
+    """Answer of set_parameters_atomically."""
+    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    return call(ros, SetParametersAtomically, f"{node}/set_parameters_atomically", request).result
+
+
+def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
+    node = make(ros, "velocity_loop")
+    raised, halved = [0.016, 0.016, 0.016, 0.011], [0.4, 0.4, 0.4, 0.25]
+    assert change(ros, "velocity_loop", **{"servo.proportional_gain": raised, "servo.integral_gain": halved}).successful
+    assert node.node._loop._kp == tuple(raised)
+    assert node.node._loop._ki == tuple(halved)
+    request = GetParameters.Request(names=["servo.proportional_gain", "servo.integral_gain"])
+    answer = call(ros, GetParameters, "velocity_loop/get_parameters", request)
+    assert [list(value.double_array_value) for value in answer.values] == [raised, halved]
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"force_gain": [0.02], "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+        ({"force_gain": [0.02], "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
+        ({"force_gain": [0.02], "posture_gain": math.nan}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": -1.0}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": "much"}, "Wrong parameter type"),
+        ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
+        (
+            {"force_gain": [0.02], "force_gian": 0.02},
+            "unknown parameter 'force_gian'; did you mean 'force_gain'? allowed, as they can change while node",
+        ),
+        ({"force_gain": [0.5]}, "times the largest linearly stable one"),
+        ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
+    ],
+)
+def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
+    node = make(ros, "force_loop")
+    before = node.node._loop.parameters
+    result = change(ros, "force_loop", **given)
+    assert not result.successful
+    assert text in result.reason
+    assert node.node._loop.parameters == before
+    assert tuple(node.get_parameter("force_gain").value) == before.force_gain
+    assert change(ros, "force_loop", force_gain=[0.02]).successful
+    assert node.node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
+
+
+def test_servo_gains_are_live_at_the_velocity_loop_alone(ros: Any) -> None:
+    make(ros, "gravity")
+    result = change(ros, "gravity", **{"servo.proportional_gain": [0.01] * 4})
+    assert not result.successful
+    assert "servo.proportional_gain" in result.reason
+
+
+@pytest.mark.parametrize(
+    ("node", "given", "text"),
+    [
+        ("velocity_loop", {"servo.proportional_gain": [1e308] * 4}, "allowed: 0 to 1e+09"),
+        ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
+        ("force_loop", {"force_limit": 1e308}, "force_limit"),
+        ("force_loop", {"joint_speed_limit": 1e308}, "joint_speed_limit"),
+        ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time out of range Min: 0.001"),
+        ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
+    ],
+)
+def test_a_live_value_that_the_arm_cannot_bear_is_refused(
+    ros: Any, node: str, given: dict[str, Any], text: str
+) -> None:
+    there = make(ros, node)
+    (name,) = given
+    before = there.get_parameter(name).value
+    result = change(ros, node, **given)
+    assert not result.successful
+    assert text in result.reason
+    assert there.get_parameter(name).value == before
+
+
+def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
+    node = make(ros, "velocity_loop")
+    before = node.node._loop._kp
+    result = change(ros, "velocity_loop", **{"servo.proportional_gain": [0.1] * 3, "servo.integral_gain": [0.1] * 3})
+    assert result.reason == "parameter 'servo.proportional_gain' has 3 values; 4 names need 4"
+    assert node.node._loop._kp == before
+
+
+def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
+    class Both:
+        name, parameters, owns = "velocity_loop", Gains, "servo"
+
+        def __init__(self, shared: Shared, own: Gains) -> None:
+            self.gain, self.servo = own.gain, shared.servo
+
+        @reaction(Input("motor_states"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+        def tune(self, own: Gains) -> None:
+            self.gain = own.gain
+
+        def retune(self, servo: Servo) -> None:
+            require(servo.integral_gain[0] < 100.0, "integral gain is too large")
+            self.servo = servo
+
+    own: dict[str, Any] = {"gain": 1.0, "names": ["a"], "weights": [1.0]}
+    given = {**WAM.sections[SHARED], **own}
+    overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
+    node = ros.add(AdaptedNode(declaration(Both), namespace="/wam", context=ros.context, parameter_overrides=overrides))
+    before = node.node.servo
+    refused = change(ros, "velocity_loop", gain=2.0, **{"servo.integral_gain": [200.0] * 4})
+    assert refused.reason == "integral gain is too large"
+    assert (node.node.gain, node.node.servo) == (1.0, before)
+    assert change(ros, "velocity_loop", gain=1.5, **{"servo.integral_gain": [3.0] * 4}).successful
+    assert (node.node.gain, node.node.servo.integral_gain) == (1.5, (3.0,) * 4)
+
+
+def test_a_node_that_fails_on_a_value_keeps_the_old_one_and_says_so(ros: Any) -> None:
+    class Fails:
+        name, parameters = "velocity_loop", Gains
+
+        def __init__(self, shared: Shared, own: Gains) -> None:
+            self.gain = own.gain
+
+        @reaction(Input("motor_states"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+        def tune(self, own: Gains) -> None:
+            self.gain = own.gain
+            self.inverse = 1.0 / (own.gain - 0.75)
+
+    given = {**WAM.sections[SHARED], "gain": 1.0, "names": ["a"], "weights": [1.0]}
+    overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
+    node = ros.add(
+        AdaptedNode(declaration(Fails), namespace="/wam", context=ros.context, parameter_overrides=overrides)
+    )
+    refused = change(ros, "velocity_loop", gain=0.75)
+    assert not refused.successful
+    assert "the node failed on it: ZeroDivisionError" in refused.reason
+    assert node.node.gain == 1.0
+    assert node.get_parameter("gain").value == 1.0
+    assert change(ros, "velocity_loop", gain=0.5).successful
+
+
+def test_an_answer_without_a_result_is_no_success() -> None:
+    request = SetParametersRequest("filter", {"gain": 0.7})
+    assert "filter failed on it" in refusal_of(request, SetParameters.Response())
+
+
+def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:
+    make(ros, "velocity_loop")
+    request = SetParameters.Request(parameters=[Parameter("ages.command", value=0.5).to_parameter_msg()])
+    (result,) = call(ros, SetParameters, "velocity_loop/set_parameters", request).results
+    assert not result.successful
+    assert "ages.command" in result.reason
+
+
+def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "wam_ros.program", name, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong", "text"),
+    [
+        ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
+        ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
+        ("force_loop", "force_gain: [1.45e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
+        ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
+    ],
+)
+def test_a_wrong_parameter_stops_the_process_with_its_name(
+    name: str, right: str, wrong: str, text: str, tmp_path: Path, domain_id: int
+) -> None:
+    file = tmp_path / "parameters.yaml"
+    good = packaged("wam").read_text()
+    assert good.count(right) == 1
+    file.write_text(good.replace(right, wrong))
+    done = run_node(name, "--ros-args", "--params-file", str(file))
+    assert f"node '{name}': " in done.stderr
+    assert done.returncode == 1
+    assert text in done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_a_parameter_on_the_command_line_wins_over_the_file(domain_id: int) -> None:
+    done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5")
+    assert "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05" in done.stderr
+
+
+def test_a_node_without_parameters_says_where_they_are(domain_id: int) -> None:
+    done = run_node("gravity")
+    assert done.returncode == 1
+    assert "start it with --ros-args --params-file config/wam.yaml, or with 'wam node'" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,69 @@
+"""Other transmissions as configurations of the same plant: formulas against the plant, and the stack on each."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_control.task.scenario import ScenarioStep
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_description.signals import ForceCommand
+from wam_sim.simulation import Simulation
+from wam_studies.figures.transmissions import KINDS, ROWS, driven, measured, predicted, table
+from wam_studies.plant.ideal_testbed import ideal_testbed, released_plant
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_plant_has_what_formulas_of_shaft_cable_and_gears_say(kind: str) -> None:
+    pairs = list(zip(predicted(kind), measured(kind), strict=True))
+    for expected, found in pairs[:-2]:
+        assert found == pytest.approx(expected, rel=0.01, abs=1e-9)
+    assert all(math.isnan(found) for _, found in pairs[-2:])
+
+
+def test_shaft_at_motor_speed_is_as_stiff_as_the_cable_and_direct_drive_pays_with_heat() -> None:
+    cables, gears, direct = map(predicted, KINDS)
+    assert gears.stiffness == pytest.approx(cables.stiffness, rel=0.03)
+    assert gears.efficiency < cables.efficiency < direct.efficiency
+    assert (direct.mass, direct.heat) == pytest.approx((14.0, 14.0))
+    assert driven("shaft and gears").stiffness == pytest.approx(gears.stiffness, rel=1e-3)  # the set's E A
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", filter(None, KINDS.values()))
+def test_stack_presses_with_every_transmission(name: str) -> None:
+    values = yaml.safe_load(packaged(f"experiments/sets/{name}").read_text(encoding="utf-8"))
+    testbed = Configuration.load(packaged("testbed")).with_values(values)
+    press = ForceCommand("link", (0.0, -20.0, 0.0))
+    run = Simulation(testbed, [ScenarioStep("press", 6.0, request="enable", force=press)])
+    assert not run.play()
+    q = np.array([row.values[0] for row in run.rows["sim/joint_states"]])
+    force = -1464.28 / 0.9144 * q[-200:]
+    assert float(force.mean()) == pytest.approx(20.0, abs=0.3)
+
+
+def test_link_moves_within_the_play_and_not_beyond() -> None:
+    plant = released_plant(ideal_testbed(rotor=1e9), backlash=(0.14,))
+    assert plant.q == plant.theta == [0.0]
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, 1e-3]))
+    before = plant.circuit_torque
+    while plant.q[0] < 0.0049:
+        plant.step([0.0])
+        assert plant.circuit_torque == before == [0.0]
+    while plant.qd[0] > 0.0:
+        plant.step([0.0])
+    assert 0.005 < plant.q[0] < 0.0052
+
+
+def test_a_play_for_each_motor_is_refused_if_motors_are_missing() -> None:
+    with pytest.raises(ParameterError, match="backlash"):
+        released_plant(ideal_testbed(), backlash=(0.1, 0.2))
+
+
+@pytest.mark.slow
+def test_table_has_every_quantity() -> None:
+    text = table()
+    assert all(name in text for name, _ in ROWS)

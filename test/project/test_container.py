@@ -1,0 +1,52 @@
+"""The container: its files name what is there.  Docker itself is not needed here; nothing is built."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+DEVCONTAINER = json.loads((ROOT / ".devcontainer" / "devcontainer.json").read_text(encoding="utf-8"))
+INSTRUCTIONS = re.sub(r"\\\n", " ", re.sub(r"^#.*\n", "", DOCKERFILE, flags=re.MULTILINE)).splitlines()
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def test_every_file_that_is_copied_is_there() -> None:
+    copied = [shlex.split(line)[2:] for line in INSTRUCTIONS if line.startswith("COPY")]
+    assert copied
+    missing = [source for *sources, _ in copied for source in sources if not (ROOT / source).exists()]
+    assert missing == []
+
+
+def test_every_target_of_make_exists() -> None:
+    called = set(re.findall(r"make (\w+)", DOCKERFILE.replace("make procps", ""))) | {"demo"}
+    called |= set(re.findall(r"make (\w+)", DEVCONTAINER["postCreateCommand"]))
+    assert {"install", "dependencies"} <= called <= TARGETS
+
+
+def test_dependencies_are_a_layer_before_the_sources() -> None:
+    steps = [line.split()[0] + " " + " ".join(line.split()[1:3]) for line in INSTRUCTIONS if line]
+    assert steps.index("RUN make dependencies") < steps.index("COPY --chown=wam:wam .")
+    copied = "\n".join(INSTRUCTIONS[: INSTRUCTIONS.index("RUN make dependencies")])
+    read_by_setup = re.findall(r"HERE / \"(\w+)\" / \"(\w+\.py)\"", (ROOT / "setup.py").read_text(encoding="utf-8"))
+    assert read_by_setup
+    assert all("/".join(parts) in copied for parts in read_by_setup)
+
+
+def test_the_tests_find_their_browser_and_are_not_run_as_root() -> None:
+    assert "chromium" in DOCKERFILE
+    assert [line.split()[1] for line in INSTRUCTIONS if line.startswith("USER")] == ["wam"]
+    assert DEVCONTAINER["remoteUser"] == "wam"
+
+
+def test_the_editor_builds_the_same_container() -> None:
+    file = (ROOT / ".devcontainer" / DEVCONTAINER["build"]["dockerfile"]).resolve()
+    assert file == ROOT / "Dockerfile"
+    assert f"WORKDIR {DEVCONTAINER['workspaceFolder']}" in INSTRUCTIONS
+
+
+def test_nothing_that_the_tests_need_is_left_out() -> None:
+    ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert {"!bags/sample", "!bags/README.md", "!bags/index.yaml"} <= set(ignored)
+    assert not {"test", "docs", "config", "examples", "benchmarks"} & set(ignored)

@@ -1,0 +1,129 @@
+"""What the documentation says is what the code does: pages are current, names exist.
+
+The commands are run by test_doc_commands.py, the site is built by test_site.py.
+"""
+
+import ast
+import difflib
+import importlib.util
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.topics import BY_NAME
+
+ROOT = Path(__file__).resolve().parents[2]
+HANDBOOK = {
+    path.name: path.read_text(encoding="utf-8")
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]
+}
+
+ACTIONS = {"/wam/follow_joint_trajectory"}  # of `wam follow`, where control_msgs is installed
+
+
+def load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# generated pages
+
+
+@pytest.fixture(scope="module")
+def generate() -> Any:
+    return load(ROOT / "docs" / "generate.py")
+
+
+@pytest.mark.slow
+def test_generated_pages_are_current(generate: Any) -> None:
+    pages = generate.pages()
+    stale = [path.name for path, text in pages.items() if path.read_text(encoding="utf-8") != text]
+    assert stale == [], "these pages are not what the code says; run 'make docs' and commit them"
+    assert {path.name for path in pages} >= {"running.md", "topics.md", "parameters.md", "constants.md"}
+
+
+def test_a_changed_block_is_noticed_and_a_changed_sentence_is_kept(generate: Any) -> None:
+    text = HANDBOOK["topics.md"]
+    assert generate.filled(text.replace("| `motor_states`", "| `motor_status`")) == text
+    own = text.replace("# Topics\n", "# Our topics\n")
+    assert generate.filled(own) == own
+
+
+# names
+
+
+def test_the_tests_that_force_md_names_exist() -> None:
+    named = re.findall(r"`(test_\w+)\.(test_\w+)`", HANDBOOK["force.md"])
+    assert len({row.split("|")[1] for row in HANDBOOK["force.md"].splitlines() if re.match(r"\| F\d+ ", row)}) == 21
+    missing = [f"{file}.{name}" for file, name in named if f"def {name}(" not in source(file)]
+    assert missing == []
+
+
+def source(test: str) -> str:
+    path = next(ROOT.glob(f"test/*/{test}.py"), None)
+    return path.read_text(encoding="utf-8") if path else ""
+
+
+def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None:
+    from wam_description.nodes import NODES
+    from wam_ros.bring_up import Composition
+
+    nodes = [name for name in NODES if name != "recorder"]
+    configuration = Configuration.load(packaged("wam")).with_values({"nodes": nodes, "timing.real_time_factor": 0.0})
+    with Composition(configuration, domain_id=domain_id) as composition:
+        services = {service.service_name for node in composition.nodes.values() for service in node.services}
+    topics = {name if name.startswith("/") else f"/wam/{name}" for name in BY_NAME}
+    for page, text in HANDBOOK.items():
+        named = set(re.findall(r"/wam/[a-z_/]*[a-z]", text))
+        assert named <= topics | services | {f"/wam/{node}" for node in NODES} | ACTIONS, page
+
+
+NO_TOPICS = {"use_joint_sensors", "needs_joint_sensors"}  # which look like some
+
+
+def test_topics_in_backticks_exist() -> None:
+    looks_like_a_topic = re.compile(r"(sim|contact)/\w+|\w+_(command|states|sensors|effort|currents|torques)")
+    for page, text in HANDBOOK.items():
+        if page == "parameters.md":
+            continue
+        for name in set(re.findall(r"`([\w/]+)`", text)) - BY_NAME.keys() - NO_TOPICS:
+            meant = difflib.get_close_matches(name, BY_NAME, cutoff=0.85)
+            assert not meant, f"{page}: `{name}`, is {meant[0]} meant?"
+            assert not looks_like_a_topic.fullmatch(name), f"{page}: there is no topic `{name}`"
+
+
+def test_files_that_the_handbook_links_to_exist() -> None:
+    for page, text in HANDBOOK.items():
+        folder = ROOT if page in ("README.md", "CONTRIBUTING.md") else ROOT / "docs"
+        for target in re.findall(r"\]\(([^)#:]+)\)", text):
+            assert (folder / target).is_file(), f"{page}: {target}"
+
+
+def spoken(path: Path) -> Iterator[str]:
+    """Every text in a module; what an f-string fills in becomes <>."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "<>" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+@pytest.mark.slow
+def test_refusals_in_the_handbook_are_those_of_the_code() -> None:
+    table = HANDBOOK["safety.md"].partition("<!-- messages:")[2]
+    messages = re.findall(r"^\|[^|]+\| `(.+)` \|$", table, re.MULTILINE)
+    assert len(messages) >= 19
+    texts = [text for path in ROOT.glob("wam_*/*.py") for text in spoken(path)]
+    for message in messages:
+        whole = message.removeprefix("refused: ")  # the driver puts it before an obstacle
+        pattern = re.compile(".*?".join(re.escape(part) for part in re.split(r"<\w+>", whole)))
+        assert any(pattern.search(text) for text in texts), message

@@ -1,0 +1,245 @@
+"""Drivers tested against the contract: the simulated one and the skeleton keep it, a broken one fails row by row."""
+
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import LONG, RosWorld
+from sensor_msgs.msg import JointState
+
+from wam_cli.commands.conform import driver_alone
+from wam_description.configuration import Configuration, packaged
+from wam_description.driver_contract import REQUIREMENTS, DriverContract
+from wam_description.signals import Answer, State
+from wam_ros import conformance, message_checks
+from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
+from wam_ros.driver_probe import DriverProbe
+from wam_ros.node import make_node
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+SHARE = 0.05  # of the periods in which a state comes, on a machine as busy as may be
+PATIENT = 20
+
+
+class Bench:
+    """A driver and the probe in one process."""
+
+    def __init__(self, ros: RosWorld, folder: Path, configuration: Configuration, make: Callable[..., Any]) -> None:
+        self.ros, self._make = ros, make
+        file = folder / "parameters.yaml"
+        file.write_text(configuration.text)
+        self._arguments = ["--ros-args", "--params-file", str(file)]
+        shared = configuration.shared
+
+        def spin(seconds: float) -> None:
+            ros.executor.spin_once(timeout_sec=seconds)
+
+        self.probe = ros.add(DriverProbe(shared, 0.4, spin, context=ros.context, namespace="/wam"))
+        self.contract = DriverContract.of(shared, SHARE)
+        self.start()
+
+    def start(self) -> None:
+        self.driver = self.ros.add(
+            self._make(context=self.ros.context, namespace="/wam", cli_args=self._arguments, use_global_arguments=False)
+        )
+
+    def conformance(self, attempts: int) -> Conformance:
+        return Conformance(self.probe, self.contract, attempts, lambda: self.ros.remove(self.driver), self.start)
+
+
+def simulated() -> Configuration:
+    return driver_alone(Configuration.load(packaged("wam")))
+
+
+def skeleton(monkeypatch: pytest.MonkeyPatch) -> Configuration:
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return driver_alone(Configuration.load(EXAMPLES / "bus_driver.yaml"))
+
+
+def wrong(bench: Bench, attempts: int = PATIENT) -> list[str]:
+    return [row.text for row in bench.conformance(attempts).rows() if row.verdict != OK]
+
+
+@pytest.mark.slow
+def test_the_simulated_driver_keeps_the_contract_as_a_process_of_its_own(domain_id: int) -> None:
+    command = [sys.executable, "-P", "-m", "wam_cli.main", "conform", "--share", str(SHARE), "--attempts", str(PATIENT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10 * LONG)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{len(REQUIREMENTS)} ok, 0 WRONG, 0 not tested" in done.stdout
+
+
+class Heldup:
+    """A probe that pauses, or not."""
+
+    longest_pause = 0.0
+
+    def be_proper(self) -> None:
+        """Nothing to end."""
+
+
+@pytest.mark.parametrize(("pause", "tries"), [(0.001, 2), (1.0, 6)])
+def test_an_attempt_that_the_machine_held_up_does_not_count(
+    pause: float, tries: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probe: Any = Heldup()
+    tested = Conformance(probe, DriverContract.of(simulated().shared, SHARE), 2)
+    made = []
+
+    def check() -> str:
+        made.append(pause)
+        probe.longest_pause = pause
+        return "it is wrong"
+
+    monkeypatch.setitem(conformance.CHECKS, "rate", lambda bench: check())
+    row = tested.row("rate")
+    assert (row.verdict, len(made)) == (WRONG, tries)
+    assert ("held up" in row.found) == (pause > conformance.PAUSE)
+
+
+@pytest.mark.slow
+def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_refused(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
+    bench = Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))
+    found = [bench.conformance(PATIENT).row(key) for key in ("refusals", "answers")]
+    assert [row.text for row in found if row.verdict != OK] == []
+    assert max(map(abs, bench.probe.carrying)) > 0.6, "A, in motor 4"
+
+
+@pytest.mark.slow
+def test_the_skeleton_keeps_the_contract_in_150_lines(
+    ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configuration = skeleton(monkeypatch)
+    entry = configuration.shared.nodes[0]
+    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node(entry, **given))) == []
+    assert len((EXAMPLES / "bus_driver.py").read_text().splitlines()) <= 150
+
+
+def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one() -> None:
+    configuration = simulated().with_values({"arm.motors.torque_constant": [1.0] * 4})
+    contract = DriverContract.of(configuration.shared, SHARE)
+    assert contract.peak == configuration.shared.arm.motors.peak_torque
+
+
+def test_without_a_driver_no_row_but_the_interface_is_tested(
+    ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("START", "LOOK"):
+        monkeypatch.setattr(message_checks, name, 0.05)
+    monkeypatch.setattr("wam_ros.driver_probe.PATIENCE", 0.05)
+    bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
+    rows = list(bench.conformance(1).rows())
+    assert [row.key for row in rows] == list(REQUIREMENTS)
+    assert {row.verdict for row in rows[1:]} == {NOT_TESTED}
+    assert rows[0].verdict == WRONG
+    assert "motor_states" in rows[0].found
+
+
+class Broken:
+    """Defects of the skeleton, one of which can be chosen while it runs."""
+
+    defect = ""
+
+    def __init__(self, **ros: Any) -> None:
+        super().__init__(**ros)
+        self.create_subscription(JointState, "motor_current_command", self._take_anything, 10)
+        ports = self._ports
+        self._whole_publish, self._whole_write, self._whole_status = ports.publish, self.bus.write, ports.publish_status
+        ports.publish, self.bus.write, ports.publish_status = self._send, self._write, self._send_status
+        ports.takes_problem = lambda reason: None if self.defect in ("claims", "agreement") else self._trip(reason)
+
+    def _send(self, topic: str, stamp: int, value: Any) -> None:
+        change = {
+            ("arrays", "motor_states"): lambda state: state._replace(velocity=[]),
+            ("velocity", "motor_states"): lambda state: state._replace(velocity=[*map(math.degrees, state.velocity)]),
+            ("current", "motor_currents"): lambda state: State([], [], [1e3 * current for current in state.effort]),
+        }.get((self.defect, topic), lambda state: state)
+        if (self.defect, topic) != ("outer", "/clock"):
+            self._whole_publish(topic, stamp, change(value))
+
+    def _write(self, currents: list[float], brakes_on: bool, dt: float) -> None:
+        self._whole_write(self._command if self.defect == "braked" else currents, brakes_on, dt)
+
+    def _send_status(self, status: Any) -> None:
+        self._whole_status(status._replace(session=0) if self.defect == "status" else status)
+
+    @property
+    def stamp(self) -> int:
+        return super().stamp + (self.defect == "stamps")
+
+    def _take_anything(self, message: Any) -> None:
+        if self.defect in ("names", "refusals", "answers", "repetition"):
+            self._command = [*message.effort, *self._zero][:4]
+            self._command_stamp, self._came = self.stamp, time.perf_counter()
+
+    def _take_currents(self, stamp: int, command: State) -> None:
+        if self.defect not in ("names", "answers"):
+            super()._take_currents(stamp, command)
+
+    def _publish(self) -> None:
+        if self.defect != "rate" or self._tick % 40 == 0:
+            super()._publish()
+
+    def _run(self) -> None:
+        # a busy machine trips the short one; half a second by arrival alone is the defect of repetition
+        self._watchdog = {"watchdog": 1e9, "answers": 1e9, "end": 1e9, "repetition": 0.5}.get(self.defect, 0.045)
+        super()._run()
+
+    def _enable(self) -> Answer:
+        if self.defect == "fault":
+            self.safety.reset_fault()
+        if self.defect == "silence":
+            return self.safety.enable("")
+        before = self._command
+        answer = super()._enable()
+        if self.defect == "discard":
+            self._command = before
+        return answer
+
+    def _disable(self) -> Answer:
+        return Answer(True, "braked") if self.defect == "disable" else super()._disable()
+
+    def _trip(self, reason: str) -> None:
+        if self.defect != "estop":
+            super()._trip(reason)
+
+    def _take_peer(self, status: Any) -> None:
+        if self.defect != "peers":
+            super()._take_peer(status)
+
+
+def broken_driver(**ros: Any) -> Any:
+    from bus_driver import BusDriver
+
+    return type("BrokenDriver", (Broken, BusDriver), {})(**ros)
+
+
+@pytest.mark.slow
+def test_a_broken_driver_fails_row_by_row(ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(ros, tmp_path, skeleton(monkeypatch), broken_driver)
+    driver = bench.driver
+
+    def reborn() -> None:
+        driver._session -= 1
+
+    conformance_of_it = Conformance(bench.probe, bench.contract, 1, lambda: None, reborn)
+    assert conformance_of_it.row("interface").verdict == OK
+    verdicts = {}
+    for key in list(REQUIREMENTS)[1:]:
+        driver.defect = key
+        for _ in range(PATIENT):
+            verdicts[key] = conformance_of_it.row(key).verdict
+            if verdicts[key] != NOT_TESTED:  # on a busy machine
+                break
+        driver.defect = ""
+        driver.bus.__init__(driver._constant)  # a NaN stays in it
+        driver.bus.write = driver._write
+    assert verdicts == dict.fromkeys(verdicts, WRONG)

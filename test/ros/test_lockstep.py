@@ -1,0 +1,280 @@
+"""Lockstep: the same scenario gives the same numbers, bit for bit, wherever and however it runs."""
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from bag_comparison import compare
+
+from wam_bag.bag import Bag, JointColumns, PointColumns, TableColumns, WrenchColumns, read
+from wam_control.task.scenario import load
+from wam_description.arm import Timing
+from wam_description.configuration import Configuration, packaged
+from wam_description.interface import process_groups
+from wam_description.nodes import EACH, GROUPED, ONE
+from wam_description.synchroniser import InputSpec, Synchroniser
+from wam_sim.replay import tables
+from wam_sim.simulation import Rows, Simulation
+
+STEPS = [
+    {"name": "release", "seconds": 0.1, "request": "enable"},
+    {
+        "name": "move and be pushed",
+        "seconds": 0.5,
+        "posture": [0.1, -0.7, 0.05, 0.4],
+        "push": {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
+    },
+    {"name": "press on nothing", "seconds": 0.1, "force": {"frame": "outer_link", "newtons": [0.0, -3.0, 0.0]}},
+    {"name": "brake", "seconds": 0.1, "request": "disable"},
+]
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    path = tmp_path / "script.yaml"
+    path.write_text(yaml.safe_dump({"steps": STEPS}))
+    return path
+
+
+def configuration(script: Path, directory: Path, name: str, **values: object) -> Configuration:
+    base = Configuration.load(packaged("wam"))
+    return base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(directory),
+            "recorder:name": name,
+            **values,
+        }
+    )
+
+
+def record_composed(configured: Configuration, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)  # type: ignore[attr-defined]
+        assert scenario.failure == ""  # type: ignore[attr-defined]
+
+
+def record_in_processes(configured: Configuration, how: str = EACH) -> None:
+    from wam_ros.bring_up import Processes
+
+    with Processes(configured, processes=how) as processes:
+        ((name, code),) = processes.wait(bool).items()
+        assert (name.split()[-1], code) == ("scenario", 0)
+
+
+def play_directly(configured: Configuration, script: Path) -> Simulation:
+    run = Simulation(configured, load(script, configured.shared))
+    assert run.play() == ""
+    return run
+
+
+def differences(rows: Rows, bag: Bag) -> list[str]:
+    """Topics of a direct run whose numbers are not those of the bag, bit for bit."""
+    found = []
+    for topic, published in rows.items():
+        columns = bag.topics[f"/wam/{topic}"]
+        if isinstance(columns, JointColumns):
+            numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        elif isinstance(columns, WrenchColumns):
+            numbers = np.hstack([columns.force, columns.torque])
+        elif isinstance(columns, TableColumns):
+            rows = [[number for row in table.rows for number in row] for table in tables(columns)]
+            if repr([list(row.values) for row in published]) != repr(rows):
+                found.append(topic)
+            continue
+        else:
+            assert isinstance(columns, PointColumns)
+            numbers = columns.point
+        here = np.array([row.values for row in published])
+        if here.shape != numbers.shape or here.tobytes() != np.ascontiguousarray(numbers).tobytes():
+            found.append(f"{topic}: {here.shape} and {numbers.shape}")
+        if [row.stamp for row in published] != columns.stamp_ns.tolist():
+            found.append(f"{topic}: stamps")
+        if published[0].frame and [row.frame for row in published] != list(columns.frames):
+            found.append(f"{topic}: frames")
+    return found
+
+
+@pytest.mark.parametrize(("delay", "dither_cycle"), [(0, 0), (1, 40)])
+def test_lockstep_over_topics_equals_the_loop_without_ros(
+    delay: int, dither_cycle: int, script: Path, tmp_path: Path, domain_id: int
+) -> None:
+    values = {"timing.outer_delay": delay, "timing.dither_cycle": dither_cycle}
+    configured = configuration(script, tmp_path, "composed", **values)
+    record_composed(configured, domain_id)
+    run = play_directly(configured, script)
+    bag = read(tmp_path / "composed")
+    assert len(run.rows) == 26
+    assert len(run.rows["motor_states"]) == 801
+    assert differences(run.rows, bag) == []
+
+
+@pytest.mark.slow
+def test_one_period_of_delay_changes_the_numbers(script: Path, tmp_path: Path) -> None:
+    """The comparison above would notice an outer command that is used a period too late."""
+    runs = [
+        play_directly(configuration(script, tmp_path, "none", **{"timing.outer_delay": delay}), script)
+        for delay in (0, 1)
+    ]
+    assert runs[0].rows["motor_states"] != runs[1].rows["motor_states"]
+
+
+def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: Path, domain_id: int) -> None:
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        record_in_processes(configuration(script, tmp_path, "loaded"))
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    record_in_processes(configuration(script, tmp_path, "quiet"))
+    record_composed(configuration(script, tmp_path, "composed"), domain_id)
+    assert compare(tmp_path / "loaded", tmp_path / "quiet") == []
+    record_in_processes(configuration(script, tmp_path, "grouped"), GROUPED)
+    assert compare(tmp_path / "quiet", tmp_path / "composed") == []
+    assert compare(tmp_path / "grouped", tmp_path / "composed") == []
+    bag = read(tmp_path / "loaded")
+    assert "/wam/status" in bag.topics
+    assert len(bag.topics["/wam/motor_states"].log_time_ns) == 801
+
+
+def test_what_works_every_inner_period_shares_a_process_and_so_does_the_rest_without_the_recorder() -> None:
+    nodes = [*Configuration.load(packaged("wam")).shared.nodes, "scenario", "recorder"]
+    outer = ["transform", "gravity", "force_loop", "contact_estimator", "scenario"]
+    assert process_groups(nodes, GROUPED) == [["driver", "velocity_loop"], outer, ["recorder"]]
+    assert process_groups(nodes, ONE) == [nodes]
+    assert process_groups(nodes, EACH) == [[node] for node in nodes]
+    own = "wam_control.velocity.position_loop:PositionLoopNode"
+    assert process_groups(["driver", own], GROUPED) == [["driver", own]], "what counts is that it is an inner loop"
+
+
+def test_a_node_of_another_name_has_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own_nodes.py").write_text(
+        "from wam_control.velocity.gravity_node import GravityNode\n"
+        "class Slow(GravityNode):\n    name = 'slow'\n"
+        "class Another(GravityNode):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    slow, another = "own_nodes:Slow", "own_nodes:Another"
+    assert process_groups(["force_loop", slow, another], GROUPED) == [["force_loop", another], [slow]]
+
+
+@pytest.mark.slow
+def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys, json, hashlib\n"
+        "from pathlib import Path\n"
+        "from wam_sim.simulation import Simulation\n"
+        "from wam_control.task.scenario import load\n"
+        "from wam_description.configuration import Configuration, packaged\n"
+        "c = Configuration.load(packaged('wam'))\n"
+        "run = Simulation(c, load(Path(sys.argv[1]), c.shared))\n"
+        "run.play()\n"
+        "print(json.dumps({t: hashlib.sha256(repr(r).encode()).hexdigest() for t, r in run.rows.items()}))\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    outputs = []
+    for seed in ("1", "2"):
+        environment["PYTHONHASHSEED"] = seed
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(script)], capture_output=True, text=True, check=True, env=environment
+        )
+        outputs.append(json.loads(done.stdout))
+    assert outputs[0] == outputs[1]
+
+
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)
+
+
+def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:
+    """Stamp, dt, state and command of each step that an input completes."""
+    steps = synchroniser.put(topic, stamp, value)
+    return [(inputs.stamp, inputs.dt, inputs["state"], inputs["command"]) for inputs in steps]
+
+
+def test_a_step_waits_for_the_command_that_belongs_to_the_state() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
+    ms = 1_000_000
+    assert puts(synchroniser, "state", 1 * ms, "s1") == [(1 * ms, 0.001, "s1", None)]
+    assert puts(synchroniser, "state", 2 * ms, "s2") == []
+    assert synchroniser.missing(2 * ms) == ["command"]
+    assert puts(synchroniser, "command", 1 * ms, "c1") == [(2 * ms, 0.001, "s2", "c1")]
+    assert puts(synchroniser, "command", 6 * ms, "c6") == []
+    assert puts(synchroniser, "state", 6 * ms, "s6") == [(6 * ms, 0.004, "s6", "c1")]
+    assert puts(synchroniser, "state", 7 * ms, "s7") == [(7 * ms, 0.001, "s7", "c6")]
+
+
+def test_a_node_that_begins_late_leaves_out_the_steps_whose_inputs_it_has_missed() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
+    ms = 1_000_000
+    for tick in (1003, 1004, 1005, 1006):  # they need the command of 1001
+        assert puts(synchroniser, "state", tick * ms, f"s{tick}") == []
+    assert puts(synchroniser, "command", 1006 * ms, "c1006") == []
+    assert puts(synchroniser, "state", 1007 * ms, "s1007") == [(1007 * ms, 0.001, "s1007", "c1006")]
+
+
+def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
+    realtime = dataclasses.replace(TIMING, mode="realtime")
+    synchroniser = Synchroniser(realtime, "state", {"command": InputSpec(outer=True)})
+    assert puts(synchroniser, "state", 1_000_000, "s1") == [(1_000_000, 0.001, "s1", None)]
+    assert puts(synchroniser, "command", 1_000_000, "old") == []
+    assert puts(synchroniser, "command", 6_000_000, "new") == []
+    assert puts(synchroniser, "state", 9_000_000, "s9") == [(9_000_000, 0.008, "s9", "new")]
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_the_age_of_an_input_counts_from_the_state_that_caused_it(mode: str) -> None:
+    timing = dataclasses.replace(TIMING, mode=mode)
+    synchroniser = Synchroniser(timing, "state", {"command": InputSpec(outer=True, delay=1)})
+    assert list(synchroniser.put("command", 1_000_000, "c1")) == []
+    (inputs,) = synchroniser.put("state", 4_000_000, "s4")
+    assert (inputs.age("command"), inputs.stamp_of("command")) == (0.003, 1_000_000)
+    assert (inputs.age("nothing"), inputs["nothing"]) == (0.0, None)
+
+
+def test_a_state_that_comes_twice_starts_one_step() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {})
+    assert len(list(synchroniser.put("state", 1_000_000, "a"))) == 1
+    assert list(synchroniser.put("state", 1_000_000, "b")) == []
+
+
+def test_an_outer_step_takes_states_of_outer_periods_only() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False)}, outer=True, thinned=True)
+    for tick in range(1, 12):
+        synchroniser.put("sensors", tick * 1_000_000, tick)
+        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
+        assert steps == ([(tick * 1_000_000, tick)] if tick in (1, 6, 11) else [])
+
+
+def test_an_outer_step_takes_a_delayed_input_of_the_inner_rate_from_the_outer_period_before() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False, delay=1)}, outer=True, thinned=True)
+    for tick in range(1, 12):
+        synchroniser.put("sensors", tick * 1_000_000, tick)
+        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
+        assert steps == ([(tick * 1_000_000, {1: None, 6: 1, 11: 6}[tick])] if tick in (1, 6, 11) else [])
+
+
+def test_an_outer_step_waits_for_its_inputs_of_both_rates_and_leaves_out_what_one_of_them_has_missed() -> None:
+    specs = {"sensors": InputSpec(outer=False), "estimate": InputSpec(outer=True)}
+    synchroniser = Synchroniser(TIMING, "state", specs, outer=True)
+    ms = 1_000_000
+    assert list(synchroniser.put("state", 1 * ms, "s1")) == []
+    for tick in range(1, 7):
+        assert list(synchroniser.put("sensors", tick * ms, tick)) == []
+    assert synchroniser.missing(1 * ms) == ["estimate"]
+    assert list(synchroniser.put("state", 6 * ms, "s6")) == []
+    (inputs,) = synchroniser.put("estimate", 6 * ms, "e6")  # that of the first one can no longer come
+    assert (inputs["state"], inputs["sensors"], inputs["estimate"]) == ("s6", 6, "e6")

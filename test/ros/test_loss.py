@@ -1,0 +1,199 @@
+"""What an enabled arm does where a node of the chain stops, another one speaks for it, or the driver starts again."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import RosWorld
+from test_nodes import ARM, MS, SIX, changed, make
+
+from wam_description.signals import Level, NodeStatus, State
+from wam_description.topics import BY_NAME
+from wam_driver.safety import Mode
+from wam_ros.header import stamp_of
+from wam_ros.messages import diagnostic_status, joint_state, message_type
+from wam_ros.qos import qos
+from wam_studies.faults.answered_clock import AnsweredClock
+
+LIMIT = 50 * MS  # ns of the arm's time, from the last answer of a node to zero current
+
+
+class Stack:
+    """The six nodes in this process; the arm is enabled."""
+
+    def __init__(self, ros: RosWorld, folder: Path, mode: str, **values: Any) -> None:
+        self.ros, self.folder, self._clock = ros, folder, AnsweredClock(MS * 1e-9)
+        self.values = {"timing__mode": mode, "timing__timeout": 2.0, **values}
+        self._frozen: list[tuple[Any, Any, list[Any]]] = []
+        others = [name for name in SIX if name != "driver"]
+        configured = changed(SIX, **self.values)
+        self.nodes = {name: make(ros, folder, name, "/wam", configured) for name in others}
+        self.start_driver()
+        row = BY_NAME["motor_current_command"]
+        self._answers = ros.node("watch").create_subscription(message_type(row), row.name, self._take_answer, qos(row))
+        self.enable()
+
+    def start_driver(self) -> None:
+        """In realtime a period passes with each answer, so that no node is late on a busy machine."""
+        with self._clock.of_new_nodes(self.values["timing__mode"]):
+            self.nodes["driver"] = make(self.ros, self.folder, "driver", "/wam", changed(SIX, **self.values))
+
+    def _take_answer(self, command: Any) -> None:
+        if stamp_of(command) >= self.driver.stamp:
+            self._clock.advance()
+
+    @property
+    def driver(self) -> Any:
+        return self.nodes["driver"].driver
+
+    @property
+    def fault(self) -> str:
+        return str(self.driver.safety.fault)
+
+    def wait_periods(self, count: int) -> None:
+        begin = self.driver.stamp
+        self.ros.wait(lambda: self.driver.stamp >= begin + count * MS, what="periods")
+
+    def enable(self) -> None:
+        """Until currents have flowed for a while; a node that was frozen may need several tries."""
+        node = self.nodes["driver"]
+        self.ros.wait(lambda: node._started and not node._ports.absent and not self.driver_is_new(), what="all nodes")
+        for _ in range(50):
+            self.wait_periods(100)
+            self.driver.reset_fault()
+            node._announce()
+            answer = node._enable(type("Request", (), {"data": True}))
+            node._announce()
+            self.wait_periods(100)
+            if answer.success and not self.fault:
+                return
+        pytest.fail(f"not enabled: {answer.message} {self.fault}")
+
+    def driver_is_new(self) -> bool:
+        return bool(self.nodes["driver"]._session.silent)
+
+    def freeze(self, name: str) -> int:
+        """Let a node do nothing any more, as SIGSTOP does, while its messages wait; the time of the arm then, ns."""
+        for subscription in self.nodes[name].subscriptions:
+            waiting: list[Any] = []
+            self._frozen.append((subscription, subscription.callback, waiting))
+            subscription.callback = waiting.append
+        return int(self.driver.stamp)
+
+    def thaw(self) -> None:
+        """Let the node go on with what has waited."""
+        for subscription, callback, waiting in self._frozen:
+            subscription.callback = callback
+            for message in waiting:
+                callback(message)
+        self._frozen.clear()
+
+    def last_flow(self) -> int:
+        """Arm time of the last state with a current, ns."""
+        return max(sample.stamp for sample in self.driver.recent if any(sample.actual))
+
+
+LOST = {
+    "transform": "transform has stopped",
+    "gravity": "gravity has stopped",
+    "force_loop": "force_loop has stopped",
+    "contact_estimator": "contact_estimator has stopped",
+    "velocity_loop": "check that velocity_loop runs",
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
+    name: str, ros: RosWorld, tmp_path: Path
+) -> None:
+    feedback = {"force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
+    stack = Stack(ros, tmp_path, "realtime", **(feedback if name == "contact_estimator" else {}))
+    frozen = stack.freeze(name)
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    stack.wait_periods(100)
+    stack.thaw()
+    assert LOST[name] in stack.fault
+    assert stack.last_flow() - frozen <= LIMIT
+    assert stack.driver.currents == [0.0] * 4
+    stack.enable()
+
+
+def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_with_it(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    stack = Stack(ros, tmp_path, "lockstep")
+    stack.freeze("gravity")
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert "lockstep: no motor_current_command for the state of" in stack.fault
+    assert "gravity has stopped or is very slow, start it again, then reset_fault" in stack.fault
+    stack.thaw()
+    stack.wait_periods(10)
+    stack.enable()
+
+
+def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "lockstep")
+    node = stack.nodes["force_loop"]
+    publish, node._publish = node._publish, lambda stamp, outputs: None
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert "force_loop runs, but did not publish joint_effort_command and joint_velocity_command" in stack.fault
+    assert "velocity_loop" not in stack.fault
+    stack.driver.reset_fault()
+    answer = stack.nodes["driver"]._enable(type("Request", (), {"data": True}))
+    assert "force_loop runs, but did not publish" in answer.message
+    node._publish = publish
+    stack.enable()
+
+
+def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "lockstep")
+    row = BY_NAME["status"]
+    forger = ros.node("forger").create_publisher(message_type(row), row.name, qos(row))
+    ros.wait(lambda: forger.get_subscription_count() >= len(stack.nodes), what="listeners")
+    forged = NodeStatus(Level.OK, "braked", "driver", mode="braked", session=999, since=1, stamp=1)
+    forger.publish(diagnostic_status(forged, "wam"))
+    followers = [node for name, node in stack.nodes.items() if name != "driver"]
+    ros.wait(lambda: all(node._ports.session == 999 for node in followers), what="the forged status")
+    stack.wait_periods(300)
+    assert stack.fault == ""
+
+
+def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: RosWorld, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "realtime")
+    ros.wait(lambda: stack.nodes["gravity"]._is_enabled)
+    stack.nodes["gravity"].end()
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert "gravity has ended; start it again, then reset_fault" in stack.fault
+
+
+@pytest.mark.parametrize(
+    ("topic", "names"),
+    [
+        ("joint_states", "/wam/intruder and /wam/transform publish joint_states"),
+        ("motor_states", "/wam/driver and /wam/intruder publish motor_states"),
+    ],
+)
+def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: RosWorld, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "lockstep")
+    row = BY_NAME[topic]
+    other = ros.node("intruder")
+    second = other.create_publisher(message_type(row), topic, qos(row))
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert names in stack.fault
+    owners = ARM.motors.names if row.side == "motors" else ARM.joints.names
+    for ahead in (0, 5 * MS):
+        second.publish(joint_state(stack.driver.stamp + ahead, owners, State([0.5] * 4, [0.5] * 4, [0.5] * 4)))
+    other.destroy_publisher(second)
+    ros.wait(lambda: not any(node._ports.problem for node in stack.nodes.values()), what="one publisher each")
+    stack.enable()
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: RosWorld, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, mode)
+    before = stack.nodes["driver"]._session.number
+    ros.remove(stack.nodes["driver"])
+    stack.start_driver()
+    stack.enable()
+    assert stack.nodes["driver"]._session.number > before
+    assert all(node._ports.session > before for name, node in stack.nodes.items() if name != "driver")

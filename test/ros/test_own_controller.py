@@ -1,0 +1,821 @@
+"""A user's own controller, named in the configuration, runs in the simulation, over topics and in a replay."""
+
+import dataclasses
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_bag.bag import JointColumns, read
+from wam_control.task.scenario import ScenarioStep, load
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration, packaged
+from wam_description.defects import UnusableOutput, conversion
+from wam_description.interface import Interface, declared
+from wam_description.parameters import Nothing, ParameterError, build
+from wam_description.signals import ForceCommand, Level, NodeStatus, State, Table, Wrench
+from wam_description.synchroniser import Inputs
+from wam_description.topics import BY_NAME, JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
+from wam_description.wiring import Call, Input, Outputs, declaration, reaction
+from wam_sim.replay import replay
+from wam_sim.simulation import Simulation
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+STEPS = {
+    "steps": [
+        {"name": "release", "seconds": 0.1, "request": "enable"},
+        {
+            "name": "push",
+            "seconds": 0.3,
+            "push": {
+                "cover": "outer_link",
+                "contact_position": 0.4,
+                "newtons": [0.0, 20.0, 0.0],
+                "begin": 0.05,
+                "end": 0.25,
+            },
+        },
+    ]
+}
+
+
+@pytest.fixture
+def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Configuration:
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    (tmp_path / "script.yaml").write_text(yaml.safe_dump(STEPS))
+    configuration = Configuration.load(EXAMPLES / "impedance.yaml")
+    return configuration.with_values(
+        {
+            "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
+            "timing.timeout": 60.0,
+            "scenario:script": str(tmp_path / "script.yaml"),
+            "recorder:directory": str(tmp_path),
+            "recorder:name": "bag",
+        }
+    )
+
+
+@pytest.mark.slow
+def test_the_example_prints_how_far_the_tip_yields() -> None:
+    done = subprocess.run(
+        [sys.executable, "impedance.py"], cwd=EXAMPLES, capture_output=True, text=True, check=True, timeout=300
+    )
+    words = done.stdout.split()
+    assert float(words[6]) == pytest.approx(float(words[-2]), rel=0.15), done.stdout
+
+
+def test_an_own_controller_is_the_same_in_simulation_topics_and_replay(
+    configured: Configuration, tmp_path: Path, domain_id: int
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario: Any = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)
+        assert scenario.failure == ""
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
+    assert run.play() == ""
+    recorded = read(tmp_path / "bag").topics["/wam/joint_effort_command"]
+    assert isinstance(recorded, JointColumns)
+    simulated = np.array([row.values for row in run.rows["joint_effort_command"]])
+    assert np.abs(simulated).max() > 1.0, "zeros would show nothing"
+    assert simulated.tobytes() == np.ascontiguousarray(recorded.effort).tobytes()
+    assert replay(tmp_path / "bag", "impedance:Impedance").is_same
+
+
+class Echo:
+    """Publishes the torques of gravity on a topic of its own."""
+
+    name, parameters = "echo", Nothing
+    topics = (Topic("echo", JOINT_STATE, "outer", "the torques of gravity, N m", "joints"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {"echo": inputs["gravity_effort"]}
+
+
+def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    run = Simulation(configured, steps, controllers={"echo": Echo})
+    assert run.play() == ""
+    assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
+
+
+class Arrays:
+    """Takes the place of the example's controller: its torques as arrays of numpy, a velocity command as a tuple."""
+
+    name, parameters = "damping", Nothing
+    topics = (
+        Topic("strength", WRENCH, "outer", "of the torques, N m", ""),
+        Topic("rows", TABLE, "outer", "the same", columns=("torque",)),
+        Topic("taken_by_nobody", JOINT_STATE, "outer", "the same", "joints"),
+    )
+    kind: Any = staticmethod(np.array)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(
+        Input("joint_states", "velocity"),
+        outputs=("joint_velocity_command", "joint_effort_command", "strength", "rows", "taken_by_nobody"),
+    )
+    def step(self, inputs: Inputs) -> Outputs:
+        torques = self.kind([-3.0 * v for v in inputs["joint_states"].velocity])
+        return {
+            "joint_velocity_command": State((), (), ()),  # type: ignore[arg-type]
+            "joint_effort_command": State(self.kind([]), self.kind([]), torques),
+            "strength": Wrench("base", self.kind([0.0, 0.0, sum(torques)]), self.kind([0.0] * 3)),
+            "rows": Table("base", self.kind([[torque] for torque in torques])),
+            "taken_by_nobody": State(self.kind([]), self.kind([math.nan] * 4), torques),
+        }
+
+
+class Lists(Arrays):
+    """The same as lists."""
+
+    kind = staticmethod(list)
+
+
+class Takes(Echo):
+    """Takes what they publish, so that it is looked at."""
+
+    name = "takes"
+    topics = ()
+
+    @reaction(Input("strength"), Input("rows"), outputs=())
+    def step(self, inputs: Inputs) -> Outputs:
+        assert type(inputs["strength"].force) is tuple
+        assert type(inputs["rows"].rows[0][0]) is float
+        return {}
+
+
+def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(configured: Configuration, tmp_path: Path) -> None:
+    own = {"nodes": [node for node in configured.shared.nodes if ":" not in node]}
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    runs = [
+        Simulation(configured.with_values(own), steps, {"damping": kind, "takes": Takes}) for kind in (Arrays, Lists)
+    ]
+    assert [run.play() for run in runs] == ["", ""]
+    assert np.abs([row.values for row in runs[0].rows["joint_effort_command"]]).max() > 0.01, "zeros would show nothing"
+    assert repr(runs[0].rows) == repr(runs[1].rows), "as text, in which NaN equals NaN"
+
+
+@pytest.mark.parametrize(
+    ("output", "text"),
+    [
+        (
+            {"joint_effort_command": State([], [], [float("nan")] * 4)},
+            "returned an unusable joint_effort_command: effort of",
+        ),
+        (
+            {"nowhere": None},
+            "node 'damping' returned the topic 'nowhere'; its reactions declare joint_velocity_command",
+        ),
+    ],
+)
+def test_what_a_node_answers_to_a_status_is_looked_at_in_a_direct_run(
+    output: dict[str, Any], text: str, configured: Configuration, tmp_path: Path
+) -> None:
+    class Answering(Lists):
+        def take_status(self, status: NodeStatus) -> Outputs:
+            return output
+
+    own = {"nodes": [node for node in configured.shared.nodes if ":" not in node]}
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    with pytest.raises(ValueError, match=text):
+        Simulation(configured.with_values(own), steps, {"damping": Answering}).play()
+
+
+class Misspelt:
+    """Publishes on a topic that is in no table."""
+
+    name, parameters = "misspelt", Nothing
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("joint_states", "position"), outputs=("joint_posture_comand",))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {}
+
+
+def test_a_misspelt_topic_is_refused_with_the_one_that_is_meant(configured: Configuration) -> None:
+    text = r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class"
+    with pytest.raises(ParameterError, match=text):
+        Interface(configured.shared, {"misspelt": Misspelt})
+
+
+@pytest.mark.parametrize(
+    ("row", "text"),
+    [
+        (
+            Topic("echo", "sensor_msgs/JointState", "outer", "N m", "joints"),
+            "topic 'echo': type is 'sensor_msgs/JointState'; allowed: 'sensor_msgs/msg/JointState', ",
+        ),
+        (Topic("echo", JOINT_STATE, "200 Hz", "N m", "joints"), "topic 'echo': rate is '200 Hz'; allowed: 'inner', "),
+        (Topic("echo", JOINT_STATE, "outer", "N m"), "topic 'echo': side is ''; allowed: 'motors', 'joints'"),
+        (Topic("echo", WRENCH, "outer", "N", "joints"), "topic 'echo': side is 'joints'; allowed: ''"),
+        (Topic("echo", TABLE, "outer", "N"), "topic 'echo': columns are (); name its columns"),
+    ],
+)
+def test_a_topic_of_its_own_that_cannot_be_is_refused_with_what_is_allowed(
+    row: Topic, text: str, configured: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the declaration, so in a direct run and over topics alike."""
+
+    class Other(Echo):
+        topics = (row,)
+
+    with pytest.raises(TypeError) as refusal:
+        Simulation(configured, [ScenarioStep("wait", 0.1)], controllers={"echo": Other})
+    assert str(refusal.value).startswith(text)
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(Echo, "topics", (row,))
+    with pytest.raises(ParameterError, match="node 'own_nodes:Echo': topic 'echo': "):
+        declared("own_nodes:Echo")
+
+
+def test_the_rows_of_the_nodes_of_the_stack_are_of_types_and_rates_that_exist() -> None:
+    for row in TOPICS:
+        if row.type in OF_OWN_NODES:
+            row.check()
+
+
+def test_lockstep_waits_for_a_topic_only_where_the_configured_nodes_stream_it(configured: Configuration) -> None:
+    interface = Interface(configured.shared)
+    assert interface.publishers("joint_effort_command") == ["impedance"]
+    assert interface.is_streamed("motor_velocity_command")
+    without = dataclasses.replace(configured.shared, nodes=("driver", "transform", "velocity_loop", "gravity"))
+    assert not Interface(without).is_streamed("motor_velocity_command")
+    assert Interface(without).is_streamed("motor_effort_command")
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("gravitation", "no node is named 'gravitation'; nodes: driver, transform"),
+        ("no_such_package:Class", "check that 'no_such_package' is installed or on PYTHONPATH"),
+        ("impedance:ImpedanceParameters", "is no node: name and parameters"),
+    ],
+)
+def test_a_node_that_is_none_is_refused_by_name(entry: str, text: str, configured: Configuration) -> None:
+    with pytest.raises(ParameterError, match=text):
+        declared(entry)
+
+
+class Raising(Echo):
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        raise KeyError("stiff\nness")
+
+
+def test_a_controller_whose_constructor_raises_is_named_with_its_line(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    with pytest.raises(ParameterError) as refusal:
+        Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Raising})
+    text = str(refusal.value)
+    assert text.startswith(f"node 'echo' cannot be made: {__name__}:Raising raised KeyError: ")
+    assert f", at {__file__}:" in text
+    assert text.endswith("; correct its __init__")
+    assert "\n" not in text
+
+
+def test_a_module_that_raises_at_its_import_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "broken_module.py").write_text("gain = 1 +\n")
+    with pytest.raises(ParameterError, match=r"node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"):
+        declared("broken_module:Any")
+
+
+def test_a_reaction_without_outputs_is_named_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The faulty one, though another class of the module is configured; also where a check of an input refuses."""
+    lines = "from wam_description.wiring import Input, reaction\nclass Other:\n    "
+    for name, faulty in (
+        ("no_outputs", '@reaction(Input("joint_states"))'),
+        ("odd", '@reaction(Input("q", "p"), outputs=())'),
+    ):
+        (tmp_path / f"{name}.py").write_text(f"{lines}{faulty}\n    def step(self, inputs): ...\nclass Mine: ...\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        with pytest.raises(ParameterError, match=rf"node '{name}:Mine' cannot be imported: TypeError: .*{name}\.py:3"):
+            declared(f"{name}:Mine")
+
+
+def test_an_output_of_a_reaction_that_declares_none_is_refused_with_what_to_write() -> None:
+    class Forgot(Echo):
+        @reaction(Input("gravity_effort", "effort"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"echo": None}
+
+    text = r"its reactions declare nothing; write outputs=\('echo',\) in @reaction"
+    with pytest.raises(ValueError, match=text):
+        declaration(Forgot).require_declared({"echo": None})
+
+
+def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(configured: Configuration) -> None:
+    node: Any = declared("impedance:Impedance").node
+    loop = node(configured.shared, configured.node("impedance", node.parameters))
+    joints = State([0.0, -1.2, 0.0, 0.9], [0.0] * 4, [])
+
+    def effort(stamp: int, posture: list[float]) -> Any:
+        taken = {"joint_states": (stamp, joints), "joint_posture_command": (stamp, State(posture, [], []))}
+        return loop.step(Inputs.of(stamp, 0.005, taken))["joint_effort_command"]
+
+    good = effort(5_000_000, [0.0, -1.3, 0.0, 0.9])
+    assert loop.refusals == {}
+    assert effort(10_000_000, [0.0, 9.0, 0.0, 0.9]) == good
+    assert "joint2 is to be at 9 rad; allowed: " in loop.refusals["joint_posture_command"]
+
+
+def test_a_topic_that_is_in_no_table_is_refused(configured: Configuration) -> None:
+    class Lost(Echo):
+        name, topics = "lost", ()
+
+        @reaction(Input("gravity_effort", "effort"), outputs=("nowhere",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    assert declaration(Lost).outputs == ("nowhere",)
+    with pytest.raises(ParameterError, match="node 'lost' names the topic 'nowhere'"):
+        Interface(configured.shared, {"lost": Lost})
+
+
+def test_a_fault_of_the_driver_ends_the_task_in_the_simulation_too(configured: Configuration, tmp_path: Path) -> None:
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
+    while run.driver.stamp < 150_000_000:
+        assert not run.step()
+    run.driver.estop()
+    assert run.play() == "the driver stopped in step 'push': emergency stop"
+
+
+def test_two_nodes_that_publish_one_command_are_refused(configured: Configuration) -> None:
+    both = dataclasses.replace(configured.shared, nodes=(*configured.shared.nodes, "force_loop"))
+    with pytest.raises(ParameterError, match="'joint_velocity_command' has 2 publishers, impedance, force_loop"):
+        Interface(both)
+    twice = dataclasses.replace(
+        configured.shared, nodes=("driver", "gravity", "wam_control.velocity.gravity_node:GravityNode")
+    )
+    with pytest.raises(ParameterError, match="two nodes of the configuration are named 'gravity'"):
+        Interface(twice)
+
+
+def test_a_subclass_keeps_the_reactions_of_its_parent() -> None:
+    class Louder(Echo):
+        name = "louder"
+
+    assert declaration(Louder).reactions == declaration(Echo).reactions
+
+
+def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(configured: Configuration, tmp_path: Path) -> None:
+    class Typing(Echo):
+        @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"ecko": inputs["gravity_effort"]}
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Typing})
+    with pytest.raises(ValueError, match="node 'echo' returned the topic 'ecko'; its reactions declare echo"):
+        run.play()
+
+
+def test_a_reaction_sees_the_arrays_that_it_takes_and_no_others(configured: Configuration, tmp_path: Path) -> None:
+    seen = []
+
+    class Watching(Echo):
+        @reaction(Input("joint_states", "position"), outputs=("echo",))
+        def step(self, inputs: Inputs) -> Outputs:
+            seen.append(inputs["joint_states"])
+            return {}
+
+    Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Watching}).step()
+    assert [len(array) for array in seen[0]] == [4, 0, 0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wam", "barrett-wam4", "testbed", "torque-loop", "position-loop"])
+def test_the_nodes_of_the_stack_read_no_array_that_they_do_not_declare(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configuration = Configuration.load(packaged(name))
+    force = ForceCommand("base", (0.0, 5.0, 0.0))
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("press", 0.3, force=force)]
+    plain = Simulation(configuration, steps)
+    monkeypatch.setattr("wam_sim.bus.is_packaged", lambda declaration: False)
+    masked = Simulation(configuration, steps)
+    assert plain.play() == masked.play() == ""
+    is_same = repr(plain.rows) == repr(masked.rows)  # not in the assertion: pytest would compare the texts for minutes
+    assert is_same
+
+
+def test_currents_that_are_not_finite_are_refused_by_name(configured: Configuration, tmp_path: Path) -> None:
+    class Broken:
+        name, parameters = "velocity_loop", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+        @reaction(Input("motor_states"), outputs=("motor_current_command",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"motor_current_command": State([], [], [float("nan")] * 4)}
+
+    steps = load(tmp_path / "script.yaml", configured.shared)
+    own = {name: value for name, value in configured.sections.items() if name != "velocity_loop"}
+    run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
+    text = r"node 'velocity_loop' returned an unusable motor_current_command: effort of motor1 is nan; send finite"
+    with pytest.raises(UnusableOutput, match=text):
+        run.play()
+
+
+@pytest.mark.parametrize("velocity", [None, State([], [], []), State([], [0.1] * 4, [])])
+def test_torque_without_a_velocity_command_does_not_move_the_arm_and_is_warned_of_once(
+    velocity: State | None, configured: Configuration, caplog: pytest.LogCaptureFixture
+) -> None:
+    commands = {"joint_effort_command": State([], [], [3.0, 0.0, 0.0, 0.0])}
+    if velocity is not None:
+        commands["joint_velocity_command"] = velocity
+
+    class Torque(Echo):
+        name, topics = "torque", ()
+
+        @reaction(Input("joint_states", "position"), outputs=tuple(commands))
+        def step(self, inputs: Inputs) -> Outputs:
+            return commands
+
+    alone = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.4)]
+    run = Simulation(alone, steps, {"torque": Torque})
+    assert run.play() == ""
+    texts = caplog.messages
+    moved = abs(run.rows["joint_states"][-1].values[0])
+    if velocity is None:
+        assert moved < 0.01
+        assert [
+            text.startswith("warning: transform: joint_effort_command has no lasting effect") for text in texts
+        ] == [True]
+        assert "empty velocity to command torque alone: State([], [], [])" in texts[0]
+    else:
+        assert moved > 0.02
+        assert texts == []
+
+
+NAN = float("nan")
+
+
+class Careless(Echo):
+    """Returns in place of the force loop what the test gives it."""
+
+    name, topics, given = "careless", (), State([], [], [])
+
+    @reaction(Input("joint_states", "position"), outputs=("joint_velocity_command", "joint_effort_command"))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {"joint_velocity_command": State([], [], []), "joint_effort_command": self.given}
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (State([], [], [0.0, NAN, 0.0, 0.0]), "effort of joint2 is nan; send finite numbers"),
+        (State([], [], [0.0, 0.0, 1e13, -1e13]), "effort of joint3 is 1e+13; no arm reaches that, send at most 1e+12"),
+        (State([], [], [0.0] * 3), "effort has 3 values; send 4, one for each of joint1, joint2, joint3, joint4"),
+        (State([], [], []), "effort has 0 values; send 4, one for each of joint1, joint2, joint3, joint4"),
+        (State([], [0.0] * 3, [0.0] * 4), "velocity has 3 values; send 4, one for each of joint1"),
+        ([0.0] * 4, "[0.0, 0.0, 0.0, 0.0] is no State; return one"),
+        (State([], [], ["a"] * 4), "cannot be sent: effort has 'a'; return floats"),  # type: ignore[list-item]
+        (State([], [], [True] * 4), "cannot be sent: effort has True; return floats"),
+        (State([], [], np.full(4, True)), "cannot be sent: effort has np.True_; return floats"),  # type: ignore[arg-type]
+        (State([], [], b"abcd"), "cannot be sent: effort is b'abcd'; return a list of floats"),  # type: ignore[arg-type]
+        (State([], [], memoryview(b"abcd")), "cannot be sent: effort is <memory at"),  # type: ignore[arg-type]
+        (State([], [], {1.0}), "cannot be sent: effort is {1.0}; return a list of floats"),  # type: ignore[arg-type]
+        (State([], [], None), "cannot be sent: effort is None; return a list of floats"),  # type: ignore[arg-type]
+    ],
+)
+def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
+    given: Any, text: str, configured: Configuration, tmp_path: Path
+) -> None:
+    class One(Careless):
+        pass
+
+    One.given = given
+    with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    run = Simulation(with_own, load(tmp_path / "script.yaml", configured.shared), {"careless": One})
+    with pytest.raises(UnusableOutput) as refusal:
+        run.play()
+    assert str(refusal.value).startswith("node 'careless' returned an unusable joint_effort_command: ")
+    assert text in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("topic", "given", "text"),
+    [
+        ("joint_effort_command", State([], [], "1234"), "effort is '1234'; return a list of floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", State([], [], np.array(["1"])), "effort has np.str_('1'); return floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", State([], [], np.array([1j])), "effort has np.complex128(1j); return floats"),  # type: ignore[arg-type]
+        ("joint_effort_command", ([], [], [0.0]), "([], [], [0.0]) is no State; return one"),
+        ("force_command", Wrench("base", {1.0, 2.0, 3.0}, (0.0,) * 3), "force is {1.0, 2.0, 3.0}; return a list"),  # type: ignore[arg-type]
+        ("force_command", Wrench(b"base", (0.0,) * 3, (0.0,) * 3), "frame is b'base'; return a text"),  # type: ignore[arg-type]
+        ("task_command", Table("base", {(1.0,)}), "rows is {(1.0,)}; return a list of rows"),  # type: ignore[arg-type]
+        ("task_command", Table("base", [b"ab"]), "a row is b'ab'; return a list of floats"),  # type: ignore[arg-type]
+    ],
+)
+def test_an_output_that_no_other_node_takes_is_refused_where_it_holds_no_numbers(
+    topic: str, given: Any, text: str
+) -> None:
+    """It was published as other numbers than those that were returned, or in an order that nobody chose."""
+    with pytest.raises(UnusableOutput) as refusal:
+        conversion("careless", BY_NAME[topic])(given)
+    assert str(refusal.value).startswith(f"node 'careless' returned an unusable {topic}: ")
+    assert text in str(refusal.value)
+
+
+def test_a_controller_that_returns_nothing_is_named_in_the_simulation_too(configured: Configuration) -> None:
+    class Silent(Careless):
+        name = "silent"
+
+        @reaction(Input("joint_states", "position"), outputs=("joint_velocity_command", "joint_effort_command"))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.3)]
+    run = Simulation(with_own, steps, {"silent": Silent})
+    run.play()
+    fault = run.driver.safety.fault
+    assert fault.startswith("command stale"), fault
+    assert "silent runs, but did not publish joint_effort_command and joint_velocity_command: let each of" in fault
+
+
+def without(configuration: Configuration, node: str) -> Configuration:
+    """The same nodes but one."""
+    return configuration.with_values({"nodes": [name for name in configuration.shared.nodes if name != node]})
+
+
+def silent_after(node: Any, steps: int) -> Any:
+    """A node of the stack that returns nothing any more after so many steps."""
+
+    class Silent(node):  # type: ignore[misc]
+        count = 0
+
+        @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
+        def step(self, inputs: Inputs) -> Outputs:
+            self.count += 1
+            return super().step(inputs) if self.count <= steps else {}
+
+    return Silent
+
+
+class Inner:
+    """Commands the joints, which is of the outer rate, in answer to each motor state."""
+
+    name, parameters, waits = "inner", Nothing, False
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self._timing = shared.timing
+
+    @reaction(Input("motor_states", "position"), outputs=("joint_velocity_command",))
+    def step(self, inputs: Inputs) -> Outputs:
+        is_left_out = self.waits and not self._timing.is_outer(inputs.stamp)
+        return {} if is_left_out else {"joint_velocity_command": State([], [0.0] * 4, [])}
+
+
+class Thinned(Inner):
+    """The same once per outer period."""
+
+    @reaction(Input("motor_states", "position"), outputs=("joint_velocity_command",), thinned=True)
+    def step(self, inputs: Inputs) -> Outputs:
+        return super().step(inputs)
+
+
+class Waiting(Inner):
+    """The same, which leaves the command out between the outer periods."""
+
+    waits = True
+
+
+def test_a_topic_of_the_outer_rate_between_two_outer_periods_is_refused_with_the_node_that_returned_it() -> None:
+    """Four of five of these commands were dropped by the nodes that take them."""
+    wam, steps = without(Configuration.load(packaged("wam")), "force_loop"), [ScenarioStep("wait", 0.1)]
+    text = "node 'inner' returned an unusable joint_velocity_command: it is of the outer rate, .* write thinned=True"
+    with pytest.raises(UnusableOutput, match=text):
+        Simulation(wam, steps, {"inner": Inner}).play()
+    for kind in (Thinned, Waiting):
+        run = Simulation(wam, steps, {"inner": kind})
+        assert run.play() == ""
+        stamps = [[row.stamp for row in run.rows[name]] for name in ("joint_velocity_command", "joint_states")]
+        assert stamps[0] == stamps[1] != []
+
+
+def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
+    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Inner"]
+    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.safety.fault)
+        assert driver.driver.safety.fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
+
+
+@pytest.mark.parametrize("steps", [0, 50, 300])
+def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
+    steps: int,
+) -> None:
+    """The nodes that wait for it refuse what the others send, and the driver brakes, as over topics."""
+    wam = Configuration.load(packaged("wam"))
+    silent = silent_after(declared("gravity").node, steps)
+    plan = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("wait", 2.0)]
+    run = Simulation(without(wam, "gravity"), plan, {"my_gravity": silent})
+    failure = run.play()
+    assert "my_gravity runs, but did not publish gravity_effort: let each of its steps return that" in failure
+    assert run.driver.safety.fault in failure
+
+
+def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason() -> None:
+    class Silent:
+        name, parameters = "my_transform", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+        @reaction(Input("motor_states", "position"), outputs=("joint_states",), thinned=True)
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    wam = Configuration.load(packaged("wam"))
+    run = Simulation(without(wam, "transform"), [ScenarioStep("wait", 0.3)], {"my_transform": Silent})
+    text = "the scenario gets no joint_states for .*; my_transform runs, but did not publish joint_states: let each"
+    with pytest.raises(ValueError, match=text):
+        run.play()
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (State([], [], [NAN] * 4), "unusable joint_effort_command: effort of joint1 is nan; send finite numbers"),
+        (State([], [], [0.0] * 3), "unusable joint_effort_command: effort has 3 values; send 4, one for each of"),
+    ],
+)
+def test_over_topics_the_fault_names_the_node_and_its_unusable_output(
+    given: State, text: str, configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(Careless, "given", given)
+    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Careless"]
+    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.safety.fault)
+        assert driver.driver.safety.fault.startswith(f"careless: {text}")
+
+
+def test_an_array_in_the_place_of_another_argument_of_an_input_is_refused() -> None:
+    with pytest.raises(TypeError, match=r"delayed must be True or False; .*'joint_states', 'position velocity"):
+        reaction(Input("joint_states", "position", "velocity"), outputs=())  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="arrays has 'speed'; allowed: effort, "):
+        reaction(Input("joint_states", "position speed"), outputs=())
+    with pytest.raises(TypeError, match="absent has 'stop'; allowed: brake, hold, zero"):
+        reaction(Input("joint_states", absent="stop"), outputs=())
+
+
+class Requesting(Echo):
+    """Requests what nobody serves, or what the test gives it, with a new list of requests every time."""
+
+    name, topics = "requesting", ()
+    given: tuple[Call, ...] = (Call("nobody", "help"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self.requests: list[Call] = []
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("joint_torque_command",))
+    def step(self, inputs: Inputs) -> Outputs:
+        self.requests = list(self.given)
+        return {"joint_torque_command": inputs["gravity_effort"]}
+
+
+def test_without_an_answer_to_refusals_a_refused_step_publishes_nothing(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"requesting": Requesting})
+    for _ in range(20):
+        run.step()
+    assert len(run.rows["gravity_effort"]) == 4
+    assert "joint_torque_command" not in run.rows
+
+
+def test_requests_in_a_new_list_are_made(configured: Configuration, tmp_path: Path) -> None:
+    class Stopping(Requesting):
+        given = (Call("driver", "estop"),)
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"requesting": Stopping})
+    run.step()
+    assert run.driver.safety.fault == "emergency stop"
+
+
+class Twice:
+    """Two reactions to one topic; what each does is noted, with numbers where text is usual."""
+
+    name, parameters = "twice", Nothing
+    topics = (Topic("first", JOINT_STATE, "outer", "position, rad", "joints"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self.done: list[str] = []
+
+    @reaction(Input("joint_states", "position"), outputs=("first",))
+    def one(self, inputs: Inputs) -> Outputs:
+        self.done.append(f"one {[len(array) for array in inputs['joint_states']]}")
+        return {
+            "first": State(inputs["joint_states"].position, [], []),
+            "status": NodeStatus(Level.OK, "at work", facts={"steps": len(self.done)}),  # type: ignore[dict-item]
+        }
+
+    @reaction(Input("joint_states", "velocity"), outputs=())
+    def two(self, inputs: Inputs) -> Outputs:
+        self.done.append(f"two {[len(array) for array in inputs['joint_states']]}")
+        return {}
+
+    @reaction(Input("first", "position"), outputs=())
+    def three(self, inputs: Inputs) -> Outputs:
+        self.done.append("three")
+        return {}
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"steps": len(self.done) / 2.0}
+
+
+def test_reactions_to_one_topic_work_in_the_order_of_their_declaration_everywhere(
+    configured: Configuration, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"twice": Twice})
+    for _ in range(11):
+        run.step()
+    order = ["one [4, 0, 0]", "two [0, 4, 0]", "three"]
+    assert run.nodes["twice"].done == 3 * order
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Twice"]})
+    with Composition(over_topics, domain_id=domain_id) as composition:
+        twice: Any = composition.nodes["twice"]
+        composition.spin(lambda: len(twice.node.done) >= 30)
+        subscribers = [info.node_name for info in twice.get_subscriptions_info_by_topic("/wam/joint_states")]
+    done = [word for word in twice.node.done if word != "three"]
+    assert done == (order[:2] * len(done))[: len(done)]
+    assert subscribers.count("twice") == 1
+
+
+def test_a_list_of_another_length_is_refused_by_name(configured: Configuration) -> None:
+    with pytest.raises(ParameterError, match="parameter 'stiffness' has 2 values; it needs 3"):
+        build(declared("impedance:Impedance").parameter_class, {"stiffness": [1.0, 2.0], "damping": [1.0, 2.0, 3.0]})
+
+
+def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
+    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from wam_ros import node as adapter
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(adapter, "PATIENCE", 0.0)
+    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Requesting"]})
+    said = []
+    with Composition(over_topics, domain_id=domain_id) as composition:
+        composition.spin(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))
+    assert "waiting for the service nobody/help; start the node 'nobody'" in "".join(said)
+
+
+def test_topics_that_answer_each_other_in_a_circle_are_not_streamed(configured: Configuration) -> None:
+    ping = Topic("ping", JOINT_STATE, "outer", "torque, N m", "joints")
+    pong = ping._replace(name="pong")
+
+    class Ping(Echo):
+        name, topics = "ping", (ping, pong)
+
+        @reaction(Input("pong", "effort"), outputs=("ping",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    class Pong(Echo):
+        name, topics = "pong", ()
+
+        @reaction(Input("ping", "effort"), outputs=("pong",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    class Started(Pong):
+        @reaction(Input("gravity_effort", "effort"), outputs=("pong",))
+        def begin(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    circle = Interface(configured.shared, {"ping": Ping, "pong": Pong})
+    assert not circle.is_streamed("ping")
+    assert not circle.is_streamed("pong")
+    started = Interface(configured.shared, {"ping": Ping, "pong": Started})
+    assert started.is_streamed("ping")
+    assert started.is_streamed("pong")

@@ -1,0 +1,838 @@
+"""Processes and signals: whatever ends the stack, the brakes go on, the bag is closed, nothing is left behind."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import LONG, soon
+from rclpy.context import Context
+
+from wam_bag.bag import read
+from wam_cli.main import COMMANDS, main
+from wam_description.configuration import Configuration, packaged
+from wam_description.nodes import GROUPED
+from wam_description.topics import BY_NAME
+from wam_ros import bring_up
+from wam_ros.bring_up import Processes
+from wam_ros.leaving import HELD_UP as HELD_UP_BY
+from wam_ros.leaving import bound_leaving, leaving
+from wam_ros.qos import qos
+
+ROOT = Path(__file__).parents[2]
+NODES = 7  # six and the recorder
+BOLD = ("--set", "driver:late_periods=1.0")  # a busy machine is no obstacle
+
+
+def wait(until: Callable[[], Any], what: str, timeout: float = LONG) -> None:
+    """Wait until something is true; the test fails where it takes too long."""
+    end = time.monotonic() + timeout
+    while not until():
+        assert time.monotonic() < end, f"not within {timeout} s: {what}"
+        time.sleep(0.02)
+
+
+class Stack:
+    """A command of ours in a process of its own, found again with all it started by a word in its environment."""
+
+    def __init__(self, folder: Path, *command: str, **environment: str) -> None:
+        self.mark = f"WAM_STACK_TEST={folder}"
+        self.output = folder / "output.txt"
+        everything = {**os.environ, "PYTHONPATH": str(ROOT), "WAM_STACK_TEST": str(folder), **environment}
+        with self.output.open("w") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, *command], stdout=output, stderr=output, cwd=folder, env=everything
+            )
+
+    def alive(self) -> list[int]:
+        """Processes that carry the mark, zombies left out."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError):
+                if (
+                    entry.name.isdigit()
+                    and self.mark.encode() in (entry / "environ").read_bytes().split(b"\0")
+                    and (entry / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+                ):
+                    found.append(int(entry.name))
+        return found
+
+    def said(self) -> str:
+        return self.output.read_text()
+
+    def end(self) -> None:
+        """Kill what a failed test has left."""
+        for pid in self.alive():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Callable[..., Stack]]:
+    stacks: list[Stack] = []
+
+    def start(*command: str, **environment: str) -> Stack:
+        stacks.append(Stack(tmp_path, *command, **environment))
+        return stacks[-1]
+
+    yield start
+    for stack in stacks:
+        stack.end()
+
+
+def soon_delivered() -> float:
+    """The same for processes: first the driver, then the others wait until listeners have their last messages."""
+    from wam_ros.run import LONGEST_DELIVERY
+
+    return 2.0 * LONGEST_DELIVERY + soon()
+
+
+def up(started: Callable[..., Stack], *arguments: str) -> Stack:
+    """The whole stack and a recorder, running, with a bag that grows."""
+    stack = started("-m", "wam_cli.main", "up", "--record", *arguments)
+    wait(lambda: recorded(stack) > 400_000, f"a bag that grows; {stack.said()}")
+    in_groups = GROUPED in arguments or "--realtime" in arguments
+    others = 3 if in_groups else NODES if "--processes" in arguments else 0
+    assert len(stack.alive()) == others + 1
+    return stack
+
+
+def recorded(stack: Stack) -> int:
+    return sum(file.stat().st_size for file in stack.output.parent.glob("bags/*/*.mcap"))
+
+
+def statuses(folder: Path, node: str) -> list[str]:
+    """What a node said of its state, from the only bag of a folder."""
+    (bag,) = (folder / "bags").iterdir()
+    assert (bag / "metadata.yaml").is_file(), "the bag is closed"
+    status: Any = read(bag).topics["/wam/status"]
+    return [message.message for message in status.messages if message.name == node]
+
+
+def enable(ros: Any, stack: Stack) -> None:
+    """Release the brakes, and wait until the driver's status has come: it is latched, and the next one replaces it."""
+    from diagnostic_msgs.msg import DiagnosticStatus
+    from std_srvs.srv import SetBool
+
+    node = ros.node("asker")
+    seen: list[str] = []
+    node.create_subscription(
+        DiagnosticStatus, "status", lambda message: seen.append(message.message), qos(BY_NAME["status"])
+    )
+    client = node.create_client(SetBool, "driver/enable")
+    ros.wait(client.service_is_ready)
+    while True:
+        future = client.call_async(SetBool.Request(data=True))
+        ros.wait(future.done, what=f"an answer; {stack.said()}")
+        if future.result().success:
+            break
+        assert "no motor_current_command comes in" in future.result().message
+    ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
+
+
+ASK_THE_COLLECTOR = """
+import gc
+from rclpy.node import Node
+from wam_ros.run import run
+
+class Asker(Node):
+    def __init__(self, context, namespace):
+        super().__init__("asker", context=context, namespace=namespace)
+
+    @property
+    def done(self):  # asked while it spins
+        print(gc.get_freeze_count(), len(gc.get_objects()))
+        return True
+
+run({"asker": Asker})
+"""
+
+
+def test_the_collector_passes_over_what_is_there_when_a_node_begins_to_spin(started: Any, ros: Any) -> None:
+    # it would take 0.1 s, and the others would brake the arm for a node that is late
+    stack = started("-c", ASK_THE_COLLECTOR)
+    assert stack.process.wait(LONG) == 0, stack.said()
+    frozen, looked_at = map(int, stack.said().split())
+    assert looked_at < 0.02 * frozen
+
+
+@pytest.mark.parametrize(
+    ("number", "options"),
+    [
+        (signal.SIGINT, ()),
+        (signal.SIGTERM, ()),
+        (signal.SIGINT, ("--processes",)),
+        (signal.SIGTERM, ("--processes", GROUPED)),
+    ],
+)
+def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
+    number: signal.Signals, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
+) -> None:
+    stack = up(started, *options)
+    enable(ros, stack)
+    stack.process.send_signal(number)
+    wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon_delivered())
+    assert stack.alive() == []
+    assert stack.process.returncode == 0
+    assert "Traceback" not in stack.said()
+    assert "fault" not in stack.said(), "the brakes are on before a command ceases"
+    assert statuses(tmp_path, "driver")[-2:] == ["enabled", "braked"]
+
+
+@pytest.fixture
+def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Processes:
+    """A recorder as a process, with a bag that is open."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(bring_up, "PATIENCE", 0.2)
+    monkeypatch.setattr(bring_up, "TOLD", 0.2)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+    return processes
+
+
+def pid_of(processes: Processes, name: str) -> int:
+    return processes._processes[name].pid
+
+
+def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
+    recording: Processes, tmp_path: Path, capfd: Any
+) -> None:
+    pid = pid_of(recording, "recorder")
+    os.kill(pid, signal.SIGSTOP)
+    threading.Timer(1.5, os.kill, (pid, signal.SIGCONT)).start()  # much later than the patience with other nodes
+    recording.stop()
+    assert recording.killed == []
+    assert list(tmp_path.glob("bags/*/metadata.yaml"))
+    assert "waiting for the recorder to write the bag, " in capfd.readouterr().err
+
+
+def catches_sigterm(pid: int) -> bool:
+    status = Path("/proc", str(pid), "status").read_text()
+    return bool(int(status.split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1)
+
+
+@pytest.mark.parametrize("imports", [False, True])
+def test_a_recorder_that_is_told_to_end_before_it_has_a_bag_lacks_no_messages(
+    imports: bool, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    if imports:
+        wait(lambda: catches_sigterm(pid_of(processes, "recorder")), "the first import")
+        pid = pid_of(processes, "recorder")
+        os.kill(pid, signal.SIGSTOP)  # so that it has no bag yet however busy the machine is
+        threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
+    processes.stop()
+    assert (processes.bag_failure, processes.killed) == ("", [])
+    assert not list(tmp_path.glob("bags/*"))
+
+
+def test_a_recorder_that_is_ended_before_the_other_nodes_leaves_a_bag_that_is_not_whole(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["gravity", "recorder"]})) as processes:
+        wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+        os.kill(pid_of(processes, "recorder"), signal.SIGTERM)
+        assert processes.wait(bool) == {"recorder": 0}
+    assert processes.bag_failure.startswith("the recorder ended before the other nodes; the bag lacks")
+
+
+def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
+    recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr(bring_up, "RECORDER_PATIENCE", 0.5)
+    os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
+    recording.stop()
+    assert recording.killed == ["recorder"]
+    assert "node recorder is killed: it has done nothing for" in capfd.readouterr().err
+    (bag,) = tmp_path.glob("bags/*")
+    assert not (bag / "metadata.yaml").exists()
+    main_without_exit("bag", "repair", str(bag))
+    assert (bag / "metadata.yaml").is_file()
+
+
+HELD_UP = """
+import rclpy.node
+
+def destroy_node(self):
+    while True:
+        pass
+
+rclpy.node.Node.destroy_node = destroy_node
+"""
+
+
+def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_its_work(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HELD_UP)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+    monkeypatch.chdir(tmp_path)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+    processes.stop()
+    assert processes.killed == []
+    assert processes.bag_failure == ""
+    assert processes._processes["recorder"].returncode == -signal.SIGVTALRM
+    assert processes.ended() == {"recorder": 0}
+    assert list(tmp_path.glob("bags/*/metadata.yaml"))
+    printed = capfd.readouterr().err.splitlines()
+    assert not [line for line in printed if "WARN" in line and "waiting for the recorder" not in line]  # a busy machine
+
+
+def test_a_process_with_a_failure_ends_by_itself_so_that_its_code_reports_it() -> None:
+    context, before = Context(), signal.getsignal(HELD_UP_BY)
+    try:
+        for failure, is_bounded in (("nothing was touched", False), ("", True)):
+            bound_leaving(context, lambda failure=failure: failure)
+            with leaving(context):
+                assert (signal.getitimer(signal.ITIMER_VIRTUAL)[0] > 0.0) is is_bounded
+            assert signal.getitimer(signal.ITIMER_VIRTUAL)[0] == 0.0
+    finally:
+        signal.signal(HELD_UP_BY, before)
+
+
+def main_without_exit(*words: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 0
+
+
+def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> None:
+    def call(request: str) -> tuple[int, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "wam_cli.main", "call", request],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=LONG,
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    code, said = call("enable")
+    assert code == 1
+    assert "no service /wam/driver/enable" in said
+    assert "wam up" in said
+    up(started)
+    assert call("enable") == (0, "enabled: brakes released\n")
+    assert call("tare")[0] == 0
+    assert call("estop")[0] == 0
+    code, said = call("enable")
+    assert code == 1
+    assert "call reset_fault first" in said
+    assert call("reset_fault")[0] == 0
+    assert call("disable")[0] == 0
+
+
+def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, domain_id: int) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(packaged("wam").read_text().replace("nodes: [driver,", "nodes: [drver,"))
+    done = subprocess.run(
+        [sys.executable, "-m", "wam_cli.main", "up", "--config", str(path)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+    )
+    assert done.returncode == 1
+    assert "no node is named 'drver'; nodes: driver, transform" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = started("-m", "wam_cli.main", "demo", "--no-live", "--real-time-factor", "0", "--name", "stopped")
+    wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
+    stack.process.send_signal(signal.SIGINT)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
+    assert stack.process.returncode == 130
+    assert "Traceback" not in stack.said()
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
+def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = up(started, "--processes")
+    stack.process.kill()
+    stack.process.wait()
+    wait(lambda: not stack.alive(), "the end of the children", soon_delivered())
+    (bag,) = (tmp_path / "bags").iterdir()
+    assert (bag / "metadata.yaml").is_file(), "the recorder closed its bag"
+
+
+def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = up(started, "--processes")
+    (victim,) = (pid for pid in stack.alive() if b"velocity_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    os.kill(victim, signal.SIGKILL)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
+    assert stack.alive() == []
+    errors = [line for line in stack.said().splitlines() if "rror" in line]
+    cause = "error: node velocity_loop was ended from outside by SIGKILL; the system does that where memory is short"
+    assert errors[0] == f"{cause}; all others are stopped now", "the cause comes first"
+    assert errors[-1] == f"{cause}; all others were stopped"
+    assert stack.process.returncode == 9
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
+PROGRAMS = {
+    "up": ("wam_cli.main", "up"),
+    "node": ("wam_cli.main", "node", "driver"),
+    "scorecard": ("wam_cli.main", "scorecard"),
+    "program": ("wam_ros.program", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
+}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("program", "library"),
+    [("up", "numpy"), ("up", "rclpy"), ("node", "mujoco"), ("scorecard", "numpy"), ("program", "pinocchio")],
+)
+def test_a_signal_during_start_up_ends_all_silently(
+    program: str, library: str, number: signal.Signals, started: Any, domain_id: int
+) -> None:
+    stack = started("-m", *PROGRAMS[program])
+    wait(lambda: has_loaded(stack, library) or stack.process.poll() is not None, f"the import of {library}")
+    stack.process.send_signal(number)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}")
+    assert stack.alive() == []
+    assert stack.process.returncode in (0, 128 + number)
+    assert "Traceback" not in stack.said()
+
+
+def test_the_command_ends_silently_from_its_first_import_on() -> None:
+    interrupted = (
+        "import os, signal, sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'argparse': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "from wam_cli.program import main\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", interrupted], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.SIGINT, "", "")
+
+
+def has_loaded(stack: Stack, library: str) -> bool:
+    """Whether a program has begun to load a library, by the files that it has mapped."""
+    with contextlib.suppress(OSError):
+        return f"/{library}/" in Path(f"/proc/{stack.process.pid}/maps").read_text()
+    return False
+
+
+@pytest.mark.parametrize("program", ["node", "program"])
+def test_signals_while_a_program_ends_do_not_change_how_it_ends(program: str, ros: Any, started: Any) -> None:
+    listener = ros.node("listener")
+    stack = started("-m", *PROGRAMS[program])
+    name = "driver" if program == "node" else "gravity"
+    ros.wait(lambda: name in listener.get_node_names() or stack.process.poll() is not None)
+
+    def interrupt() -> bool:
+        stack.process.send_signal(signal.SIGINT)
+        time.sleep(0.002)
+        return stack.process.poll() is not None
+
+    wait(interrupt, f"the end; {stack.said()}")
+    assert stack.process.returncode == 0
+    assert "Traceback" not in stack.said()
+
+
+def test_a_group_that_loses_its_process_is_named_and_takes_the_stack_with_it(
+    started: Any, tmp_path: Path, domain_id: int
+) -> None:
+    stack = up(started, "--realtime", *BOLD)
+    (victim,) = (pid for pid in stack.alive() if b"force_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    os.kill(victim, signal.SIGKILL)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
+    assert stack.alive() == []
+    group = "transform or gravity or force_loop or contact_estimator"
+    assert f"node {group} was ended from outside by SIGKILL" in stack.said()
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
+@pytest.mark.parametrize("name", ["driver", "velocity_loop"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: Any, started: Any) -> None:
+    listener = ros.node("listener")
+    stack = started("-m", "wam_cli.main", "node", name)
+    ros.wait(lambda: name in listener.get_node_names() or stack.process.poll() is not None)
+    stack.process.send_signal(number)
+    wait(lambda: stack.process.poll() is not None, f"the end of {name}; {stack.said()}", soon())
+    assert stack.process.returncode == 0
+    assert "Traceback" not in stack.said()
+
+
+def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any) -> None:
+    from diagnostic_msgs.msg import DiagnosticStatus
+    from sensor_msgs.msg import JointState
+
+    from wam_description.topics import BY_NAME
+    from wam_ros.qos import qos
+
+    said: list[str] = []
+    states: list[Any] = []
+    listener = ros.node("listener")
+    listener.create_subscription(DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"]))
+    listener.create_subscription(JointState, "motor_states", states.append, qos(BY_NAME["motor_states"]))
+    stack = started("-m", "wam_cli.main", "node", "driver", "-p", "timing.mode:=realtime")
+    ros.wait(lambda: said and len(states) > 100, what="states of a driver that is alone")
+    assert set(said) == {"braked"}
+    assert "[wam.driver]: priority: " in stack.said()
+    stack.process.terminate()
+    wait(lambda: stack.process.poll() is not None, "the end", soon())
+
+
+@pytest.mark.parametrize("environment", ["unset", "not a directory", "read-only"])
+def test_nodes_start_without_a_home_to_write_to(environment: str, started: Any, ros: Any, tmp_path: Path) -> None:
+    home = {"not a directory": "/dev/null", "read-only": "/proc"}.get(environment)
+    arguments = ["-m", "wam_cli.main", "node", "gravity"]
+    script = (
+        "import os, sys; os.environ.pop('ROS_LOG_DIR', None); os.environ.pop('HOME', None)\n"
+        f"if {home!r}: os.environ['HOME'] = {home!r}\n"
+        f"os.execv(sys.executable, [sys.executable, *{arguments!r}])"
+    )
+    stack = started("-c", script)
+    node = ros.node("listener")
+    ros.wait(lambda: "gravity" in node.get_node_names() or stack.process.poll() is not None)
+    assert stack.process.poll() is None, stack.said()
+    stack.process.terminate()
+    wait(lambda: stack.process.poll() is not None, "the end", soon())
+    assert stack.process.returncode == 0
+
+
+def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    output = capsys.readouterr()
+    code = end.value.code
+    return (code if isinstance(code, int) else 1, output.out, output.err if isinstance(code, int) else str(code))
+
+
+SUBCOMMANDS = tuple(COMMANDS)
+
+
+@pytest.mark.parametrize("subcommand", [None, *SUBCOMMANDS])
+def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys: Any) -> None:
+    code, out, _ = command(capsys, *filter(None, [subcommand, "--help"]))
+    assert code == 0
+    assert out.startswith(f"usage: wam {subcommand or ''}".rstrip())
+    if subcommand is None:
+        assert all(name in out for name in SUBCOMMANDS)
+
+
+@pytest.mark.slow
+def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> None:
+    begin = [sys.executable, "-m", "wam_cli.main", "evaluate", "contact", "--seed", "1"]
+    begin += ["--keep", str(tmp_path / "kept")]
+    with subprocess.Popen(begin, stderr=subprocess.PIPE, text=True, start_new_session=True) as battery:
+        assert battery.stderr is not None
+        assert battery.stderr.readline().startswith("evaluate: 0 of ")
+        wait(lambda: (tmp_path / "kept").exists() and any((tmp_path / "kept").iterdir()), "a first scene")
+        battery.terminate()
+        assert battery.wait(LONG) == 128 + signal.SIGTERM
+        assert "leaked" not in battery.stderr.read()
+    with contextlib.suppress(ProcessLookupError):  # the last process of the session is gone
+        wait(lambda: os.killpg(battery.pid, 0), "the end of the workers")
+
+
+@pytest.mark.slow
+def test_a_reader_who_has_had_enough_is_no_error() -> None:
+    """As in `wam scorecard | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "wam_cli.main", "scorecard"],
+        stdout=write,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["up", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
+        (["node", "driver", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
+        (["demo", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
+        (["model", "urdf", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
+        (["node", "elbow"], "no node is named 'elbow'; nodes: driver, transform, velocity_loop"),
+    ],
+)
+def test_what_does_not_exist_is_said_in_one_line(arguments: list[str], text: str, capsys: Any) -> None:
+    code, out, err = command(capsys, *arguments)
+    assert code == 1
+    assert err.startswith(f"wam {arguments[0]}: {text}")
+    assert err.count("\n") == 1
+    assert out == ""
+
+
+@pytest.mark.parametrize("arguments", [["dmeo"], ["up", "--fast"], ["model", "sdf"], ["up", "extra"]])
+def test_a_wrong_command_line_shows_the_usage(arguments: list[str], capsys: Any) -> None:
+    code, _, err = command(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("usage: wam")
+
+
+@pytest.mark.parametrize(
+    ("ros_arguments", "text"),
+    [(["-p", "x"], "-p x"), (["-p"], "trailing -p flag"), (["--nonsense"], "--nonsense")],
+)
+def test_wrong_ros_arguments_are_said_without_a_traceback(
+    ros_arguments: list[str], text: str, started: Any, domain_id: int
+) -> None:
+    stack = started("-m", "wam_cli.main", "node", "gravity", *ros_arguments)
+    wait(lambda: stack.process.poll() is not None, "the end")
+    assert stack.process.returncode == 1
+    assert text in stack.said().splitlines()[-1]
+    assert "Traceback" not in stack.said()
+
+
+OWN = """
+from wam_description.parameters import Nothing
+from wam_description.topics import JOINT_STATE, Topic
+from wam_description.wiring import Input, reaction
+
+
+class Echo:
+    name, parameters = "echo", Nothing
+    topics = (Topic("echo", JOINT_STATE, "outer", "the torques of gravity, N m", "joints"),)
+
+    def __init__(self, shared, own):
+        pass
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+    def step(self, inputs):
+        return {"echo": inputs["gravity_effort"]}
+"""
+
+
+@pytest.mark.parametrize("mode", ["realtime", "lockstep"])
+def test_record_takes_mode_and_nodes_from_the_running_stack(
+    mode: str, started: Any, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    (tmp_path / "own_echo.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    configured = Configuration.load(packaged("wam")).with_nodes("own_echo:Echo").with_values({"timing.mode": mode})
+    path = os.pathsep.join([str(ROOT), str(tmp_path)])
+    with Composition(configured, "left", domain_id) as composition:
+        words = ("--name", "mine", "--directory", str(tmp_path / "bags"), "--namespace", "left")
+        stack = started("-m", "wam_cli.main", "record", *words, PYTHONPATH=path)
+        begin = time.monotonic()
+        composition.spin(lambda: recorded(stack) > 400_000 or time.monotonic() - begin > LONG)
+        assert recorded(stack) > 400_000, stack.said()
+        stack.process.send_signal(signal.SIGINT)
+        composition.spin(lambda: stack.process.poll() is not None or time.monotonic() - begin > LONG)
+    assert stack.process.returncode == 0, stack.said()
+    nodes = "driver, transform, velocity_loop, gravity, force_loop, contact_estimator, echo"
+    assert stack.said().startswith(f"the stack in /left runs in {mode}: {nodes}\n")
+    bag = read(tmp_path / "bags" / "mine")
+    assert bag.metadata["recording"]["mode"] == mode
+    assert (bag.first_ns > 10**18) is (mode == "realtime"), "a time of day, or one of the arm's"
+    assert bag.counts["/left/echo"] > 0
+    assert b"/left/echo:" in bag.attachments["parameters.yaml"]
+
+
+def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr("wam_ros.call.PATIENCE", 0.2)
+    code, _, err = command(capfd, "record", "--directory", str(tmp_path / "bags"))
+    assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
+    assert err == "wam record: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
+
+
+def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) -> None:
+    code, _, err = command(capsys, "record", "--set", "timing.mode=realtime")
+    assert code == 1
+    assert "--set timing.mode has no effect here: the running stack has its own" in err
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_model_is_written_to_standard_output(form: str, capsys: Any) -> None:
+    code, out, _ = command(capsys, "model", form)
+    assert code == 0
+    assert {"urdf": "<robot", "mjcf": "<mujoco"}[form] in out
+
+
+def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 0.05}, {name: release, seconds: 100.0, request: enable}]")
+    configured = Configuration.load(packaged("wam")).with_values(
+        {
+            "nodes": ["driver", "transform", "scenario"],
+            "timing.mode": "realtime",
+            "driver:late_periods": 1.0,
+            "scenario:script": str(script),
+        }
+    )
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario: Any = composition.nodes["scenario"]
+        begin = time.monotonic()
+        composition.spin(lambda: scenario.done or time.monotonic() - begin > LONG)
+        assert scenario.done
+        assert "refused: no motor_current_command comes in; start velocity_loop" in scenario.failure
+
+
+def test_a_composition_in_lockstep_can_be_left_at_any_moment(domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
+    begin = time.monotonic()
+    with Composition(configured, domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.stamp > 50_000_000 or time.monotonic() - begin > LONG)
+        assert driver.driver.stamp > 50_000_000
+        begin = time.monotonic()
+        composition.spin(lambda: time.monotonic() - begin > 0.2)
+        assert time.monotonic() - begin < soon()
+
+
+def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 100.0}]")
+    base = Configuration.load(packaged("wam"))
+    configured = base.with_values({"nodes": [*base.shared.nodes, "scenario"], "scenario:script": str(script)})
+    with Composition(configured, domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        begin = time.monotonic()
+        composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
+        driver.time.pause(True)
+        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        driver._fault("two publishers send motor_current_command")
+        ended = composition.wait(lambda ended: bool(ended) or time.monotonic() - begin > LONG)
+        assert ended == {"scenario": 1}
+        (failure,) = composition.failures
+        assert failure == "the driver stopped in step 'wait': two publishers send motor_current_command"
+
+
+REPORT_THE_DELIVERY = """
+import time
+from rclpy.node import Node
+from wam_ros.run import SHORT_DELIVERY, end_of_delivery, run
+
+class Sender(Node):
+    def __init__(self, context, namespace):
+        super().__init__("sender", context=context, namespace=namespace)
+        print("made", flush=True)
+
+    def destroy_node(self):
+        print(end_of_delivery(self.context) - time.monotonic() <= SHORT_DELIVERY)
+        super().destroy_node()
+
+run({"sender": Sender})
+"""
+
+
+@pytest.mark.parametrize("listener_gone", [False, True])
+def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
+    listener_gone: bool, started: Any, domain_id: int
+) -> None:
+    from wam_ros.program import LISTENER_GONE
+
+    stack = started("-c", REPORT_THE_DELIVERY)
+    wait(lambda: "made" in stack.said() or stack.process.poll() is not None, "the node")
+    assert stack.process.poll() is None, stack.said()
+    if listener_gone:
+        stack.process.send_signal(LISTENER_GONE)
+    stack.process.terminate()
+    assert stack.process.wait(LONG) == 0, stack.said()
+    assert stack.said().split() == ["made", str(listener_gone)]
+
+
+@pytest.mark.parametrize(("number", "is_announced"), [(signal.SIGKILL, True), (signal.SIGTERM, False)])
+def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
+    number: signal.Signals, is_announced: bool, recording: Processes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.program import LISTENER_GONE
+
+    sent: list[int] = []
+    monkeypatch.setattr(subprocess.Popen, "send_signal", lambda process, number: sent.append(number))
+    os.kill(pid_of(recording, "recorder"), number)
+    recording.wait(bool)
+    recording.stop()
+    assert (LISTENER_GONE in sent) is is_announced
+
+
+def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
+    started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    patience = 4.0  # s; each of the six nodes would wait as long
+    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", patience)
+    configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
+    begin = time.monotonic()
+    with Composition(configured, domain_id=domain_id) as composition:
+        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+        composition.spin(lambda: recorded(listener) > 400_000 or time.monotonic() - begin > LONG)
+        assert recorded(listener) > 400_000, listener.said()
+        listener.process.send_signal(signal.SIGSTOP)
+        begin = time.monotonic()
+        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        begin = time.monotonic()
+    took = time.monotonic() - begin
+    listener.process.send_signal(signal.SIGCONT)
+    assert took < patience + min(soon(), 2.0 * patience)
+
+
+def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
+    started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is the only one that is kept: replaced before it is taken, it is a message that a recording lacks."""
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", 0.2)
+    configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
+    with Composition(configured, domain_id=domain_id) as composition:
+        published = composition.nodes["driver"]._ports._published
+
+        def spin_until(is_enough: Callable[[], bool], seconds: float) -> None:
+            end = time.monotonic() + seconds
+            composition.spin(lambda: is_enough() or time.monotonic() > end)
+
+        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+        spin_until(lambda: recorded(listener) > 40_000, LONG)
+        assert recorded(listener) > 40_000, listener.said()
+        listener.process.send_signal(signal.SIGSTOP)
+        spin_until(lambda: False, 0.2)
+        before = published["status"]
+        begin = time.monotonic()
+        spin_until(lambda: False, 1.5)  # about 30 periods of the repetition
+        while_frozen, frozen = published["status"] - before, time.monotonic() - begin
+        listener.process.send_signal(signal.SIGCONT)
+        spin_until(lambda: published["status"] > before + while_frozen + 10, LONG)
+        after = published["status"] - before - while_frozen
+    assert 1 <= while_frozen <= frozen / 0.2 + 2
+    assert after > 10
+
+
+def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
+    from std_srvs.srv import Trigger
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 100.0}]")
+    stack = started("-m", "wam_cli.main", "up", "--realtime", "--scenario", str(script), *BOLD)
+    client = ros.node("asker").create_client(Trigger, "driver/estop")
+    ros.wait(client.service_is_ready)
+    wait(lambda: "wait" in stack.said(), f"the first step; {stack.said()}")
+    future = client.call_async(Trigger.Request())
+    ros.wait(future.done)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
+    assert stack.process.returncode == 1
+    assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()

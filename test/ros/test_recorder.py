@@ -1,0 +1,853 @@
+"""The recorder against real publishers; its bags read by readers that are not ours."""
+
+import contextlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from conftest import LONG, RosWorld, soon
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
+from mcap.exceptions import McapError
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosReliability
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+
+from wam_bag.bag import read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.contents import contents
+from wam_bag.losses import losses
+from wam_bag.message_layout import stamp_reader
+from wam_description.agreement import DIGESTS, digests
+from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError, flatten
+from wam_description.signals import Level, NodeStatus
+from wam_description.topics import BY_NAME, TOPICS
+from wam_ros.bring_up import Composition
+from wam_ros.header import header
+from wam_ros.messages import diagnostic_status, message_type, read_status
+from wam_ros.qos import qos
+from wam_ros.recorder import Numbering, Recorder
+from wam_ros.recorder_node import RecorderNode
+
+CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
+ROOT = Path(__file__).parents[2]
+
+
+def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: Any) -> Any:
+    sections = yaml.safe_load(CONFIG.read_text())
+    shared = flatten(sections["/**"]["ros__parameters"]) | sections["/**/recorder"]["ros__parameters"]
+    changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
+    return {**shared, **changed}
+
+
+def recorder(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
+    given = [Parameter(name, value=value) for name, value in parameters(directory, **choices).items()]
+    return ros.add(RecorderNode(context=ros.context, namespace="/wam", parameter_overrides=given))
+
+
+def publisher(node: Node, topic: str) -> Any:
+    return node.create_publisher(message_type(BY_NAME[topic]), topic, qos(BY_NAME[topic]))
+
+
+def matched(*publishers: Any, count: int = 1) -> Callable[[], bool]:
+    return lambda: all(p.get_subscription_count() >= count for p in publishers)
+
+
+def state(stamp: int, value: float) -> JointState:
+    return JointState(header=header(stamp), name=["motor1", "motor2"], position=[value, -value], effort=[0.0, value])
+
+
+def received(node: RecorderNode, topic: str) -> int:
+    return sum(count.received for count in node.recorder.counts() if count.topic == topic)
+
+
+@contextlib.contextmanager
+def recorder_process(ros: Any, directory: Path, **choices: Any) -> Iterator[subprocess.Popen[str]]:
+    file = directory / "recorder.yaml"
+    file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
+    command = [sys.executable, "-m", "wam_ros.program", "recorder", "--ros-args", "-r", "__ns:=/wam"]
+    process = subprocess.Popen(
+        [*command, "--params-file", str(file)],
+        env=ros.environment,
+        cwd=ROOT,
+        text=True,
+        stderr=subprocess.PIPE,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def recovered(file: Path) -> list[Message]:
+    """Messages up to the break, as `mcap recover` finds them."""
+    found = []
+    with file.open("rb") as stream, contextlib.suppress(McapError, EOFError):
+        found.extend(record for record in StreamReader(stream).records if isinstance(record, Message))
+    return found
+
+
+def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = ros.node("sender")
+    publishers = {topic.name: publisher(sender, topic.name) for topic in TOPICS}
+    ros.wait(matched(*publishers.values()))
+    for k in range(1, 301):
+        publishers["motor_states"].publish(state(k * 1_000_000, 0.1 * k))
+        if k % 5 == 0:
+            for topic in TOPICS:
+                if topic.name not in ("motor_states", "/diagnostics", "status"):
+                    publishers[topic.name].publish(message_type(topic)())
+    ros.wait(lambda: received(node, "/wam/motor_states") == 300 and received(node, "/clock") == 60)
+    ros.remove(node)
+    expected = {n if n[0] == "/" else f"/wam/{n}": 60 for n in publishers if n not in ("/diagnostics", "status")}
+    with AnyReader([tmp_path / "bag"]) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        assert counts | expected | {"/wam/motor_states": 300} == counts
+        assert Counter(connection.topic for connection, _, _ in reader.messages()) == {
+            k: v for k, v in counts.items() if v
+        }
+        for connection in reader.connections:
+            (offered,) = connection.ext.offered_qos_profiles
+            latched = BY_NAME[connection.topic.removeprefix("/wam/")].latched
+            assert offered.durability == (QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE)
+            assert (offered.reliability, offered.depth) == (QosReliability.RELIABLE, 1 if latched else 1000)
+        last = 0
+        states = [c for c in reader.connections if c.topic == "/wam/motor_states"]
+        for k, (connection, log_time, data) in enumerate(reader.messages(states), 1):
+            message = reader.deserialize(data, connection.msgtype)
+            assert message.position.tolist() == [0.1 * k, -0.1 * k]
+            assert message.name == ["motor1", "motor2"]
+            assert abs(log_time - time.time_ns()) < 60e9
+            assert log_time >= last
+            last = log_time
+
+
+def test_only_the_topics_that_were_chosen_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, topics=["motor_states", "/clock"])
+    sender = ros.node("sender")
+    publishers = {name: publisher(sender, name) for name in ("motor_states", "motor_currents", "/clock")}
+    ros.wait(matched(*publishers.values()), what="it listens to the others too, so that every publisher begins")
+    for k in range(1, 11):
+        for name in ("motor_currents", "motor_states"):
+            publishers[name].publish(state(k * 1_000_000, 0.1 * k))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 10)
+    ros.remove(node)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections} == {"/wam/motor_states": 10, "/clock": 0}
+
+
+def test_a_topic_that_does_not_exist_is_refused(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="parameter 'topics' names 'motor_state'; allowed: \\*, "):
+        recorder(ros, tmp_path, topics=["motor_state"])
+
+
+def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    sender.publish(state(0, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    for k in range(1500):  # nobody spins: the reader keeps the last 1000
+        sender.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1001)
+    (count,) = [count for count in node.recorder.counts() if count.topic == "/wam/motor_states"]
+    assert count == ("/wam/motor_states", "driver", 1001, 500, 0, 0)
+    ros.remove(node)
+    record = read(tmp_path / "bag").metadata["recording"]
+    assert record["mode"] == "realtime"
+    assert record["/wam/motor_states driver received"] == "1001"
+    assert record["/wam/motor_states driver dropped"] == "500"
+
+
+def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any, tmp_path: Path) -> None:
+    sender = publisher(ros.node("driver"), "robot_description")
+    sender.publish(String(data="<robot/>"))
+    node = recorder(ros, tmp_path)
+    ros.wait(lambda: received(node, "/wam/robot_description") == 1)
+    ros.remove(node)
+    (message,) = read(tmp_path / "bag").topics["/wam/robot_description"].messages
+    assert message.data == "<robot/>"
+
+
+def test_it_records_on_the_single_threaded_executor_too(ros: Any, tmp_path: Path) -> None:
+    ros.executor.shutdown()
+    ros.executor = SingleThreadedExecutor(context=ros.context)
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(20):
+        sender.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 20)
+    assert {c.dropped for c in node.recorder.counts()} == {0}
+
+
+def test_what_has_arrived_when_it_is_stopped_is_recorded(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(200):
+        sender.publish(state(k, 0.0))
+    ros.remove(node)
+    assert len(read(tmp_path / "bag").topics["/wam/motor_states"].log_time_ns) == 200
+
+
+def test_bytes_left_behind_by_serialize_message_are_cut(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    sender.publish(bytes(serialize_message(state(1, 0.5))))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    ros.remove(node)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        ((connection, _, data),) = reader.messages()
+        assert reader.deserialize(data, connection.msgtype).effort.tolist() == [0.0, 0.5]
+
+
+def test_lockstep_times_are_those_of_the_messages(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, mode="lockstep")
+    other = ros.node("contact_estimator")
+    torques, touched = publisher(other, "external_joint_torques"), publisher(other, "contact/in_contact")
+    ros.wait(matched(torques, touched))
+    touched.publish(Bool(data=False))
+    ros.wait(lambda: received(node, "/wam/contact/in_contact") == 1)
+    for k in range(1, 51):
+        torques.publish(state(k * 5_000_000, 0.0))
+    ros.wait(lambda: received(node, "/wam/external_joint_torques") == 50)
+    touched.publish(Bool(data=True))
+    ros.wait(lambda: received(node, "/wam/contact/in_contact") == 2)
+    ros.remove(node)
+    times = [5_000_000 * k for k in range(1, 51)]
+    bag = read(tmp_path / "bag")
+    assert bag.topics["/wam/external_joint_torques"].log_time_ns.tolist() == times
+    assert bag.topics["/wam/contact/in_contact"].log_time_ns.tolist() == [0, times[-1]]
+    published = [m.publish_time for m in recovered(tmp_path / "bag" / "bag_0.mcap")]
+    assert max(published) == times[-1]
+
+
+def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any, tmp_path: Path) -> None:
+    states: list[Any] = []
+    listener = ros.node("listener")
+    row = BY_NAME["status"]
+    listener.create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path, nodes=("gravity", "recorder"))
+    ros.wait(lambda: node.count_subscribers("/wam/status") == 2)
+    other = Node(
+        "gravity",
+        namespace="/wam",
+        context=ros.context,
+        parameter_overrides=[Parameter("arm.mass", value=[1.0, 2.5]), Parameter("on", value=True)],
+        automatically_declare_parameters_from_overrides=True,
+    )
+    ros.add(other)
+    ros.wait(lambda: not node.parameters_of_nodes.missing)
+    node.attend()
+    assert not node.ready, "ready before the topics of gravity were there"
+    kept = [publisher(other, topic) for topic in ("gravity_effort", "status", "/diagnostics")]
+    ros.wait(lambda: states)
+    assert kept
+    assert (states[0].name, states[0].message) == ("recorder", "ready")
+    ros.remove(node)
+    attached = yaml.safe_load(read(tmp_path / "bag").attachments["parameters.yaml"])
+    assert attached["/wam/gravity"]["ros__parameters"]["arm"] == {"mass": [1.0, 2.5]}
+    assert attached["/wam/gravity"]["ros__parameters"]["on"] is True
+    assert attached["/wam/recorder"]["ros__parameters"]["timing"]["period"] == 0.001
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
+    sender = publisher(ros.node("driver"), "motor_states")
+    with recorder_process(ros, tmp_path) as process:
+        ros.wait(matched(sender))
+        for k in range(1, 501):
+            sender.publish(state(k, 0.0))
+        file = tmp_path / "bag" / "bag_0.mcap"
+        ros.wait(lambda: len(recovered(file)) >= 500)
+        process.send_signal(stop)
+        _, said = process.communicate(timeout=LONG)
+        assert process.returncode == 0, said
+    assert "none lost" in said
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections}["/wam/motor_states"] == 500
+
+
+def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Path) -> None:
+    sender = publisher(ros.node("driver"), "motor_states")
+    file = tmp_path / "bag" / "bag_0.mcap"
+    with recorder_process(ros, tmp_path) as process:
+        ros.wait(matched(sender))
+        sent: list[int] = []
+
+        def send() -> bool:
+            sent.append(time.time_ns())
+            sender.publish(state(len(sent), 0.0))
+            return len(sent) >= 250  # one each 10 ms of `wait`
+
+        ros.wait(send)
+        killed = time.time_ns()
+        process.kill()
+        process.wait()
+    found = [m for m in recovered(file) if m.publish_time >= sent[0] - 1_000_000]
+    states = [m for m in found if len(m.data) > 60 and m.publish_time <= killed]
+    assert len([t for t in sent if t < killed - 1_000_000_000]) >= 100
+    assert states[-1].publish_time > killed - 1_000_000_000
+    numbers = [m.sequence for m in states if b"motor1" in m.data]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_a_bag_that_cannot_be_made_stops_the_node_before_it_starts(ros: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ParameterError, match=r"is a file.*'directory'"):
+        recorder(ros, tmp_path / "file")
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(ParameterError, match=r"exists already.*'name'"):
+        recorder(ros, tmp_path)
+    with pytest.raises(ParameterError, match="without directories"):
+        recorder(ros, tmp_path, name="../bag")
+
+
+def by_hand(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
+    """A recorder that is not among the nodes of the stack."""
+    return recorder(ros, directory, nodes=("driver", "gravity"), **choices)
+
+
+@pytest.mark.parametrize(
+    ("mode", "nodes", "difference"),
+    [
+        ("realtime", ["driver", "gravity"], "node driver runs in realtime, and this recorder in lockstep"),
+        ("lockstep", ["driver", "my:Own"], "node driver and this recorder do not both have gravity, my:Own"),
+        ("lockstep", ["gravity", "driver", "recorder"], ""),
+    ],
+)
+def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
+    mode: str, nodes: list[str], difference: str, ros: Any, tmp_path: Path
+) -> None:
+    driver = ros.node("driver")
+    driver.declare_parameter("timing.mode", mode)
+    driver.declare_parameter("nodes", nodes)
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    states = publisher(driver, "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") and "driver" in node.parameters_of_nodes.found)
+    node.attend()
+    advice = "; start the recorder with 'wam record', which takes both from the running stack"
+    assert node.failure == (difference and difference + advice)
+
+
+@pytest.mark.parametrize(
+    ("again", "found"),
+    [
+        ({}, ""),
+        ({"timing.real_time_factor": 0.5, "timing.niceness": -3}, ""),
+        ({"timing.mode": "realtime"}, "timing.mode"),
+        ({"arm.name": "other", "arm.payload": 1.0, "timing.period": 0.002, "timing.outer_divisor": 4}, "and 1 more"),
+    ],
+)
+def test_a_node_that_is_started_again_otherwise_makes_the_bag_one_of_two_runs(
+    again: dict[str, Any], found: str, ros: Any, tmp_path: Path
+) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    configuration = Configuration.load(CONFIG)
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    for i, values in enumerate(({}, again, {})):
+        status = publisher(ros.node(f"status_{i}"), "status")
+        ros.wait(matched(status))
+        given = digests(configuration.with_values(values).shared)
+        status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "driver", facts={DIGESTS: given}), "wam"))
+        ros.wait(lambda i=i: received(node, "/wam/status") == i + 1)
+    assert found in node.failure
+    begin = "node driver was started again, with another "
+    end = f", and {tmp_path / 'bag'} has both runs; record each with a recorder of its own"
+    assert bool(found) is (node.failure.startswith(begin) and node.failure.endswith(end))
+
+
+@pytest.mark.parametrize("again", [1.0, 2.0])
+def test_a_node_that_is_started_again_with_another_parameter_of_its_own_is_named(
+    again: float, ros: Any, tmp_path: Path
+) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    driver = ros.node("driver")
+    driver.declare_parameter("seed", 1)
+    states = publisher(driver, "motor_states")
+    ros.wait(matched(states))
+    states.publish(state(1, 0.0))
+    for life, gain in enumerate((1.0, again)):
+        gravity = ros.node("gravity")
+        gravity.declare_parameter("gain", gain)
+        status = publisher(gravity, "status")
+        ros.wait(matched(status))
+        status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam"))
+        ros.wait(lambda: not node.parameters_of_nodes.missing)
+        node.attend()
+        assert node.restarted == ["gravity"] * life
+        ros.wait(lambda: not node.restarted, what="its parameters")
+        ros.remove(gravity)
+    begin = "node gravity was started again, with another gain, and "
+    assert node.failure.startswith(begin) if again == 2.0 else node.failure == ""
+
+
+def test_a_recorder_to_which_nothing_came_ends_with_the_reason(
+    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr("wam_ros.recorder_node.SILENCE", 0.1)
+    node, printed = by_hand(ros, tmp_path), ""
+
+    def is_reported() -> bool:
+        nonlocal printed
+        printed += capfd.readouterr().err
+        return "no message for 0.1 s: no stack runs here; Ctrl-C ends the recording" in printed
+
+    ros.wait(is_reported)
+    ros.remove(node)
+    assert (
+        node.failure
+        == f"{tmp_path / 'bag'} is empty: no message came; start the stack with 'wam up' before the recorder"
+    )
+
+
+def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) -> None:
+    ros.remove(recorder(ros, tmp_path, name=""))
+    (path,) = tmp_path.glob("wam_2*")
+    assert (path / f"{path.name}_0.mcap").is_file()
+    assert (path / "metadata.yaml").is_file()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "received", "dropped", "missed"),
+    [
+        ([1, 2, 3], 3, 0, 0),
+        ([1, 2, 5, 6, 9], 5, 4, 0),
+        ([7, 8, 10], 3, 1, 6),
+        ([1, 2, 3, 1, 2, 4], 6, 0, 0),  # started again: 4 follows the 3 of the first life
+        ([1, 1, 2, 2, 3, 3], 6, 0, 0),  # two publishers under one name
+        ([1, 1, 2, 2, 3, 4, 3, 6], 8, 1, 0),
+        ([0, 0], 2, 0, 0),  # a middleware that does not number
+    ],
+)
+def test_gaps_in_the_numbering_are_drops(numbers: list[int], received: int, dropped: int, missed: int) -> None:
+    numbering = Numbering()
+    for number in numbers:
+        numbering.add(number)
+    assert (numbering.received, numbering.dropped, numbering.missed) == (received, dropped, missed)
+
+
+def test_a_gap_where_there_is_another_publisher_is_no_drop() -> None:
+    present = {"first"}
+    numbering = Numbering(lambda: present)
+    for number in (1, 2, 5):  # one publisher: two were lost
+        numbering.add(number)
+    present.add("second")  # started again, its first three before there was a connection; the first one was killed
+    for number in (9, 10, 13):
+        numbering.add(number)
+    present.remove("first")
+    for number in (14, 16):
+        numbering.add(number)
+    assert (numbering.received, numbering.dropped, numbering.missed) == (8, 2 + 2 + 1, 8)
+
+
+def test_what_a_restarted_node_published_before_it_was_connected_is_not_lost(ros: Any, tmp_path: Path) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    gravity = diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam")
+    for life, sent in ((1, 4), (2, 8)):
+        with contextlib.closing(RosWorld(ros.domain_id)) as another_process:
+            status = publisher(another_process.node("gravity"), "status")
+            for _ in range(sent):
+                status.publish(gravity)  # the newest alone is kept for a recorder that does not know this publisher yet
+            ros.wait(matched(status), what="a connection")
+            ros.wait(lambda status=status: status.wait_for_all_acked(Duration()), what="the newest status")
+            states.publish(state(life, 0.0))
+            ros.wait(lambda life=life: received(node, "/wam/motor_states") == life, what="what came before this state")
+    (found,) = (count for count in node.recorder.counts() if count.topic == "/wam/status")
+    assert (found.received + found.missed, found.dropped) == (4 + 8, 0)
+
+
+def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
+    def data(name: str) -> bytes:
+        message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=name)])
+        return bytes(serialize_message(message))
+
+    row = BY_NAME["/diagnostics"]
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
+        for number in (1, 2, 3):
+            machine.receive(row.name, data("driver: timing"), 0, 0, number)
+        for number in (1, 9):
+            machine.receive(row.name, data("wam: gravity"), 0, 0, number)
+        assert {c.publisher: (c.received, c.dropped) for c in machine.counts()} == {
+            "driver": (3, 0),
+            "gravity": (2, 7),
+        }
+
+
+def test_the_times_of_a_lockstep_recording_are_not_those_of_another_arm(tmp_path: Path) -> None:
+    def diagnostics(name: str, stamp: int) -> bytes:
+        message = DiagnosticArray(header=header(stamp, ""), status=[DiagnosticStatus(name=name)])
+        return bytes(serialize_message(message))
+
+    rows = [BY_NAME["/diagnostics"], BY_NAME["motor_states"]]
+    with BagWriter(tmp_path / "bag") as bag:
+        profiles = {row.name: qos(row) for row in rows}
+        machine = Recorder(
+            bag, {row.name: row for row in rows}, "lockstep", profiles, lambda name: {"1": "driver"}, "/left"
+        )
+        machine.receive("/diagnostics", diagnostics("right: driver", 1_795_558_389_219_000_000), 0, 0, 7)
+        machine.receive("motor_states", bytes(serialize_message(state(5_000_000, 0.1))), 0, 0, 1)
+        machine.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
+        machine.receive("/diagnostics", diagnostics("right: gravity", 1_795_558_390_219_000_000), 0, 0, 30)
+        machine.receive("motor_states", bytes(serialize_message(state(7_000_000, 0.1))), 0, 0, 2)
+        assert machine.dropped() == 0
+    times = sorted(message.log_time for message in recovered(next((tmp_path / "bag").glob("*.mcap"))))
+    assert times[-1] == 7_000_000
+    assert len(times) == 5
+
+
+def fill_disk(bag: BagWriter) -> None:
+    """Let every further write end as on a full disk."""
+    with Path("/dev/full").open("wb") as full:
+        os.dup2(full.fileno(), bag._stream.fileno())
+
+
+def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
+    row = BY_NAME["contact/in_contact"]
+    bag = BagWriter(tmp_path / "bag")
+    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: {}, "/wam")
+    machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
+    assert not machine.failure
+    fill_disk(bag)
+    bag._writer._chunk_size = 1
+    for number in (2, 3):
+        machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
+    machine.finish()
+    stopped = f"recording into {tmp_path / 'bag'} has stopped: the disk is full (No space left on device)"
+    assert machine.failure.startswith(stopped)
+    assert "free some space" in machine.failure
+    assert machine.lost_at_disk == 2
+    assert bag.closed
+
+
+def test_a_node_whose_disk_is_full_says_so_in_its_status(ros: Any, tmp_path: Path) -> None:
+    states: list[Any] = []
+    row = BY_NAME["status"]
+    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
+    fill_disk(node.bag)
+    sender.publish(state(1, 0.0))
+    ros.wait(lambda: any(said.level == said.ERROR and "No space left" in said.message for said in states))
+    assert "No space left" in node.failure
+
+
+def report(node: str, ended: bool, arm: str = "wam", **published: int) -> DiagnosticArray:
+    """What a node says about how much it has published."""
+    facts = {"node": f"/{arm}/{node}", **{f"published /wam/{topic}": str(count) for topic, count in published.items()}}
+    status = NodeStatus(Level.OK, "ready", node, facts=facts | ({"ended": "yes"} if ended else {}))
+    return DiagnosticArray(status=[diagnostic_status(status, "wam")])
+
+
+def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_path: Path, capfd: Any) -> None:
+    node = recorder(ros, tmp_path, nodes=("driver", "gravity", "transform", "recorder"))
+    states, said = (publisher(ros.node("driver"), topic) for topic in ("motor_states", "/diagnostics"))
+    ros.wait(matched(states, said))
+    for k in range(7):
+        states.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 7)
+    said.publish(report("driver", True, motor_states=10, robot_description=4))
+    said.publish(report("gravity", False, gravity_effort=5))
+    said.publish(report("transform", True, "other_arm", motor_states=10**9))
+    ros.wait(lambda: received(node, "/diagnostics") == 3)
+    ros.remove(node)
+    lost = "lost at the end: 3 of /wam/motor_states from driver"
+    unknown = "lost at the end: not known of gravity, transform, which gave no final count"
+    assert f"10 messages, {lost}, {unknown}" in capfd.readouterr().err
+    bag = read(tmp_path / "bag")
+    assert bag.metadata["recording"]["/wam/motor_states driver lost_at_end"] == "3"
+    found = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
+    assert found.at_end == {"/wam/motor_states from driver": 3}
+    assert found.sentences(0) == [
+        "Lost at the end: 3 of /wam/motor_states from driver.",
+        "Lost at the end: not known of gravity, transform, which gave no final count.",
+    ]
+
+
+def test_what_is_on_its_way_at_the_end_is_waited_for(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    node.recorder.announce("driver", "/wam/motor_states", 1)
+    states.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    node.recorder.announce("driver", "/wam/motor_states", 2)
+    late = threading.Timer(0.2, lambda: states.publish(state(2, 0.0)))
+    late.start()
+    ros.remove(node)
+    late.join()
+    assert len(read(tmp_path / "bag").topics["/wam/motor_states"].stamp_ns) == 2
+
+
+@pytest.mark.parametrize(
+    ("numbers", "total", "lacking"),
+    [
+        ([1, 2, 3], 3, 0),
+        ([1, 2, 3], 10, 7),
+        ([5, 6], 9, 3),
+        ([1, 2, 9, 1, 2], 4, 2),
+        ([0, 0], 5, 3),
+        ([7], 3, 0),  # a recorder that started later
+        ([7, 8, 11], 9, 0),
+        ([7, 8, 11], 14, 3),
+    ],
+)
+def test_messages_behind_the_last_one_are_counted_by_the_total(numbers: list[int], total: int, lacking: int) -> None:
+    numbering = Numbering()
+    for number in numbers:
+        numbering.add(number)
+    numbering.announce(total)
+    assert numbering.lacking() == lacking
+
+
+def lives(*numbers_and_totals: tuple[list[int], int], present: bool = True) -> Numbering:
+    """A node that was started again, each time by another writer, with its numbers and what it announced at last."""
+    writers: list[str] = []
+    numbering = Numbering(lambda: writers)
+    for life, (numbers, total) in enumerate(numbers_and_totals):
+        writers[:] = [f"writer {life}"] if present else []
+        for number in numbers:
+            numbering.add(number)
+        numbering.announce(total)
+    return numbering
+
+
+ALL = list(range(1, 101))
+
+
+@pytest.mark.parametrize("present", [True, False])
+@pytest.mark.parametrize(
+    ("first", "second", "dropped", "missed", "lacking"),
+    [
+        ((ALL, 100), (ALL[:40], 30), 0, 0, 0),
+        ((ALL[:40], 40), (ALL, 70), 0, 0, 0),  # it is past its last total, which is above that of the first life
+        ((ALL, 100), (ALL[:10], 100), 0, 0, 90),
+        ((ALL[:90], 100), (ALL[:10], 15), 0, 0, 10 + 5),
+        ((ALL, 100), (ALL[9:20], 20), 0, 9, 0),  # before it was connected
+    ],
+)
+def test_losses_are_those_of_each_life_of_a_node(
+    first: tuple[list[int], int],
+    second: tuple[list[int], int],
+    dropped: int,
+    missed: int,
+    lacking: int,
+    present: bool,
+) -> None:
+    found = lives(first, second, present=present)
+    assert (found.dropped, found.missed, found.lacking()) == (dropped, missed, lacking)
+
+
+def test_a_gap_of_a_second_life_is_not_closed_by_numbers_of_the_first() -> None:
+    assert lives((ALL, 100), ([*range(1, 11), *range(102, 151)], 150)).dropped == 91
+
+
+def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:
+    """The stack runs on while the recorder stops: the last total is older than the last messages."""
+    row, name = BY_NAME["motor_states"], "/wam/motor_states"
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {name: row}, "lockstep", {name: qos(row)}, lambda name: {"1": "driver"}, "/wam")
+        data = bytes(serialize_message(state(1, 0.0)))
+        for number in range(6000, 8000):
+            machine.receive(name, data, 0, 0, number)
+            if number in (6500, 7500):
+                machine.announce("driver", name, number - 3)
+        assert machine.lost_at_end() == 0
+        machine.announce("driver", name, 8010)
+        assert machine.lost_at_end() == 11
+
+
+@pytest.mark.parametrize("required", [False, True])
+@pytest.mark.parametrize("change", ["deleted", "moved"])
+def test_a_bag_that_vanishes_is_told_at_once_and_is_a_fault_if_it_was_required(
+    change: str, required: bool, ros: Any, tmp_path: Path
+) -> None:
+    states: list[Any] = []
+    row = BY_NAME["status"]
+    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path, required=required)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
+    sender.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    node.recorder.flush()
+    if change == "deleted":
+        shutil.rmtree(tmp_path / "bag")
+    else:
+        (tmp_path / "bag").rename(tmp_path / "elsewhere")
+    begin = time.monotonic()
+    ros.wait(lambda: any(said.level == said.ERROR for said in states), what="an error in the status")
+    assert time.monotonic() - begin < soon()
+    (said,) = (said for said in states if said.level == said.ERROR)
+    assert "bag_0.mcap is gone (No such file or directory): it was deleted or moved" in said.message
+    assert read_status(said).fault == (said.message if required else "")
+    if change == "moved":  # what was recorded before is whole
+        assert len(read(tmp_path / "elsewhere").topics["/wam/motor_states"].stamp_ns) <= 1
+
+
+def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
+    row = BY_NAME["status"]
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
+        for k in range(300):
+            status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
+            machine.receive(row.name, bytes(serialize_message(status)), 0, 0, 1)
+        counts = machine.counts()
+    assert len(counts) <= 64
+    assert max(len(count.publisher) for count in counts) < 300
+    assert "\x1b" not in counts[0].publisher
+
+
+@pytest.mark.slow
+def test_no_bytes_on_any_topic_end_the_recorder(tmp_path: Path) -> None:
+    chance = random.Random(20261120)
+    rows = list(BY_NAME.values())
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: {}, "/wam")
+        for k in range(5000):
+            row = chance.choice(rows)
+            data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))
+            for _ in range(chance.randrange(6)):
+                data[chance.randrange(len(data))] = chance.choice([0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)])
+            machine.receive(row.name, bytes(data[: chance.randrange(len(data) + 1)]), k, k, k)
+        assert not machine.failure
+    assert sum(read(tmp_path / "bag", may_lack=True, topics=[]).counts.values()) == 5000
+
+
+def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, mode="lockstep", split_time=0.1)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(1, 301):
+        sender.publish(state(k * 1_000_000, 0.5))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 300)
+    ros.remove(node)
+    names = [f"bag_{i}.mcap" for i in range(3)]
+    assert sorted(path.name for path in (tmp_path / "bag").glob("*.mcap")) == names
+    information = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert information["relative_file_paths"] == names
+    assert [file["message_count"] for file in information["files"]] == [100, 100, 100]
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert [time for _, time, _ in reader.messages()] == [k * 1_000_000 for k in range(1, 301)]
+    bag = read(tmp_path / "bag")
+    assert len(bag.topics["/wam/motor_states"].log_time_ns) == 300
+    assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
+
+
+def test_every_message_that_the_stack_publishes_is_in_the_bag(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": [{"name": "speak", "seconds": 0.3}]}))
+    base = Configuration.load(CONFIG)
+    configuration = base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(tmp_path),
+            "recorder:name": "bag",
+        }
+    )
+    published: Counter[str] = Counter()
+    publish = Publisher.publish
+
+    def counting(self: Any, message: Any) -> None:
+        published[self.topic_name] += 1
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, "publish", counting)
+    with Composition(configuration, domain_id=domain_id) as composition:
+        composition.spin(lambda: composition.nodes["scenario"].done)
+    recorded = {name: topic.messages for name, topic in contents(tmp_path / "bag").topics.items()}
+    assert published["/wam/motor_states"] == 301
+    assert {name: published[name] for name in recorded} == recorded
+
+
+def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
+    states, push = BY_NAME["motor_states"], BY_NAME["sim/disturbance"]
+    names = {"/wam/motor_states": states, "/wam/sim/disturbance": push}
+    offered = {name: qos(row) for name, row in names.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), names, "lockstep", offered, lambda name: {}, "/wam")
+    machine.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
+    machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
+    machine.finish()
+    assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
+
+
+@pytest.mark.parametrize(("number", "begin"), [(1, 0), (6001, 6_000_000_000)])
+def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
+    number: int, begin: int, tmp_path: Path
+) -> None:
+    """Its duration, and with that its rates, would count from the start of the run."""
+    rows = {f"/wam/{name}": BY_NAME[name] for name in ("robot_description", "status", "motor_states")}
+    offered = {name: qos(row) for name, row in rows.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
+    machine.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
+    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
+    for k in range(3):
+        machine.receive("/wam/motor_states", serialize_message(state(6_000_000_000 + k, 0.0)), 1, 1, number + k)
+    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 4)
+    machine.finish()
+    topics = read(tmp_path / "bag").topics
+    assert topics["/wam/robot_description"].log_time_ns.tolist() == [begin]
+    assert topics["/wam/status"].log_time_ns.tolist() == [begin, begin]
+    assert topics["/wam/motor_states"].log_time_ns.tolist() == [6_000_000_000 + k for k in range(3)]
+    assert contents(tmp_path / "bag").first == begin
+
+
+def test_a_run_without_a_stamp_is_recorded_at_its_start(tmp_path: Path) -> None:
+    rows = {f"/wam/{name}": BY_NAME[name] for name in ("status", "motor_states")}
+    offered = {name: qos(row) for name, row in rows.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
+    for number in range(1, 2001):  # the arm is paused
+        machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
+    machine.finish()
+    assert set(read(tmp_path / "bag").topics["/wam/status"].log_time_ns.tolist()) == {0}
+    assert contents(tmp_path / "bag").topics["/wam/status"].messages == 2000
+
+
+def test_topics_without_a_stamp_are_taken_first(ros: Any, tmp_path: Path) -> None:
+    """Or the stamp that gives a status its time comes in the next round, where both are sent while a round is on."""
+    node = recorder(ros, tmp_path)
+    stamped = [
+        stamp_reader(BY_NAME.get(name, BY_NAME[name.removeprefix("/wam/")]).type)(bytes([1] * 100)) is not None
+        for name in node._inlets
+    ]
+    assert stamped == sorted(stamped)
+    assert set(stamped) == {True, False}

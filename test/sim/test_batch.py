@@ -1,0 +1,265 @@
+"""Batches: equal on every executor, finished pieces are kept, Ctrl-C ends them, damage is repaired.  About 12 s."""
+
+import argparse
+import hashlib
+import math
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
+from io import StringIO
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from conftest import LONG
+
+from wam_cli.commands import batch_of
+from wam_sim import batch, pieces
+from wam_sim.progress import Progress
+from wam_studies.stability.stability_map import stability_map
+
+ROOT = Path(__file__).resolve().parents[2]
+GAMMA, ZETA = np.linspace(0.9, 2.4, 300), np.geomspace(0.05, 1.0, 20)
+calls: list[float] = []
+
+
+def root(x: float) -> float:
+    calls.append(x)
+    return float(np.sqrt(x)) if x >= 0.0 else 1 / 0
+
+
+def half(x: float) -> float:
+    return x / 2.0
+
+
+def run(inputs: Sequence[float], folder: Path | None = None) -> list[float]:
+    with ThreadPoolExecutor(1) as executor:
+        return batch.results(root, inputs, executor, folder)
+
+
+def steps(executor: Executor) -> np.ndarray:
+    return stability_map(GAMMA, ZETA, 1.0, 1.0, executor).steps
+
+
+@pytest.mark.slow
+def test_every_executor_gives_the_same_bits() -> None:
+    distributed = pytest.importorskip("distributed")
+    with ThreadPoolExecutor(1) as one:
+        expected = steps(one)
+    with batch.processes(2) as two:
+        assert np.array_equal(steps(two), expected)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0")
+        with cluster, batch.dask(cluster.scheduler_address) as many:
+            assert len(cluster.scheduler_info["workers"]) == 2
+            assert np.array_equal(steps(many), expected)
+
+
+def test_finished_pieces_are_not_computed_again(tmp_path: Path) -> None:
+    calls.clear()
+    assert run([4.0, 9.0], tmp_path) == [2.0, 3.0]
+    assert run([9.0, 16.0, 4.0], tmp_path) == [3.0, 4.0, 2.0]
+    assert sorted(calls) == [4.0, 9.0, 16.0]
+
+
+class Numbers(NamedTuple):
+    """Everything that a piece can hold."""
+
+    array: np.ndarray
+    response: np.ndarray
+    values: tuple[float, ...]
+    names: list[str]
+    count: int
+    is_whole: bool
+
+
+def test_a_piece_holds_every_number_to_the_bit(tmp_path: Path) -> None:
+    values = (0.1, -0.0, math.nan, math.inf, 5e-324)
+    array = np.arange(6.0).reshape(2, 3).T / 7.0
+    written = Numbers(array, np.array([1 + 2j]), values, ["a", "é"], 3, True)
+    pieces.write(tmp_path / "x.piece", written)
+    (read,) = pieces.read(tmp_path / "x.piece") or (None,)
+    assert type(read) is Numbers
+    assert np.array_equal(read.array, array)
+    assert read.response.dtype == complex
+    assert struct.pack("5d", *read.values) == struct.pack("5d", *values)
+    assert read[3:] == written[3:]
+    assert type(read.values) is tuple
+    with pytest.raises(TypeError, match="object"):
+        pieces.write(tmp_path / "y.piece", [object()])
+
+
+def test_reading_a_piece_runs_no_code(tmp_path: Path) -> None:
+    """A pickle with the right hash, and a name that is no NamedTuple, count as damaged."""
+    for content in (
+        pickle.dumps(os.system).decode("latin-1").encode("ascii", "ignore"),
+        b'{"named": ["os", "system", ["true"]]}',
+        b'{"named": ["subprocess", "Popen", ["true"]]}',
+        b'{"array": ["|O", [1], "AAAAAAAAAAA="]}',
+    ):
+        (tmp_path / "x.piece").write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+        assert pieces.read(tmp_path / "x.piece") is None
+
+
+def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
+    with pytest.raises(ValueError, match="another user"):
+        run([4.0], tmp_path)
+
+
+def test_pieces_are_kept_in_the_users_cache_directory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert pieces.default_folder() == Path("/somewhere/wam_stack/pieces")
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert pieces.default_folder() == Path.home() / ".cache" / "wam_stack" / "pieces"
+
+
+@pytest.mark.parametrize("damage", [b"", b"short", b"x" * 200])
+def test_a_damaged_piece_is_computed_again(tmp_path: Path, damage: bytes) -> None:
+    run([4.0], tmp_path)
+    (file,) = tmp_path.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(damage)
+    calls.clear()
+    assert run([4.0], tmp_path) == [2.0]
+    assert calls == [4.0]
+    assert file.read_bytes() == whole
+
+
+def test_another_function_or_source_uses_no_earlier_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run([4.0], tmp_path)
+    with ThreadPoolExecutor(1) as executor:
+        assert batch.results(half, [4.0], executor, tmp_path) == [2.0]
+    assert len(list(tmp_path.iterdir())) == 2
+    monkeypatch.setattr(pieces, "sources", lambda: "changed")
+    run([4.0], tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_an_error_names_its_input_and_keeps_what_is_done(tmp_path: Path) -> None:
+    with pytest.raises(batch.PieceError, match=r"-1\.0: ZeroDivisionError"):
+        run([4.0, -1.0], tmp_path)
+    calls.clear()
+    run([4.0], tmp_path)
+    assert calls == []
+
+
+SLOW = """
+import signal, sys, time
+from pathlib import Path
+from wam_sim import batch
+
+def piece(n):
+    if n:
+        Path(f"began.{n}").touch()
+        time.sleep(600.0)
+    return n
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+    with batch.processes(2) as executor:
+        batch.results(piece, range(2), executor, Path("kept"), lambda done, of: Path(f"report.{done}").touch())
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(SLOW)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        [sys.executable, "slow.py"],
+        cwd=tmp_path,
+        env=environment,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    ) as process:
+        try:
+            while not (
+                (tmp_path / "report.1").exists() and (tmp_path / "began.1").exists()
+            ):  # one worker works, one waits
+                assert process.poll() is None
+            os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+            _, errors = process.communicate(timeout=LONG)  # the piece would take ten minutes
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGINT
+    assert errors.count(b"KeyboardInterrupt") == 1, "a worker prints a traceback, too"
+    assert len(list((tmp_path / "kept").glob("*.piece"))) == 1
+    with suppress(ProcessLookupError):
+        while True:  # until the last of the group has ended
+            os.killpg(process.pid, 0)
+            time.sleep(0.02)
+
+
+LARGE = """
+import time
+from pathlib import Path
+from wam_sim import batch
+
+def piece(given):
+    Path("began").touch()
+    time.sleep(600.0)
+
+if __name__ == "__main__":
+    with batch.processes(1) as executor:
+        for _ in range(4):
+            executor.submit(piece, bytes(1_000_000))  # more than a pipe takes
+        while not Path("began").exists():
+            time.sleep(0.01)
+        time.sleep(0.2)
+        raise SystemExit(3)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("workers", "pieces", "count"), [(5, 1, 1), (2, 7, 2)])
+def test_no_more_processes_are_started_than_there_are_pieces(
+    workers: int, pieces: int, count: int, tmp_path: Path
+) -> None:
+    given = argparse.Namespace(workers=workers, dask=None, fresh=True, command="sweep")
+    with batch_of(given, pieces) as options:
+        assert isinstance(options.executor, ProcessPoolExecutor)
+        assert len(options.executor._processes) == count
+
+
+def test_an_end_does_not_wait_for_inputs_that_no_worker_takes(tmp_path: Path) -> None:
+    (tmp_path / "large.py").write_text(LARGE)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "large.py"], cwd=tmp_path, env=environment, timeout=LONG, check=False)
+    assert done.returncode == 3
+
+
+@pytest.mark.slow
+def test_a_cluster_that_does_not_answer_is_named() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(ValueError, match=r"tcp://127\.0\.0\.1:9"), batch.dask("tcp://127.0.0.1:9", 0.5):
+        pass
+
+
+class Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_one_line_on_a_terminal_and_few_lines_elsewhere() -> None:
+    terminal, file = Terminal(), StringIO()
+    for stream in (terminal, file):
+        progress = Progress("map", stream)
+        for done in range(3, 101):
+            progress(done, 100)
+    assert terminal.getvalue().count("\n") == 1
+    assert terminal.getvalue().count("\r") == 98
+    assert 10 <= file.getvalue().count("\n") <= 12
+    assert file.getvalue().startswith("map: 3 of 100, 3 from an earlier run\n")
+    assert file.getvalue().endswith("map: 100 of 100, 3 from an earlier run\n")

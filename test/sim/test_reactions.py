@@ -1,0 +1,196 @@
+"""Forces and tasks that were refused or doubted are seen in analysis and report, with reason and time."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wam_analysis.demo_report import text, verdict
+from wam_analysis.demo_summary import DemoSummary, SteadyPress, summarize
+from wam_analysis.findings.analysis import Analysis, analyse_bag
+from wam_bag.bag import Bag, TableColumns, read
+from wam_control.task.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_sim.reactions import RecordedReaction, sentences, steady_begin, within
+from wam_sim.simulated_bag import record
+
+SAMPLES = Path(__file__).parents[2] / "bags" / "sample"
+STEPS = """
+- {name: release the brakes, seconds: 0.3, request: enable}
+- {name: nearly straight, seconds: 1.5, posture: [0.0, -1.2, 0.0, 0.05]}
+- {name: along the arm, seconds: 1.0, force: {frame: base, newtons: [4.0, 0.0, 3.0]}}
+- {name: no force, seconds: 0.4}
+- {name: above the limit, seconds: 0.6, force: {frame: outer_link, newtons: [0.0, -80.0, 0.0]}}
+- name: one place twice
+  seconds: 0.6
+  task:
+    axes:
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.27}
+- {name: to the box, seconds: 2.0, posture: [0.0, -1.9, 0.0, 1.45]}
+- {name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}
+- {name: press across, seconds: 1.2, force: {frame: outer_link, newtons: [0.0, -8.0, 0.0]}}
+- name: press across by a task
+  seconds: 1.2
+  task: {frame: outer_link, axes: [{force: 8.0, along: [0, -1, 0], cover: outer_link, contact_position: 0.26}]}
+- {name: brake, seconds: 0.2, request: disable}
+"""
+REFUSED = {
+    "along the arm": ("not_sensed", "standard deviation"),
+    "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
+    "one place twice": ("task_refused", "here they can do 1 at once"),
+}
+
+
+TORQUES = """
+- {name: release the brakes, seconds: 0.3, request: enable}
+- {name: too much, seconds: 0.6, torque: [0, 0, 0, 50]}
+- {name: nothing there, seconds: 3.0, torque: [0, 0, 0, 2]}
+- {name: none, seconds: 1.0, torque: [0, 0, 0, 0]}
+- {name: brake, seconds: 0.2, request: disable}
+"""
+
+
+def recorded(folder: Path, steps: str, values: Mapping[str, Any] | None = None) -> Bag:
+    script = folder / "script.yaml"
+    script.write_text(f"steps:\n{steps}", encoding="utf-8")
+    base = Configuration.load(packaged("wam"))
+    names = [name for name in base.shared.nodes if name not in ("scenario", "recorder")]
+    configuration = base.with_values({"nodes": [*names, "scenario"], **(values or {})})
+    assert not record(configuration, load(script, base.shared), folder / "bag")
+    return read(folder / "bag")
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSummary, Analysis]:
+    bag = recorded(tmp_path_factory.mktemp("reactions"), STEPS)
+    return summarize(bag), analyse_bag(bag, lambda stage: None)
+
+
+def press(summary: DemoSummary, name: str) -> SteadyPress:
+    (one,) = (one for one in summary.presses if one.step == name)
+    return one
+
+
+def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tmp_path: Path) -> None:
+    summary = summarize(recorded(tmp_path, TORQUES))
+    (answer,) = (one for one in verdict(summary) if one.result == "NO")
+    assert str(answer) == "commands carried out: NO (1 refused, 1 not reached)"
+    analysis = analyse_bag(read(tmp_path / "bag"), lambda stage: None)
+    sections = {section.key: section for section in analysis.sections}
+    assert "NOT REACHED in the end: nothing there." in sections["verdict"].sentences
+    beside = [  # a force that is right, in the same step
+        SteadyPress(step.name, steady_begin(step), step.end, 8.0, 8.0, 0.0, 8.0, 8.0, 3.0, reactions=())
+        for step in summary.steps
+    ]
+    (answer,) = (one for one in verdict(summary._replace(presses=tuple(beside))) if one.result == "NO")
+    assert str(answer) == "commands carried out: NO (1 not reached)"
+
+
+def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
+    summary = summarize(recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0]))
+    (answer,) = (one for one in verdict(summary) if "commands" in one.question)
+    words = "1 not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 2 s"
+    assert str(answer) == f"commands carried out: NO (1 refused), {words}"
+
+
+def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) -> None:
+    """It ends the watch of the torque."""
+    slow = TORQUES.replace("seconds: 3.0", "seconds: 3.0, set: {force_loop: {limits.settling_time: 60.0}}")
+    bag = recorded(tmp_path, slow)
+    (answer,) = (one for one in verdict(summarize(bag)) if "commands" in one.question)
+    words = "not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 60 s"
+    assert words in str(answer)
+    assert "not reached" not in str(answer)
+    sections = {section.key: section for section in analyse_bag(bag, lambda stage: None).sections}
+    assert any(words in line for line in sections["verdict"].sentences)
+
+
+def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
+    spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
+    values = {f"driver:world.springs.{key}": value for key, value in spring.items()}
+    summary = summarize(recorded(tmp_path, "- {name: release, seconds: 0.4, request: enable}", values))
+    assert not summary.missed
+    assert not summary.touches
+    assert summary.traces.true.is_known.all()
+
+
+def test_a_posture_that_the_arm_does_not_follow_is_not_as_it_should_be(tmp_path: Path) -> None:
+    """From where a task leaves the arm, which nobody knows before."""
+    turned = Configuration.load(packaged("wam")).shared.arm.joints.start
+    steps = f"""
+- {{name: release the brakes, seconds: 0.3, request: enable, task: {{axes: [{{free: 5.0, joint: joint3}}]}}}}
+- {{name: turn, seconds: 0.4, posture: {[turned[0] + 0.7, *turned[1:]]}}}
+"""
+    summary = summarize(recorded(tmp_path, steps))
+    assert (
+        str(next(one for one in verdict(summary) if one.result == "NO")) == "commands carried out: NO (1 not reached)"
+    )
+    assert "turn: reported (not_followed) from" in text(summary)
+
+
+@pytest.mark.slow
+def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[DemoSummary, Analysis]) -> None:
+    summary, analysis = found
+    begins = {step.name: step.begin / 1e9 for step in summary.steps}
+    sections = {section.key: section for section in analysis.sections}
+    (said,) = (line for line in sections["verdict"].sentences if line.startswith("REFUSED"))
+    for name, (kind, reason) in REFUSED.items():
+        assert any(line.startswith(name) and reason in line for line in sections["force"].sentences), name
+        assert f"({kind} at {begins[name]:.2f} s)" in said or f"({kind} at {begins[name] + 0.005:.2f} s)" in said
+    assert "press across" not in said
+
+
+@pytest.mark.slow
+def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: tuple[DemoSummary, Analysis]) -> None:
+    _, analysis = found
+    sections = {section.key: section for section in analysis.sections}
+    measured = {one.name for key in ("force", "stability") for one in sections[key].findings}
+    for name in REFUSED:
+        assert {one.partition(": ")[2] for one in measured if one.startswith(name)} == {"refused for"}
+    assert "press across: overshoot" in measured
+    assert not any("MISSED" in line for line in sections["verdict"].sentences)
+
+
+@pytest.mark.slow
+def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSummary, Analysis]) -> None:
+    told = text(found[0])
+    assert "force within 10 %: NO (4 of 6 refused)" in told
+    rows = {line.strip().split("  ")[0]: line for line in told.split("Estimated contacts, ")[0].splitlines()}
+    for name in ("along the arm", "above the limit", "one place twice, axis 1"):
+        assert "refused" in rows[name]
+        assert "%" not in rows[name]
+    for name, (kind, _) in REFUSED.items():
+        assert f"  {name}: {kind if kind == 'refused' else f'refused ({kind})'} from" in told
+
+
+@pytest.mark.slow
+def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[DemoSummary, Analysis]) -> None:
+    summary, analysis = found
+    one, other = press(summary, "press across"), press(summary, "press across by a task")
+    assert one.commanded == other.commanded == pytest.approx(8.0)
+    for value in (one.measured, one.true, one.estimated, other.measured, other.true, other.estimated):
+        assert value == pytest.approx(8.0, rel=0.15)
+    assert {"press across by a task: bias of the true force"} <= {
+        finding.name for section in analysis.sections for finding in section.findings
+    }
+
+
+def test_the_true_force_along_an_axis_of_the_base_is_that_of_the_arm_on_the_object() -> None:
+    """The sample has the force on the tube in the base frame, without a link and its rotation."""
+    bag = read(SAMPLES / "hold-tube")
+    (one,) = summarize(bag).presses
+    objects = bag.topics["/wam/sim/objects"]
+    assert isinstance(objects, TableColumns)
+    stamps, columns = objects.row_stamp_ns, objects.columns
+    tube = (columns["object"] == 0) & (stamps >= one.begin) & (stamps < one.end)
+    assert one.true == pytest.approx(-float(columns["arm_force_x"][tube].mean()), rel=1e-3)
+
+
+def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
+    late = RecordedReaction(0, 1_005_000_000, "not_reached", "why")
+    assert within([late], 1_000_000_000, 2_000_000_000) == ()
+    assert len(within([late], 0, 1_000_000_000)) == 1
+    again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]
+    assert sentences("press", again, 0) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 times more: why"]

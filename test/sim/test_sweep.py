@@ -1,0 +1,347 @@
+"""Sweeps: parameter sets, equal results on every executor, what was finished is kept, a refused set fails alone."""
+
+import csv
+import math
+import re
+import subprocess
+import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from wam_cli.main import main
+from wam_control.task.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_sim import batch
+from wam_sim.simulation import Simulation
+from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points, sweep
+from wam_studies.thesis import definition, sweeping
+
+ROOT = Path(__file__).resolve().parents[2]
+GAIN = "force_loop:force_gain"
+STEPS = """
+steps:
+  - {name: release, seconds: 0.1, request: enable}
+  - {name: press, seconds: 0.4, force: {frame: link, newtons: [0.0, -20.0, 0.0]}}
+"""
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    file = tmp_path / "short.yaml"
+    file.write_text(STEPS)
+    return file
+
+
+def runs(script: Path, gains: tuple[float, ...]) -> list[SweepPoint]:
+    configuration = Configuration.load(packaged("testbed"))
+    axes = [Axis(GAIN, gains)]
+    return points(configuration, load(script, configuration.shared), axes, grid(axes))
+
+
+def test_a_grid_has_every_combination_and_a_list_goes_in_step() -> None:
+    axes = [Axis("a", (1, 2)), Axis("b", (3, 4))]
+    assert grid(axes) == [(1, 3), (1, 4), (2, 3), (2, 4)]
+    assert listed(axes) == [(1, 3), (2, 4)]
+    with pytest.raises(ValueError, match="a: 2, b: 1"):
+        listed([axes[0], Axis("b", (3,))])
+
+
+def test_random_sets_are_repeatable_and_between_the_ends() -> None:
+    axes = [Axis("a", (1e-3, 1.0)), Axis("b", (-1.0, 2.0))]
+    found = drawn(axes, 200, 4)
+    assert found == drawn(axes, 200, 4) != drawn(axes, 200, 5)
+    assert all(1e-3 <= a <= 1.0 and -1.0 <= b <= 2.0 for a, b in found)
+    assert 60 < sum(a < 10**-1.5 for a, _ in found) < 140, "by the logarithm"
+    with pytest.raises(ValueError, match="needs two numbers"):
+        drawn([Axis("a", (1.0, 2.0, 3.0))], 1, 1)
+
+
+def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> None:
+    configuration = Configuration.load(packaged("testbed"))
+    with pytest.raises(ParameterError, match="no parameter 'nothing'"):
+        points(configuration, load(script, configuration.shared), [Axis("force_loop:nothing", (1,))], [(1,)])
+
+
+def pressed(tmp_path: Path, frame: str, newtons: list[float]) -> SweepResult:
+    file = tmp_path / "force.yaml"
+    file.write_text(STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons)))
+    return outcome(runs(file, (0.004,))[0])
+
+
+def test_the_error_is_the_same_in_every_frame_and_all_of_the_force_where_nothing_is_touched(tmp_path: Path) -> None:
+    on_link, in_base = pressed(tmp_path, "link", [0.0, -20.0, 0.0]), pressed(tmp_path, "base", [0.0, 0.0, -20.0])
+    assert in_base.force_rms == pytest.approx(on_link.force_rms, rel=0.02) != pytest.approx(20.0)
+    away = pressed(tmp_path, "link", [0.0, 20.0, 0.0])
+    assert away.force_rms == pytest.approx(20.0, abs=0.2)
+    assert not any(one.failure for one in (on_link, in_base, away))
+
+
+def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path) -> None:
+    found = pressed(tmp_path, "link", [20.0, 0.0, 0.0])
+    assert found.failure.startswith("20 N in link refused: the force is measured with a standard deviation of inf N")
+    assert math.isnan(found.force_rms)
+
+
+def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
+    file, found = tmp_path / "brief.yaml", []
+    for seconds in ("0.4", "1.0"):
+        file.write_text(STEPS.replace("0.4", seconds))
+        found.append(outcome(runs(file, (0.004,))[0]))
+    file.write_text(STEPS.replace("force: {frame", "chirp: {newtons: 2.0, from: 1.0, to: 3.0}, force: {frame"))
+    found.append(outcome(runs(file, (0.004,))[0]))
+    assert [one.unassessed for one in found] == ["20 N in link: commanded for less than 1 s", "", ""]
+    assert not any(one.failure for one in found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frame", ["outer_link", "base"])
+def test_a_force_that_a_larger_one_on_another_link_hides_is_not_assessed(frame: str, tmp_path: Path) -> None:
+    """`sim/contact/wrench` has the link that bears most: 7 N of error were stated for a force that was right."""
+    newtons = {"outer_link": "[0.0, -8.0, 0.0]", "base": "[0.0, 0.0, -8.0]"}[frame]
+    at = ", contact_position: 0.26" if frame == "outer_link" else ""
+    file, found = tmp_path / "two.yaml", []
+    for size in (0.0, 15.0):
+        push = f"push: {{cover: inner_link, contact_position: 0.02, newtons: [0.0, 0.0, {size}]}}"
+        force = f"force: {{frame: {frame}, newtons: {newtons}{at}}}"
+        file.write_text(f"""
+steps:
+  - {{name: release, seconds: 0.3, request: enable}}
+  - {{name: above, seconds: 2.0, posture: [0.0, -1.8, 0.0, 1.45]}}
+  - {{name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}}
+  - {{name: press, seconds: 2.0, {force}, {push}}}
+""")
+        configuration = Configuration.load(packaged("wam"))
+        (point,) = points(configuration, load(file, configuration.shared), [], [()])
+        found.append(outcome(point))
+    alone, hidden = found
+    assert alone.force_rms < 3.0  # without a known position the force is known to 2 N
+    assert not alone.unassessed
+    assert math.isnan(hidden.force_rms)
+    assert hidden.unassessed == f"8 N in {frame}: another link bears more in 100 % of its steady state"
+    assert hidden.force_peak > 14.0
+
+
+@pytest.mark.slow
+def test_a_sweep_names_a_force_whose_position_was_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """35 N along base -z, 36 deg off the normal of the link, were 24 N, and the table had nothing but `force_worst`."""
+    file = tmp_path / "inclined.yaml"
+    file.write_text("""
+steps:
+  - {name: release, seconds: 0.3, request: enable}
+  - {name: above, seconds: 2.0, posture: [0.0, -1.7, 0.0, 1.3]}
+  - {name: down, seconds: 4.0, posture: [0.0, -2.35, 0.0, 1.3], until_force: 1.5}
+  - {name: press, seconds: 3.0, force: {frame: base, newtons: [0.0, 0.0, -35.0]}}
+""")
+    configuration = Configuration.load(packaged("wam"))
+    run = Simulation(configuration, load(file, configuration.shared))
+    assert run.play() == run.unmet == ""
+    assert run.doubts.startswith("press, position_assumed: something is touched and where it is known from the torques")
+    table = tmp_path / "table.csv"
+    vary = f"{GAIN}={configuration.sections['force_loop']['force_gain'][0]}"
+    with pytest.raises(SystemExit, match="0"):
+        main(["sweep", str(table), "--scenario", str(file), "--vary", vary, "--keep", str(tmp_path)])
+    with table.open() as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["failure"] == ""
+    assert row["reported"] == "press: position_assumed"
+    assert float(row["force_worst"]) > 5.0
+    assert "1 sets, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
+
+
+def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) -> None:
+    file, found = tmp_path / "force.yaml", []
+    for newtons in ("[0.0, -20.0, 0.0]", "[20.0, 0.0, 0.0]"):
+        file.write_text(STEPS.replace("[0.0, -20.0, 0.0]", newtons))
+        run = Simulation(*runs(file, (0.004,))[0])
+        assert not run.play()
+        found.append(run.unmet)
+    assert not found[0]
+    assert found[1].startswith("press refused: the force is measured with a standard deviation of inf N")
+    assert [one.step.name for one in run.played] == ["release", "press"]
+
+
+@pytest.mark.parametrize(
+    ("command", "failure"),
+    [
+        ("torque: [0, 0, 0, 50]", "press refused: force of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
+        ("torque: [0, 0, 0, 2]", "press not reached: force of joint 4: "),
+        (
+            "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
+            "press refused: force along (0, 0, -1) at 0.28 m of outer_link: 70 N is commanded; allowed: up to",
+        ),
+        ("torque: [0, 0, 0, 0]", ""),
+    ],
+)
+def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
+    command: str, failure: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "task.yaml"
+    press = f"- {{name: press, seconds: {3.0 if 'reached' in failure else 0.4}, {command}}}"
+    file.write_text(f"steps:\n- {{name: release, seconds: 0.1, request: enable}}\n{press}\n")
+    configuration = Configuration.load(packaged("wam"))
+    found = outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure
+    assert found.startswith(failure)
+    assert bool(found) == bool(failure)
+
+
+def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> None:
+    """From where a task leaves the arm, which nobody knows before."""
+    file = tmp_path / "late.yaml"
+    file.write_text("""steps:
+- {name: release, seconds: 0.1, request: enable}
+- {name: task, seconds: 0.1, task: {axes: [{position: here, joint: joint3}]}}
+- {name: turn, seconds: SECONDS, posture: [0.4, -1.2, 0.0, 1.2]}
+""")
+    configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": [0.0, -1.2, 0.0, 1.2]})
+    text, found = file.read_text(), []
+    for seconds in (0.3, 0.42):
+        file.write_text(text.replace("SECONDS", str(seconds)))
+        found.append(outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure)
+    assert found[0].startswith("turn not reached: the commanded posture moves faster than the arm follows, joint1 ")
+    assert not found[1]
+
+
+@pytest.mark.slow
+def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
+    given = runs(script, (0.004, 0.02, -1.0))
+    with ThreadPoolExecutor(1) as one:
+        found = sweep(given, one, tmp_path / "kept")
+    assert [bool(result.failure) for result in found] == [False, False, True]
+    assert found[2].failure
+    assert found[0].force_rms > found[1].force_rms, "a small gain is slower"
+    again: list[tuple[int, int]] = []
+    with ThreadPoolExecutor(1) as one:
+        kept = sweep(given, one, tmp_path / "kept", lambda done, of: again.append((done, of)))
+    assert again == [(3, 3)]
+    assert kept[:2] == found[:2]
+
+
+@pytest.mark.slow
+def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
+    given = runs(script, (0.004, 0.02))
+    with ThreadPoolExecutor(1) as one:
+        expected = sweep(given, one)
+    with batch.processes(2) as two:
+        assert sweep(given, two) == expected
+    distributed = pytest.importorskip("distributed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with (
+            distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
+            batch.dask(cluster.scheduler_address) as workers,
+        ):
+            assert sweep(given, workers) == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
+        (("scenario:script=a,b",), "the scenario is that of --scenario"),
+        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs are in Python"),
+        (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
+        ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
+        (("arm.payload=0", "--set=arm.payload=3"), "--set arm.payload has no effect here: --vary sets it"),
+        ((f"{GAIN}=0.001", "--runs=3"), "--runs has no effect without --random; leave it out, or give --random"),
+        ((f"{GAIN}=0.001", "--seed=1"), "--seed has no effect without --random"),
+        (("seed=1:2:1000", "arm.payload=0.1:0.2:1000"), "1000000 sets in all, seed: 1000, arm.payload: 1000; at most"),
+    ],
+)
+def test_an_axis_that_would_not_be_used_is_refused(
+    axes: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["sweep", str(tmp_path / "s.csv"), *(axis if axis[0] == "-" else f"--vary={axis}" for axis in axes)])
+    assert ended.value.code
+    assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("own.yaml", "FILE .*own.yaml is the configuration itself; give another file"),
+        ("base.yaml", "FILE .*base.yaml is a base of the configuration .*own.yaml; give another file"),
+        ("steps.yaml", "FILE .*steps.yaml is read by this command; give another file"),
+    ],
+)
+def test_a_sweep_does_not_write_over_what_it_reads(
+    target: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    texts = {
+        "base.yaml": "base: testbed\n",
+        "own.yaml": "base: base.yaml\n",
+        "steps.yaml": "steps:\n  - {name: wait, seconds: 0.01}\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    command = ["sweep", str(tmp_path / target), "--config", str(tmp_path / "own.yaml"), "--workers", "1", "--fresh"]
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--scenario", str(tmp_path / "steps.yaml"), "--vary", f"{GAIN}=0.004"])
+    assert ended.value.code == 1
+    assert re.search(words, capsys.readouterr().err)
+    assert {name: (tmp_path / name).read_text() for name in texts} == texts
+
+
+def test_runs_with_a_node_of_ones_own_are_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its code may have changed: what was kept of other code was taken for its own."""
+    monkeypatch.syspath_prepend(tmp_path)
+    module, overlay, script = tmp_path / "own_push.py", tmp_path / "own.yaml", tmp_path / "steps.yaml"
+    module.write_text("from wam_control.velocity.gravity_node import GravityNode as Own\n")
+    overlay.write_text(
+        "base: wam\n/**: {ros__parameters: {nodes: [driver, transform, velocity_loop, 'own_push:Own']}}\n"
+    )
+    script.write_text("steps:\n  - {name: release, seconds: 0.1, request: enable}\n")
+    command = ["sweep", str(tmp_path / "s.csv"), "--config", str(overlay), "--scenario", str(script), "--workers", "1"]
+    for _ in range(2):
+        with pytest.raises(SystemExit):
+            main([*command, "--vary", "arm.payload=0.0", "--keep", str(tmp_path / "kept")])
+        assert "from an earlier run" not in capsys.readouterr().err
+    assert not list((tmp_path / "kept").glob("**/*.*"))
+
+
+def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path) -> None:
+    table, plot = tmp_path / "sweep.csv", tmp_path / "sweep.png"
+    command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--config", "testbed", "--fresh"]
+    command += ["--workers", "1", "--scenario", str(script), "--vary", f"{GAIN}=0.004:0.02:2", "--picture", str(plot)]
+    subprocess.run(command, check=True, capture_output=True)
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row[GAIN]) for row in rows] == pytest.approx([0.004, 0.02])
+    assert all(float(row["force_rms"]) > 0.0 for row in rows)
+    assert plot.stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Path) -> None:
+    """Cables that do not creep are measured as such, against a prediction that knows only their radii."""
+    table, plot = tmp_path / "creep.csv", tmp_path / "creep.png"
+    command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--experiment", "creep", "--fresh"]
+    command += ["--workers", "1", "--vary", "driver:effects.creep=true,false", "--picture", str(plot)]
+    subprocess.run(command, check=True, capture_output=True)
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    creeping, rigid = ([row for row in rows if row["driver:effects.creep"] == name] for name in ("True", "False"))
+    assert [row["quantity"] for row in creeping] == [row["quantity"] for row in rigid]
+    predicted = [[float(row["predicted"]) for row in those] for those in (creeping, rigid)]
+    assert predicted[0] == pytest.approx(predicted[1])
+    assert all(row["agrees"] == "True" for row in creeping)
+    assert not any(row["agrees"] == "True" for row in rigid)
+    assert all(abs(float(row["measured"])) < 0.01 * float(row["predicted"]) for row in rigid)
+    assert plot.stat().st_size > 5000
+
+
+def test_a_refused_set_of_an_experiment_fails_alone_and_an_unknown_parameter_before_anything_runs() -> None:
+    experiment = definition.load("creep")
+    (point,) = sweeping.points(experiment, [Axis(GAIN, (-1.0,))], [(-1.0,)])
+    found = sweeping.outcome(point)
+    assert "force_gain" in found.failure
+    assert not found.rows
+    with pytest.raises(ParameterError, match="no parameter 'nothing'"):
+        sweeping.points(experiment, [Axis("force_loop:nothing", (1,))], [(1,)])

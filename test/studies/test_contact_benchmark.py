@@ -1,0 +1,463 @@
+"""The contact benchmark: it counts true contacts only, knows the truth, and scores as by hand."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from contact_truth import torques as torques_by_hand
+
+from wam_control.contact.contact_estimator import ContactEstimatorParameters
+from wam_control.task.scenario import load as load_script
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_description.signals import NO_LOAD, Load
+from wam_sim.batch import processes
+from wam_sim.simulation import Simulation
+from wam_studies.contact_benchmark.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
+from wam_studies.contact_benchmark.evaluation import (
+    BenchmarkExtent,
+    BenchmarkResult,
+    ScenarioTask,
+    evaluate,
+    scenarios,
+)
+from wam_studies.contact_benchmark.figure import figure
+from wam_studies.contact_benchmark.free_motion import ContactFreeTime, contact_free_time, torque_errors
+from wam_studies.contact_benchmark.over_topics import script
+from wam_studies.contact_benchmark.page import (
+    MARGINAL,
+    MET,
+    MISSED,
+    MISSED_MARGINAL,
+    TARGET_MET,
+    mark,
+    missed,
+    page,
+)
+from wam_studies.contact_benchmark.scenarios import (
+    BenchmarkScenario,
+    PlannedContact,
+    ScenarioGenerator,
+    dither_values,
+)
+from wam_studies.contact_benchmark.score import ANY, ScenarioScore, further_metrics, required_metrics, score
+from wam_studies.contact_benchmark.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
+from wam_studies.contact_benchmark.statistics import FEW, Interval, counted, events, quantile, rms, share
+from wam_studies.contact_robustness.requirements import RequiredRow, required_table
+
+CONFIGURATION = Configuration.load(packaged("wam"))
+ARM = CONFIGURATION.shared.arm
+LENGTHS = dict(zip(ARM.covers.names, ARM.covers.length, strict=True))
+PERIOD = 5_000_000  # ns
+ZERO = (0.0, 0.0, 0.0)
+NAN = math.nan
+
+
+def hypothesis(cover: str, probability: float, place: float = NAN, sd: float = NAN, **more: Any) -> EstimatedHypothesis:
+    given: dict[str, Any] = {"low": NAN, "high": NAN, "force": (0.0, 5.0, 0.0), "moment": ZERO, **more}
+    return EstimatedHypothesis(cover, probability, place, sd, **given)
+
+
+def record(
+    i: int, newtons: float, hypotheses: tuple[EstimatedHypothesis, ...] = (), speed: float = 1.0, error: float = 0.0
+) -> Record:
+    load = Load("outer_link", 0.3, (0.0, newtons, 0.0), (0.0, 0.0, 0.3 * newtons)) if newtons else NO_LOAD
+    return Record(
+        stamp=(i + 1) * PERIOD,
+        q=(0.0,) * 4,
+        qd=(speed, 0.0, 0.0, 0.0),
+        thetad=(30.0 * speed, 0.0, 0.0, 0.0),
+        load=load,
+        torques=(0.0,) * 4,
+        external=(error, 0.0, 0.0, 0.0),
+        external_sd=(0.5,) * 4,
+        in_contact=bool(hypotheses),
+        hypotheses=hypotheses,
+    )
+
+
+def story(force: list[float], hypotheses: dict[int, tuple[EstimatedHypothesis, ...]], **more: Any) -> Played:
+    planned = (PlannedContact("push", "outer_link", 0.3, 0.0, 5.0, 0.5, 1.0, 0.0),)
+    records = [record(i, newtons, hypotheses.get(i, ()), **more) for i, newtons in enumerate(force)]
+    return Played(BenchmarkScenario("by hand", "moving", {}, (), planned), records, "")
+
+
+# true contacts
+
+
+def test_a_contact_is_evaluated_as_by_hand() -> None:
+    outer, inner = hypothesis("outer_link", 0.8, 0.33, 0.02, moment=(0.0, 0.0, 1.2)), hypothesis("inner_link", 0.2)
+    played = story([0.0] * 100 + [5.0] * 60 + [0.0] * 40, dict.fromkeys(range(104, 170), (outer, inner)))
+    ((contact,), excluded) = evaluate_contacts(played, LENGTHS)
+    assert excluded == 0
+    assert (contact.cover, contact.position, contact.force, contact.kind) == ("outer_link", 0.3, 5.0, "push")
+    assert contact.latency == pytest.approx(0.025)  # from record 99, the last without force, to 104
+    assert contact.detected
+    assert contact.right_link
+    assert contact.link_probability == 0.8
+    assert contact.error == pytest.approx(0.03)
+    assert contact.position_sd == 0.02
+    assert contact.moment_error == pytest.approx(0.3)
+    # more believed: places within 1.5 sd, 86.6 % of 80 %; on the inner link the density is 0.2/0.5588 per metre, less
+    assert contact.credibility == pytest.approx(0.8 * math.erf(1.5 / math.sqrt(2.0)), abs=0.02)
+
+
+def test_a_wrong_link_and_a_missed_contact_have_an_infinite_error() -> None:
+    force = [0.0] * 100 + [5.0] * 60
+    ((wrong,), _) = evaluate_contacts(
+        story(force, {i: (hypothesis("inner_link", 0.9),) for i in range(100, 160)}), LENGTHS
+    )
+    assert wrong.detected
+    assert not wrong.right_link
+    assert math.isinf(wrong.error)
+    assert wrong.credibility > 0.9
+    ((missing,), _) = evaluate_contacts(story(force, {}), LENGTHS)
+    assert math.isinf(missing.latency)
+    assert math.isinf(missing.error)
+    assert not missing.in_set
+
+
+def test_a_detection_from_before_the_contact_has_no_latency() -> None:
+    hypotheses = {i: (hypothesis("outer_link", 1.0, 0.3, 0.01),) for i in range(90, 160)}
+    played = story([0.0] * 100 + [5.0] * 60, hypotheses)
+    ((contact,), _) = evaluate_contacts(played, LENGTHS)
+    assert math.isnan(contact.latency)
+    assert contact_free_time(played).alarms == 1
+
+
+def test_short_and_hard_contacts_are_counted_and_excluded() -> None:
+    assert evaluate_contacts(story([0.0] * 50 + [5.0] * 10 + [0.0] * 50, {}), LENGTHS) == ([], 1)
+    assert evaluate_contacts(story([0.0] * 50 + [60.0] * 60, {}), LENGTHS) == ([], 1)
+
+
+def test_a_gap_of_one_period_does_not_split_a_contact_and_a_longer_one_does() -> None:
+    assert len(spans(story([5.0] * 40 + [0.0] + [5.0] * 40, {}).records)) == 1
+    assert len(spans(story([5.0] * 40 + [0.0] * 3 + [5.0] * 40, {}).records)) == 2
+
+
+def test_the_estimators_own_set_counts_where_it_gives_one() -> None:
+    force = [0.0] * 100 + [5.0] * 60
+    for low, high, holds in ((0.2, 0.31, True), (0.31, 0.4, False)):
+        given = (hypothesis("outer_link", 1.0, 0.3, 0.01, low=low, high=high),)
+        ((contact,), _) = evaluate_contacts(story(force, dict.fromkeys(range(100, 160), given)), LENGTHS)
+        assert contact.in_set is holds
+
+
+def test_an_alarm_that_ends_late_is_not_a_false_one_and_a_new_one_is() -> None:
+    on = (hypothesis("outer_link", 1.0, 0.3, 0.01),)
+    force = [0.0] * 50 + [5.0] * 50 + [0.0] * 100
+    late = story(force, dict.fromkeys(range(52, 130), on))
+    assert contact_free_time(late) == ContactFreeTime("moving", pytest.approx(0.65), 0)  # 50 + 80 records
+    assert (
+        contact_free_time(story(force, dict.fromkeys([*range(52, 110), *range(150, 153), *range(160, 170)], on))).alarms
+        == 2
+    )
+
+
+def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_start_and_end_of_a_contact() -> None:
+    played = story([0.0] * 200, {}, error=2.0)
+    found = torque_errors(played)
+    assert found.moving_count == 160 - 1  # 0.2 s of the beginning are the observer's
+    assert found.moving == (4.0 * found.moving_count, 0.0, 0.0, 0.0)
+    assert found.moving_z[0] == pytest.approx(16.0 * found.moving_count)
+    assert found.still_count == found.sliding_count == 0
+    assert torque_errors(story([0.0] * 200, {}, speed=0.05, error=2.0)).still_count == 159
+    with_contact = torque_errors(story([0.0] * 100 + [5.0] * 50 + [0.0] * 50, {}, error=2.0))
+    assert 159 - 2 * 25 <= with_contact.moving_count <= 159 - 2 * 22
+
+
+def test_a_dithered_arm_is_compared_with_the_truth_over_a_whole_cycle() -> None:
+    """A hand that rubs back and forth with the dither, and an estimate that is its mean."""
+    played = story([5.0] * 200, {}, speed=0.0)
+    swing = [1.0 + 3.0 * math.sin(2.0 * math.pi * i / 8.0) for i in range(200)]
+    rubbing = [
+        one._replace(torques=(torque, 0.0, 0.0, 0.0), external=(1.0, 0.0, 0.0, 0.0))
+        for one, torque in zip(played.records, swing, strict=True)
+    ]
+    errors = {}
+    for group in ("rest", "dither"):
+        found = torque_errors(played._replace(scenario=played.scenario._replace(group=group), records=rubbing))
+        errors[group] = math.sqrt(found.still[0] / found.still_count)
+    assert errors["rest"] == pytest.approx(3.0 / math.sqrt(2.0), rel=0.02)
+    assert errors["dither"] < 1e-9
+
+
+def test_credibility_of_the_truth_is_uniform_where_the_belief_is_right() -> None:
+    random = np.random.default_rng(0)
+    levels = []
+    for _ in range(400):
+        mean, sd = random.uniform(0.15, 0.25), random.uniform(0.005, 0.03)
+        hypotheses = (hypothesis("outer_link", 0.7, mean, sd), hypothesis("inner_link", 0.3))
+        if random.random() < 0.7:
+            levels.append(credibility(hypotheses, "outer_link", random.normal(mean, sd), LENGTHS))
+        else:
+            levels.append(credibility(hypotheses, "inner_link", random.uniform(0.0, 0.5), LENGTHS))
+    assert np.mean(np.array(levels) <= 0.5) == pytest.approx(0.5, abs=0.08)
+    assert np.mean(np.array(levels) <= 0.9) == pytest.approx(0.9, abs=0.12)
+
+
+# numbers and marks
+
+
+def test_intervals_are_those_of_the_textbooks() -> None:
+    found = share(8, 10)  # Wilson 1927, as in Brown, Cai & DasGupta 2001
+    assert (found.value, found.low, found.high) == (0.8, pytest.approx(0.490, abs=2e-3), pytest.approx(0.943, abs=2e-3))
+    assert events(0, 120.0).high == pytest.approx(3.69, abs=0.03)  # exact Poisson, 97.5 %
+    assert events(5, 1.0).low == pytest.approx(1.62, abs=0.03)
+    middle = quantile([float(i) for i in range(1, 102)], 0.5)
+    assert (middle.value, middle.low, middle.high) == (51.0, 41.0, 61.0)
+    assert quantile([1.0, 2.0, 3.0, 4.0], 0.5).value == 2.5
+    assert quantile([1.0, math.inf, math.inf], 0.5).value == math.inf
+    few = quantile([1.0, 2.0, 3.0], 0.5)
+    assert few.value == 2.0
+    assert math.isnan(few.low)
+    assert math.isnan(few.high), "the interval reaches beyond what was seen"
+    assert rms([4.0, 12.0], [1, 3]).value == 2.0
+    assert math.isnan(share(0, 0).value)
+
+
+def test_the_interval_of_an_rms_is_that_of_its_scenes_not_of_its_samples() -> None:
+    random = np.random.default_rng(1)
+    biases = random.normal(0.0, 1.0, 40)
+    few = rms((1000 * biases**2).tolist(), [1000] * 40)
+    assert few.high - few.low > 0.2
+
+
+def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
+    row = (0.0, 2.0), (0.0, 1.0)
+    assert mark(*row, Interval(0.9, 0.8, 1.4, 50)) == TARGET_MET
+    assert mark(*row, Interval(1.5, 1.2, 1.9, 50)) == MET
+    assert mark(*row, Interval(1.5, 1.2, 2.1, 50)) == MARGINAL
+    assert mark(*row, Interval(2.5, 2.2, 3.1, 50)) == MISSED
+    assert mark(*row, Interval(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
+    assert mark(*row, quantile([0.5], 0.5)) == FEW
+    assert mark(*row, Interval(math.nan, math.nan, math.nan, 0)) == "no data"
+    none = (0.0, 0.0), (0.0, 0.0)
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 60)) == FEW
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 130)) == MET
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 600)) == TARGET_MET
+    assert mark(*none, Interval(1.0, 0.0, 5.0, 600)) == MISSED
+    assert mark(ANY, ANY, Interval(9.0, 8.0, 10.0, 5)) == ""
+
+
+def test_a_verdict_on_few_observations_says_so() -> None:
+    assert counted(MET, 20) == MET
+    assert counted(MET, 2) == "met (n=2: too few)"
+    assert counted("", 2) == ""
+    assert "met (n=2: too few)" in required_table([RequiredRow("x", "", 1.0, "", (0.0, 1.0), ANY, share(2, 2), "")])
+    assert "too few" not in required_table(
+        [RequiredRow("x", "", 1.0, "", (0.0, 9.0), ANY, Interval(1.0, 1.0, 1.0, 1), "")]
+    )
+
+
+def synthetic(error: float, latency: float, right: float, group: str = "moving") -> list[ScenarioScore]:
+    """A hundred scenarios with a contact of 5 N; a share names the right link, 90 % of the sets hold the truth."""
+    result = []
+    for i in range(100):
+        good = i < 100 * right
+        contact = EvaluatedContact(
+            group, "push", 0.0, "outer_link", 0.2, 5.0, True, True, latency, True, 0.99, good, "",
+            error if good else math.inf, 0.015 if good else NAN, 0.5, i % 10 != 0, 0.1, 1.0, 5.0,
+        )  # fmt: skip
+        rest = torque_errors(story([0.0] * 100, {}, error=0.2))
+        result.append(ScenarioScore(f"scenario {i}", [contact], 0, 0, rest, ContactFreeTime("free", 2.0, 0), ""))
+    return result
+
+
+def found(name: str, scores: list[ScenarioScore]) -> Interval:
+    (row,) = [row for row in [*required_metrics(ARM), *further_metrics(ARM)] if row.name == name]
+    return row.of(scores)
+
+
+def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
+    scores = synthetic(error=-0.025, latency=0.04, right=0.93)
+    assert found("external torque in motion, rms, joint1", scores).value == pytest.approx(0.2)
+    assert found("false alarms in free motion with stops", scores)[::3] == (0.0, 200)
+    assert found("5 N on the outer link detected within 60 ms", scores).value == 1.0
+    assert found("5 N on the outer link detected within 30 ms", scores).value == 0.0
+    assert found("position on the outer link at 5 N, median error", scores).value == pytest.approx(0.025)
+    assert found("contacts with a reported sd below 2 cm", scores).value == pytest.approx(0.93)
+    assert found("wrong link", scores).value == pytest.approx(0.07)
+    assert found("position: 68 % quantile of error over reported sd", scores).value == pytest.approx(25 / 15)
+    assert found("position on the outer link at 10 N, median error", scores).observed == 0
+
+
+def test_a_missed_must_is_named_and_a_met_one_is_not() -> None:
+    bad = missed(BenchmarkResult((1,), {1: synthetic(-0.04, 0.07, 0.93)}), ARM)
+    assert "position on the outer link at 5 N, median error" in bad
+    assert "5 N on the outer link detected within 60 ms" in bad
+    assert "wrong link" in bad
+    good = missed(BenchmarkResult((1,), {1: synthetic(-0.004, 0.02, 1.0)}), ARM)
+    assert good == []
+
+
+def test_half_the_contacts_without_a_place_is_no_finite_median() -> None:
+    assert found("position on the outer link at 5 N, median error", synthetic(0.01, 0.02, 0.4)).value == math.inf
+
+
+def test_the_page_holds_every_row_that_is_asked() -> None:
+    result = BenchmarkResult((7,), {7: synthetic(0.01, 0.02, 1.0)})
+    text = page(result, ARM, "wam evaluate contact", "", "picture.png")
+    assert all(f"| {row.name} |" in text for row in required_metrics(ARM))
+    assert "| seed 7 |" in text
+
+
+# truth
+
+
+@pytest.mark.parametrize("cover", ["inner_link", "outer_link"])
+def test_torques_of_a_load_are_those_of_virtual_work(cover: str) -> None:
+    random = np.random.default_rng(3)
+    load_torques = LoadTorques(ARM)
+    for _ in range(5):
+        q, point, force = random.uniform(-1.0, 1.0, 4), random.uniform(-0.1, 0.4, 3), random.uniform(-9.0, 9.0, 3)
+        load = Load(cover, point[0], tuple(force), tuple(np.cross(point, force)))
+        by_hand = torques_by_hand(q, cover, point, force)
+        assert np.abs(np.subtract(load_torques.torques(q, load), by_hand)).max() < 1e-6
+    assert load_torques.torques([0.0] * 4, NO_LOAD) == (0.0,) * 4
+
+
+def pick(kind: str, seed: int = 1) -> BenchmarkScenario:
+    """A scenario in motion whose first contact is of a kind."""
+    drawn = ScenarioGenerator(CONFIGURATION, seed).contacts(120)
+    return next(scenario for scenario in drawn if scenario.planned[0].kind == kind)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["push", "sphere", "flat", "foam"])
+def test_contacts_of_every_kind_truly_happen_where_they_are_planned(kind: str) -> None:
+    scenario = pick(kind)
+    meant = scenario.planned[0]
+    played = play(CONFIGURATION, scenario)
+    first = spans(played.records)[0]
+    assert first.cover == meant.cover
+    middle = played.records[first.first + 20].load
+    length = LENGTHS[meant.cover]
+    assert middle.position == pytest.approx(
+        meant.position, abs=0.05 if kind == "foam" else 0.03 if kind == "flat" else 0.015
+    )
+    assert -0.03 < middle.position < length + 0.03
+    across = math.hypot(middle.force[1], middle.force[2])
+    if kind != "foam":
+        assert across == pytest.approx(meant.force, rel=0.2 + meant.friction)
+    while_held = played.records[first.first : first.last + 1]
+    assert all(record.load.cover for record in while_held)  # kept contact
+    assert (while_held[-1].stamp - while_held[0].stamp) * 1e-9 > 0.2
+
+
+@pytest.mark.slow
+def test_a_hand_that_misses_is_not_counted() -> None:
+    scenario = pick("sphere")
+    values = dict(scenario.values)
+    late = [100.0 for _ in values["driver:world.pushers.begin"]]
+    values |= {"driver:world.pushers.begin": late, "driver:world.pushers.end": [200.0] * len(late)}
+    steps = tuple(step._replace(push=None) for step in scenario.steps)
+    missing = scenario._replace(values=values, steps=steps)
+    found_there = score(play(CONFIGURATION, missing), ARM)
+    assert found_there.contacts == []
+    assert found_there.excluded == 0
+    assert found_there.not_made == len(scenario.planned)
+    assert len(score(play(CONFIGURATION, scenario), ARM).contacts) == len(scenario.planned)
+
+
+# scenarios
+
+
+def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
+    extent = BenchmarkExtent(contacts=6, resting=2, free=12.0)
+    first, again, other = (scenarios(CONFIGURATION, seed, extent) for seed in (5, 5, 6))
+    assert first == again
+    assert all(a.values != b.values for a, b in zip(first, other, strict=True))
+    more = scenarios(CONFIGURATION, 5, extent._replace(contacts=8))
+    assert more[:3] == first[:3]  # a larger benchmark starts like the smaller one
+
+
+@pytest.mark.slow
+def test_the_scores_have_a_picture(tmp_path: Path) -> None:
+    figure(synthetic(error=-0.025, latency=0.04, right=0.93), ARM, tmp_path / "page" / "benchmark.png")
+    assert (tmp_path / "page" / "benchmark.png").stat().st_size > 20_000
+
+
+@pytest.mark.slow
+def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
+    drawn = scenarios(CONFIGURATION, 4, BenchmarkExtent(contacts=4, resting=0, free=0.0))
+    with ThreadPoolExecutor(1) as one, processes(2) as two:
+        alone, together = (evaluate(CONFIGURATION, drawn, executor) for executor in (one, two))
+    assert repr(alone) == repr(together)
+    assert sum(len(scenario.contacts) for scenario in alone) >= 3
+
+
+def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_declared_range() -> None:
+    drawn = ScenarioGenerator(CONFIGURATION, 2).contacts(40) + ScenarioGenerator(CONFIGURATION, 2).free(24.0)
+    friction = [factor for scenario in drawn for factor in scenario.values["driver:mismatch.motor_friction"]]
+    assert 0.9 <= min(friction) < 0.93
+    assert 1.07 < max(friction) <= 1.1
+    assert all(scenario.values["contact_estimator:observer.friction_scale"] == 1.0 for scenario in drawn)
+    assert 0.0 < max(scenario.values.get("driver:mismatch.payload", 0.0) for scenario in drawn) <= 0.05
+    for scenario in drawn:  # what is carried is declared, and only that
+        assert ("driver:mismatch.payload" in scenario.values) is (
+            "contact_estimator:observer.payload" in scenario.values
+        )
+    assert CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer.payload == (0.0, 0.0)
+    assert not any(scenario.values["contact_estimator:use_joint_sensors"] for scenario in drawn)
+
+
+def test_dither_is_asked_for_only_where_the_velocity_loop_has_it() -> None:
+    sections = {name: dict(flat) for name, flat in CONFIGURATION.sections.items()}
+    sections["/**"].pop("timing.dither_cycle", None)
+    assert dither_values(CONFIGURATION._replace(sections=sections)) == {}
+    sections["/**"]["timing.dither_cycle"] = 0
+    assert dither_values(CONFIGURATION._replace(sections=sections)) == {"timing.dither_cycle": 40}
+
+
+def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
+    domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import yaml
+
+    from wam_studies import contact_scenarios
+
+    scenario = pick("sphere")
+    file = tmp_path / "scenario.yaml"
+    file.write_text(yaml.safe_dump(script(scenario)))
+    assert tuple(load_script(file, CONFIGURATION.shared)) == scenario.steps
+    short = scenario._replace(steps=scenario.steps[:3])
+    direct = play(CONFIGURATION, short)
+    over = contact_scenarios.play(CONFIGURATION, short, domain_id)
+    assert over.failure == direct.failure == ""
+    assert len(over.records) == len(direct.records)
+    for one, other in zip(direct.records, over.records, strict=True):
+        exact = (
+            one.stamp,
+            one.q,
+            one.qd,
+            one.thetad,
+            one.external,
+            one.external_sd,
+            one.in_contact,
+            one.load.force,
+            one.load.moment,
+        )
+        assert exact == (
+            other.stamp, other.q, other.qd, other.thetad, other.external, other.external_sd, other.in_contact,
+            other.load.force, other.load.moment,
+        )  # fmt: skip
+    (mine,), (theirs,) = (score(played, ARM).contacts for played in (direct, over))
+    for name, value in mine._asdict().items():
+        got = getattr(theirs, name)
+        assert got == (pytest.approx(value, rel=1e-4, abs=1e-4, nan_ok=True) if isinstance(value, float) else value)
+
+
+def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a_shorter_one() -> None:
+    barrett = Configuration.load(packaged("barrett-wam7"))
+    steps = tuple(ScenarioGenerator(barrett, 1).free(1)[0].steps[:1])
+    stiff = BenchmarkScenario("stiff", "free", {"driver:mismatch.stiffness": [1.15] * 7}, steps, ())
+    with pytest.raises(ParameterError, match=r"multiply timing\.substeps by 2"):
+        Simulation(barrett.with_values(stiff.values), steps)
+    played = play(barrett, stiff)
+    assert not played.failure
+    assert played.records[-1].stamp == pytest.approx(1e9 * sum(step.seconds for step in steps), abs=5e6)
+    assert str(ScenarioTask(barrett, stiff)) == "stiff"

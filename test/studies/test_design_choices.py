@@ -1,0 +1,153 @@
+"""Numbers of the design rules: against eigenvalues and exact responses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wam_description.configuration import Configuration, packaged
+from wam_studies.design_choices import (
+    BASE,
+    GAMMA,
+    STEP,
+    Choice,
+    differential_radius,
+    friction_or_stiffness,
+    half_friction,
+    stiffness_rule,
+    stronger_rotor,
+    twice_stiffness,
+    twisted_circuit,
+)
+from wam_studies.scorecard import measures
+from wam_theory.linear_loop import routh_gain
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, Verdict, assess, largest_stable_step, simulate
+
+
+@pytest.fixture(scope="module")
+def choices() -> dict[str, Choice]:
+    return {choice.quantity: choice for choice in friction_or_stiffness()}
+
+
+def test_a_transmission_by_4_10_would_cost_the_arm_a_tenth_of_its_bandwidth() -> None:
+    """By the eigenvalues of two masses: so little do 3 % of the asymptote say against the transmission."""
+    configuration = Configuration.load(packaged("wam"))
+    m = measures(configuration)
+    for row, jm, jl in zip(stiffness_rule(configuration), m.rotor_inertia, m.link_inertia, strict=True):
+        for cable, expected in ((row.transmission, row.bandwidth), (row.best_transmission, row.with_best)):
+            stiffness = np.array([[cable, -cable], [-cable, cable + row.contact]])
+            lowest = np.linalg.eigvals(np.linalg.solve(np.diag([jm, jl]), stiffness)).real.min()
+            assert expected == pytest.approx(math.sqrt(lowest) / (2.0 * math.pi), rel=1e-6)
+        assert 0.85 < row.with_best / row.bandwidth < 0.95
+        assert row.best_transmission / row.contact == pytest.approx(jm / jl)
+        assert row.transmission > 10.0 * row.best_transmission
+
+
+def gain() -> float:
+    return GAMMA * float(routh_gain(BASE.inertia, BASE.damping, BASE.transmission_stiffness, BASE.contact_stiffness))
+
+
+def coulomb(node: FrictionNode) -> FrictionNode:
+    j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
+    return FrictionNode(j, b, ktr, kc, node.dynamic_friction, node.dynamic_friction)
+
+
+def first_slip(node: FrictionNode) -> float:
+    motion = simulate(coulomb(node), IntegralLoop(gain()), STEP, 1e3, max_events=5)
+    return next(event.time for event in motion.events if event.kind is Kind.SLIP)
+
+
+def motor_travel(node: FrictionNode) -> float:
+    """Peak to peak of x_m once the error is small, in domain I above gamma_b."""
+    linear = (node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness)
+    loop = IntegralLoop(0.9 * float(routh_gain(*linear)))
+    motion = simulate(coulomb(node), loop, 1e-3, 1e9, max_events=24)
+    slips = [event.x_m - event.x for event in motion.events if event.kind is Kind.SLIP]
+    at = [event.contact_force for event in motion.events if event.kind is Kind.SLIP]
+    springs = [node.transmission_stiffness * s - f for s, f in zip(slips, at, strict=True)]
+    return (max(springs) - min(springs)) / node.transmission_stiffness
+
+
+def stiction_cycle(node: FrictionNode) -> float:
+    found = assess(node, IntegralLoop(1e-3 * gain()), 5.0, tolerance=1e-6)
+    assert found.verdict is Verdict.LIMIT_CYCLE
+    return found.peak_to_peak
+
+
+def stable_step(node: FrictionNode) -> float:
+    return largest_stable_step(coulomb(node), IntegralLoop(gain()), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "measured"),
+    [
+        ("delay (5.3)", first_slip),
+        ("actuator cycle, peak to peak (5.20)", motor_travel),
+        ("stiction cycle, peak to peak (5.8)", stiction_cycle),
+        ("largest stable step", stable_step),
+    ],
+)
+def test_ratios_are_those_of_exact_responses(choices: dict[str, Choice], quantity: str, measured: object) -> None:
+    assert callable(measured)
+    base = measured(BASE)
+    assert measured(half_friction()) / base == pytest.approx(choices[quantity].half_friction, rel=0.01)
+    assert measured(twice_stiffness()) / base == pytest.approx(choices[quantity].twice_stiffness, rel=0.01)
+
+
+def test_twice_the_stiffness_costs_margin_and_less_friction_does_not(choices: dict[str, Choice]) -> None:
+    """By the real parts of the roots of (5.14) where they become zero."""
+
+    def margin(node: FrictionNode) -> float:
+        j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
+        low, high = 1e-6, 1.0
+        while high > 1.00001 * low:
+            middle = math.sqrt(low * high)
+            unstable = np.roots([j, b, ktr + kc, middle * ktr * kc]).real.max() > 0.0
+            low, high = (low, middle) if unstable else (middle, high)
+        return low
+
+    ratio = choices["margin of the gain (5.15)"]
+    assert margin(twice_stiffness()) / margin(BASE) == pytest.approx(ratio.twice_stiffness, rel=1e-4)
+    assert ratio.half_friction == 1.0 > ratio.twice_stiffness
+
+
+def test_third_stage_leaves_96_percent_from_a_radius_of_an_inch_and_a_half_on() -> None:
+    """In the units of the thesis: 43 in-lb times 30.4 at each pulley of the differential, E A 51 500 lb."""
+    configuration = Configuration.load(packaged("wam"))
+    inches = differential_radius(configuration) / 0.0254
+    assert inches == pytest.approx(43.0 * 30.4 / 51_500.0 / (1.0 - 0.96 / measures(configuration).efficiency), rel=1e-3)
+    assert 1.2 < inches < 2.0
+
+
+def test_twist_of_the_circuit_of_joint_4_costs_little_torque_on_joint_3() -> None:
+    """By the length of a helix and the slope of the energy of both strands."""
+    configuration = Configuration.load(packaged("wam"))
+    arm, twisted = configuration.shared.arm, twisted_circuit(configuration)
+    assert math.degrees(twisted.twist) == pytest.approx(180.0)
+    ea, length, radius, t0 = 42258.1, 22 * 0.0254, 0.375 * 0.0254, arm.cables.pretension[3]
+
+    def energy(phi: float) -> float:
+        longer = math.sqrt(length**2 + (radius * phi) ** 2) - length
+        return 2.0 * (t0 * longer + 0.5 * ea / length * longer**2)
+
+    slope = (energy(twisted.twist + 1e-4) - energy(twisted.twist - 1e-4)) / 2e-4
+    assert twisted.torque == pytest.approx(slope, rel=1e-5)
+    assert 0.2 < twisted.change / t0 < 0.25
+    friction = 0.01 * 2.0 * 15.2 * 43.0 * 0.1129848  # 1 % of the peak torque of joint 3
+    assert twisted.torque < 0.25 * friction
+
+
+def test_two_motors_in_parallel_have_half_the_rotor_inertia_of_one_of_larger_diameter() -> None:
+    """By sums over shells of solid cylinders with the same stress on their surface."""
+
+    def cylinder(radius: float, length: float) -> tuple[float, float]:
+        edges = np.linspace(0.0, radius, 2001)
+        shells = 2.0 * math.pi * 0.5 * (edges[1:] + edges[:-1]) * np.diff(edges) * length
+        inertia = float(shells @ (0.5 * (edges[1:] + edges[:-1])) ** 2)
+        return 2.0 * math.pi * radius * length * radius, inertia  # torque of a stress of 1
+
+    one, longer, wider = cylinder(0.02, 0.05), cylinder(0.02, 0.1), cylinder(0.02 * math.sqrt(2.0), 0.05)
+    assert longer[0] == pytest.approx(2.0 * one[0])
+    assert wider[0] == pytest.approx(2.0 * one[0])
+    found = stronger_rotor(2.0)
+    assert (longer[1] / one[1], wider[1] / one[1]) == (pytest.approx(found.by_length), pytest.approx(found.by_diameter))

@@ -1,0 +1,411 @@
+"""The benchmark of force control: its tasks, how it evaluates them, and that it goes on where it was stopped."""
+
+import dataclasses
+import json
+import math
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_cli.main import main
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_description.configuration import Configuration
+from wam_description.mismatch import true_arm
+from wam_description.rigid_body import RigidBody
+from wam_driver.amplifier import Amplifier
+from wam_driver.driver import Driver, DriverParameters
+from wam_studies.force_benchmark import evaluation
+from wam_studies.force_benchmark.evaluation import ForceTrial, evaluate
+from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
+from wam_studies.force_benchmark.page import GROUPINGS, page, report, required
+from wam_studies.force_benchmark.results_file import key, read
+from wam_studies.force_benchmark.surfaces import Surface
+from wam_studies.force_benchmark.tasks import NOMINAL, SECONDS, Task, TaskConditions, configured, draw, steps
+from wam_studies.force_benchmark.trial import inertia, perform, with_accepted_gain
+
+DRAWN = [draw(WAM, 1, number) for number in range(300)]
+Q = (0.0, -1.0, 0.0, 0.8)
+ACROSS = Surface("outer_link", 0.3, (0.0, 0.0, -1.0), 4000.0, 0.3, is_plane=False)
+TASK = Task(Q, ACROSS, 10.0)
+
+
+# --------------------------------------------------------------------------------------- tasks
+def test_a_task_depends_on_its_seed_and_number_alone() -> None:
+    assert draw(WAM, 1, 17) == DRAWN[17]
+    assert draw(WAM, 2, 17) != DRAWN[17]
+    assert len({task.q for task in DRAWN}) == len(DRAWN)
+
+
+def test_tasks_are_as_wide_as_the_page_says() -> None:
+    force, stiffness = [task.force for task in DRAWN], [task.surface.stiffness for task in DRAWN]
+    assert 1.0 <= min(force) < 1.1
+    assert 36.0 < max(force) <= 40.0
+    assert 400.0 <= min(stiffness) < 500.0
+    assert 3.5e5 < max(stiffness) <= 4e5
+    assert all(
+        low < angle < high
+        for task in DRAWN
+        for low, angle, high in zip(WAM.joints.lower, task.q, WAM.joints.upper, strict=True)
+    )
+    for grouping in GROUPINGS:
+        counts = {name: sum(grouping.of(task) == name for task in DRAWN) for name in grouping.classes}
+        assert sum(counts.values()) == len(DRAWN), "every task is in one class"
+        least = 8 if grouping.title == "not known" else 15
+        assert min(counts.values()) >= least, (grouping.title, counts)
+
+
+def test_what_nobody_knows_is_in_the_true_arm_alone() -> None:
+    loaded = next(task for task in DRAWN if task.conditions.payload)
+    rough = next(task for task in DRAWN if task.conditions.asymmetry)
+    assert 0.05 <= loaded.conditions.payload <= 2.0
+    for task in (loaded, rough):
+        given = configured(CONFIGURATION, task)
+        driver = given.node("driver", DriverParameters)
+        assert given.shared.arm.payload == 0.0
+        assert driver.mismatch.payload == task.conditions.payload
+        assert (driver.friction.law == "stribeck") is (task is rough)
+        assert set(driver.friction.motor_asymmetry) == {task.conditions.asymmetry}
+
+
+@pytest.mark.parametrize("number", [0, 3, 4, 8])
+def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) -> None:
+    task = DRAWN[number]
+    configuration = configured(CONFIGURATION, task)
+    driver = Driver(configuration.shared, configuration.node("driver", DriverParameters))
+    assert driver.plant.data.ncon == 0
+    assert driver.plant.q == pytest.approx(task.q)
+    factors = [a / b for a, b in zip(driver.plant.model.body_mass[-4:], WAM.links.mass, strict=True)]
+    assert factors == pytest.approx(task.conditions.mass)
+
+
+@pytest.mark.slow
+def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
+    """Moved along the force by more than the gap the link touches, by less it does not."""
+    body = RigidBody(WAM)
+    for task in DRAWN[:12]:
+        configuration = configured(CONFIGURATION, task)
+        surface = task.surface
+        point = (surface.position, *WAM.covers.aside(surface.cover, surface.position))
+        lever = np.array(surface.direction) @ body.point_jacobian(task.q, surface.cover, point)
+        for distance, touches in ((0.001, False), (0.003, True)):
+            q = np.array(task.q) + lever * distance / float(lever @ lever)
+            if float(np.abs(q - task.q).max()) > 0.02:
+                continue  # near a singular pose this is no small motion
+            moved = configuration.with_values({"arm.joints.start": q.tolist()})
+            driver = Driver(moved.shared, moved.node("driver", DriverParameters))
+            assert bool(driver.plant.data.ncon) is touches, (task, distance)
+
+
+def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
+    task = TASK._replace(conditions=NOMINAL._replace(ramp=1.0))
+    _, *ramp, press = steps(task, SECONDS)
+    forces = [math.hypot(*step.force.force) for step in ramp]
+    assert sum(step.seconds for step in ramp) == pytest.approx(1.0)
+    assert forces == sorted(forces)
+    assert forces[0] == pytest.approx(2.0)
+    assert math.hypot(*press.force.force) == pytest.approx(10.0)
+
+
+def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
+    stepped = TASK._replace(before=30.0, conditions=NOMINAL._replace(ramp=0.5))
+    _, *ramp, first, press = steps(stepped, SECONDS)
+    forces = [math.hypot(*step.force.force) for step in (ramp[0], first, press)]
+    assert forces == pytest.approx([6.0, 30.0, 10.0])
+    assert steps(TASK._replace(longer=5.0), SECONDS)[-1].seconds == 5.0 * SECONDS
+    courses = [(task.before > 0.0, task.longer > 1.0) for task in DRAWN]
+    assert all(0.05 < np.mean(share) < 0.15 for share in zip(*courses, strict=True))
+    lasting = [task for task in DRAWN if task.longer > 1.0]
+    assert all(t.force <= 3.0 and t.surface.stiffness <= 4e3 and t.conditions.is_pinned for t in lasting)
+    changes = [task.before / task.force for task in DRAWN if task.before]
+    assert min(changes) < 0.5
+    assert max(changes) > 2.0
+    assert all(0.249 < change < 4.001 for change in changes)
+
+
+def test_the_last_command_limits_the_force_at_the_end() -> None:
+    """A hold that goes on pressing as before is not a task given up."""
+    task, held_back = TASK._replace(before=30.0), {"reason": "held", "is_stopped": True}
+    down = [0.0] * 100 + [31.0] * 2000
+    assert not evaluated(task, trace(down + [10.1] * 3000)).is_over
+    assert evaluated(task, trace(down + [10.1] * 3000, **held_back)).outcome is TaskEnd.GIVEN_UP
+    pressing = evaluated(task, trace(down + [18.0] * 3000, **held_back))
+    assert (pressing.outcome, pressing.is_over) == (TaskEnd.ENDED, True)
+
+
+def test_motors_with_dither_have_no_joint_sensors() -> None:
+    configuration = configured(CONFIGURATION, TASK._replace(conditions=NOMINAL._replace(is_dithered=True)))
+    assert not configuration.shared.arm.joint_sensors
+    assert configuration.shared.timing.dither_cycle == 40
+    assert configuration.node("force_loop", ForceLoopParameters).feedback == "contact_estimate"
+
+
+def test_an_estimated_position_is_not_given_away() -> None:
+    conditions = NOMINAL._replace(is_pinned=False)
+    for surface in (ACROSS, ACROSS._replace(cover="inner_link", position=0.2)):
+        configuration = configured(CONFIGURATION, TASK._replace(surface=surface, conditions=conditions))
+        own = configuration.node("force_loop", ForceLoopParameters)
+        given = CONFIGURATION.node("force_loop", ForceLoopParameters)
+        assert (own.contact_cover, own.contact_position) == (given.contact_cover, given.contact_position)
+        assert own.contact_source == "estimated"
+
+
+def test_true_motors_give_another_torque_than_their_reported_one() -> None:
+    parameters = CONFIGURATION.node("driver", DriverParameters)
+    mismatch = dataclasses.replace(parameters.mismatch, torque_constant=(1.1, 1.0, 0.9, 1.0))
+    true = true_arm(WAM, mismatch).motors.torque_constant
+    amplifier = Amplifier(WAM.motors, parameters.amplifier, np.random.default_rng(0), true)
+    reported = amplifier.nominal_torque([2.0] * 4)
+    assert [a / b for a, b in zip(amplifier.torque([2.0] * 4, [0.0] * 4), reported, strict=True)] == pytest.approx(
+        [1.1, 1.0, 0.9, 1.0]
+    )
+    configuration = CONFIGURATION.with_values({"driver:mismatch.torque_constant": [1.1, 1.0, 0.9, 1.0]})
+    driver = Driver(configuration.shared, configuration.node("driver", DriverParameters))
+    assert driver.amplifier.torque([2.0] * 4, [0.0] * 4) == amplifier.torque([2.0] * 4, [0.0] * 4)
+
+
+# ------------------------------------------------------------------------------------ outcomes
+def trace(forces: Any, **more: Any) -> TaskTrace:
+    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, "", False, False, 0.0, 0.0145)
+    return given._replace(**more)
+
+
+def held(newtons: float, **more: Any) -> TaskTrace:
+    return trace([0.0] * 100 + [newtons] * 3000, **more)
+
+
+@pytest.mark.parametrize(
+    ("seen", "expected"),
+    [
+        (held(10.9), TaskEnd.DONE),
+        (held(9.1, reason="place assumed"), TaskEnd.DONE),
+        (held(10.9, reason="held", is_stopped=True), TaskEnd.ENDED),
+        (held(11.1), TaskEnd.SILENT),
+        (held(0.0), TaskEnd.SILENT),
+        (held(11.1, reason="not reached"), TaskEnd.ENDED),
+        (held(0.0, reason="not sensed", is_stopped=True, travel=0.0), TaskEnd.REFUSED),
+        (held(0.0, reason="not sensed", is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
+        (held(2.0, reason="another link", is_stopped=True), TaskEnd.GIVEN_UP),
+        (trace([0.0, 10.1] + [2.0] * 3000, reason="another link", is_stopped=True), TaskEnd.ENDED),
+        (held(2.0, reason="fault", is_stopped=True, is_fault=True), TaskEnd.ENDED),
+        (held(0.0, reason="not reached", travel=0.0), TaskEnd.ENDED),
+    ],
+)
+def test_an_outcome_is_that_of_the_true_force_and_the_report(seen: TaskTrace, expected: TaskEnd) -> None:
+    assert evaluated(TASK, seen).outcome is expected
+
+
+def test_a_peak_counts_above_one_and_a_half_times_the_command_and_the_impact() -> None:
+    for peak, is_over in ((16.9, False), (17.1, True)):
+        assert evaluated(TASK, trace([0.0, peak] + [10.0] * 3000)).is_over is is_over
+
+
+@pytest.mark.parametrize(
+    ("size", "more", "is_silent"),
+    [(0.4, {}, False), (0.8, {}, True), (0.8, {"predicted_cycle": 1.5}, False), (0.8, {"reason": "so"}, False)],
+)
+def test_a_cycle_above_the_tolerance_counts_unless_it_is_reported(
+    size: float, more: dict[str, Any], is_silent: bool
+) -> None:
+    wave = 10.0 + size * np.sin(2.0 * math.pi * 3.0 * 1e-3 * np.arange(4000))
+    result = evaluated(TASK, trace(wave, **more))
+    assert result.outcome is TaskEnd.DONE
+    assert result.cycles_silently is is_silent
+
+
+def test_the_dither_is_no_cycle() -> None:
+    wave = 10.0 + 2.0 * np.sin(2.0 * math.pi * 25.0 * 1e-3 * np.arange(4000))
+    dithered = TASK._replace(conditions=NOMINAL._replace(is_dithered=True))
+    assert evaluated(TASK, trace(wave)).cycles_silently
+    assert not evaluated(dithered, trace(wave)).cycles_silently
+
+
+# -------------------------------------------------------------------------------------- trials
+def test_the_inertia_of_an_impact_is_that_of_the_compiled_plant() -> None:
+    """Kinetic energy of MuJoCo's model with links and rotors at the speeds of stiff cables."""
+    import mujoco
+
+    driver = Driver(CONFIGURATION.shared, CONFIGURATION.node("driver", DriverParameters))
+    plant, qd = driver.plant, np.array([0.3, -0.5, 0.8, 1.1])
+    rotors = np.linalg.inv(np.reshape(WAM.joint_from_motor, (4, 4))) @ qd
+    plant.data.qvel[:] = np.concatenate([rotors, qd])
+    mujoco.mj_energyVel(plant.model, plant.data)
+    mass = inertia(WAM, RigidBody(WAM), plant.q)
+    assert 0.5 * float(qd @ mass @ qd) == pytest.approx(float(plant.data.energy[1]), rel=1e-4)
+
+
+def test_a_gain_that_the_guard_refuses_is_lowered_to_one_that_it_accepts() -> None:
+    high = configured(CONFIGURATION, TASK).with_values({"force_loop:force_gain": [0.2]})
+    lowered = with_accepted_gain(high)
+    gains = [c.node("force_loop", ForceLoopParameters).force_gain[0] for c in (high, lowered)]
+    assert 0.0 < gains[1] < 0.5 * gains[0]
+    assert with_accepted_gain(lowered) is lowered, "accepted as it is"
+
+
+@pytest.mark.slow
+def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_done() -> None:
+    """The short form: three tasks by hand, each with another outcome."""
+    body = RigidBody(WAM)
+    x, y, z = body.cover_pose(Q, "outer_link").rotation[:, 1].tolist()
+    good = TASK._replace(surface=ACROSS._replace(direction=(x, y, z)))
+    done = perform(CONFIGURATION, good, 1.5)
+    assert done.outcome is TaskEnd.DONE
+    assert 0.0 < done.peak < done.limit
+    assert 15.0 < done.limit < 40.0
+    straight = (0.0, -1.0, 0.0, math.pi / 2.0 - 0.05)
+    tip = body.point(straight, "outer_link", (WAM.covers.length[1], 0.0, 0.0))
+    x, y, z = (tip / np.linalg.norm(tip)).tolist()
+    blind = Task(straight, Surface("outer_link", WAM.covers.length[1], (x, y, z), 4000.0, 0.3, is_plane=True), 5.0)
+    refusal = perform(CONFIGURATION, blind, 1.5)
+    assert refusal.outcome is TaskEnd.REFUSED
+    assert "standard deviation" in refusal.reason
+    wrong = perform(CONFIGURATION, good, 1.5, {"force_loop:contact_position": 0.1})
+    assert wrong.outcome in (TaskEnd.SILENT, TaskEnd.ENDED)
+    assert abs(wrong.mean - 10.0) > 1.0
+
+
+# ---------------------------------------------------------------------------- many tasks, page
+class AtOnce(Executor):
+    """Does each piece when it is submitted."""
+
+    def submit(self, function: Any, /, *arguments: Any, **keywords: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(function(*arguments, **keywords))
+        return future
+
+
+def result_of(task: Task) -> TaskResult:
+    """A result that follows from the task, without a simulation: 5 % too much."""
+    return evaluated(task, held(1.05 * task.force))
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[Task]:
+    """Tasks that are done, each without a simulation."""
+    done: list[Task] = []
+
+    def quick(base: Configuration, task: Task, seconds: float) -> TaskResult:
+        done.append(task)
+        return result_of(task)
+
+    monkeypatch.setattr(evaluation, "perform", quick)
+    return done
+
+
+def test_a_stopped_benchmark_goes_on_from_its_file(tmp_path: Path, counted: list[Task]) -> None:
+    file, shown = tmp_path / "new" / "results.jsonl", []
+    run = (CONFIGURATION, 5)
+
+    def play(count: int) -> list[ForceTrial]:
+        return evaluate(*run, range(count), 4.0, AtOnce(), file, lambda done, of: shown.append((done, of)))
+
+    first = play(2)
+    file.write_text(file.read_text() + '{"code": "cut o')  # killed while it wrote
+    whole = play(4)
+    assert whole[:2] == first
+    assert counted == [draw(WAM, 5, number) for number in range(4)], "none is done twice"
+    assert shown[-1] == (4, 4)
+    assert (2, 4) in shown
+    lines = map(json.loads, file.read_text().splitlines())
+    kept = {line["number"]: line["task"]["force"] for line in lines}
+    assert kept == {number: draw(WAM, 5, number).force for number in range(4)}
+    assert play(4) == whole, "and all of it can be read again"
+
+
+def test_results_of_another_seed_code_or_configuration_are_not_used(tmp_path: Path, counted: list[Task]) -> None:
+    file = tmp_path / "results.jsonl"
+    evaluate(CONFIGURATION, 5, range(2), 4.0, AtOnce(), file, lambda done, of: None)
+    other = CONFIGURATION.with_values({"force_loop:force_gain": [0.01]})
+    assert len(read(file, key(CONFIGURATION, 5, 4.0))) == 2
+    for wanted in (key(CONFIGURATION, 6, 4.0), key(CONFIGURATION, 5, 3.0), key(other, 5, 4.0)):
+        assert read(file, wanted) == {}
+    assert read(file, key(CONFIGURATION, 5, 4.0)._replace(code="other")) == {}
+
+
+def test_a_file_of_something_else_is_refused_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    for text in ("eggs\nmilk\n", "eggs"):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=r"notes.txt, line 1 is no result of a task; give another file as --res"):
+            evaluate(CONFIGURATION, 5, range(2), 4.0, AtOnce(), file, lambda done, of: None)
+        assert file.read_text() == text
+
+
+def trials() -> list[ForceTrial]:
+    """Two hundred tasks with known failures: task 3 silent, task 4 above the limit, task 5 refused."""
+    found = [ForceTrial(number, task, result_of(task)) for number, task in enumerate(DRAWN[:200])]
+    found[3] = found[3]._replace(result=evaluated(DRAWN[3], held(2.0 * DRAWN[3].force)))
+    above = trace([4.0 * DRAWN[4].force] + [DRAWN[4].force] * 3000, impact=0.0)
+    found[4] = found[4]._replace(result=evaluated(DRAWN[4], above))
+    blind = held(0.0, reason="force known to +-3.7 N; bend the arm", is_stopped=True, travel=0.0)
+    found[5] = found[5]._replace(result=evaluated(DRAWN[5], blind))
+    return found
+
+
+def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
+    found = trials()
+    rows = {name: (value, met) for name, _, value, met, _ in required(found)}
+    assert rows["wrong force without a reason"] == ("1", False)
+    assert rows["tasks refused with a reason"][0] == "0.5% of 200"
+    text = page(found, 7, "0123abcd", "wam evaluate force --seed 7", "picture.png")
+    assert "`0123abcd`" in text
+    assert "| all | 200 | 99% | 0% | 0% | 0% | 0% | 2 | 0 |" in text
+    assert "`wam evaluate force --seed 7 --only 3`" in text
+    assert "| force known to +-# N | 1 |" in text
+    assert "Unreported cycles" not in text
+    lines = report(7, "0123abcd", found)
+    assert "    wam evaluate force --seed 7 --only 4" in lines
+    assert "above the limit: " in lines
+
+
+def test_required_shares_are_of_the_accepted_tasks() -> None:
+    found = trials()
+    number = next(t.number for t in found[6:] if not t.task.conditions.is_dithered)
+    left = held(0.0, reason="another link", is_stopped=True)
+    found[number] = found[number]._replace(result=evaluated(DRAWN[number], left))
+    ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
+    refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
+    assert withdrawals == 1
+    strict, wide = [value for name, _, value, *_ in required(found) if "joint sensors" in name]
+    assert f" of {len(ends) - refusals - withdrawals} (" in strict
+    assert f" of {len(ends) - refusals} (" in wide
+
+
+def test_a_wrong_option_is_refused_in_a_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    results = ["--results", str(tmp_path / "results.jsonl")]
+    for options, text in (
+        (["--tasks", "0"], "--tasks is 0; it must be at least 1"),
+        (["--only", "-3"], "--only is -3"),
+        (["--write", str(tmp_path / "no" / "page.md")], "is no directory; give another file as --write"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(["evaluate", "force", *results, *options])
+        assert end.value.code == 1
+        assert text in capsys.readouterr().err
+
+
+def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
+    every = [task.conditions for task in DRAWN]
+    for name, width in (("mass", 0.03), ("motor_friction", 0.2), ("cables", 0.1), ("torque_constant", 0.03)):
+        factors = np.array([getattr(conditions, name) for conditions in every])
+        assert 0.95 * width < float(np.abs(factors - 1.0).max()) <= width
+    assert isinstance(every[0], TaskConditions)
+
+
+def test_a_value_that_every_task_sets_itself_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    results = ["--results", str(tmp_path / "results")]
+    given = ["evaluate", "force", "--tasks", "1", *results, "--set", "force_loop:contact_source=pinned"]
+    with pytest.raises(SystemExit, match="1"):
+        main(given)
+    assert "--set force_loop:contact_source has no effect here: each task sets it" in capsys.readouterr().err
+    given = ["evaluate", "contact", "--contacts", "1", "--set", "contact_estimator:use_joint_sensors=true"]
+    with pytest.raises(SystemExit, match="1"):
+        main(given)
+    assert "use_joint_sensors has no effect here: each scenario sets it" in capsys.readouterr().err
+    for of in ("force", "contact", "robustness"):
+        with pytest.raises(SystemExit, match="1"):
+            main(["evaluate", of, "--set", "timing.mode=realtime"])
+        assert "--set timing.mode has no effect: the runs are in Python" in capsys.readouterr().err

@@ -1,0 +1,137 @@
+"""The stability map of figure 5.8 against bisection by brute force, solve_ivp and the errata's numbers.
+
+About 10 s in all.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wam_theory.many_slips import modes, slip
+from wam_theory.regimes import gamma_3, point_b
+from wam_theory.stability_map import largest_stable_steps
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, largest_stable_step
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from comparing import solve_ivp
+
+CLOSE = 5e-3  # of a boundary
+
+
+def random_points(count: int, seed: int) -> np.ndarray:
+    """gamma, zeta, k_tr/k_c and stiction of points on both sides of gamma_III, half of them with stiction, (4, n)."""
+    rng = np.random.default_rng(seed)
+    stiction = np.where(rng.random(count) < 0.5, 1.0, 1.0 + 10.0 ** rng.uniform(-3.0, 0.7, count))
+    gamma, zeta = 1.0 + 10.0 ** rng.uniform(-1.7, 0.3, count), 10.0 ** rng.uniform(-1.5, 0.4, count)
+    return np.array([gamma, zeta, 10.0 ** rng.uniform(-1.0, 1.0, count), stiction])
+
+
+def loop_of(gamma: float, zeta: float, ratio: float, stiction: float) -> tuple[FrictionNode, IntegralLoop]:
+    """A node with J = 2, k_c = 3, F_dynamic = 0.7, and the loop of these coordinates."""
+    inertia, kc, friction = 2.0, 3.0, 0.7
+    ktr = ratio * kc
+    damping = 2.0 * zeta * math.sqrt(inertia * (ktr + kc))
+    node = FrictionNode(inertia, damping, ktr, kc, friction, friction * stiction)
+    return node, IntegralLoop(gamma * damping / inertia * (1.0 / ktr + 1.0 / kc))
+
+
+@pytest.mark.slow
+def test_boundaries_are_those_of_bisection_by_brute_force() -> None:
+    points = random_points(60, 58)
+    found = largest_stable_steps(*points)
+    for (gamma, zeta, ratio, stiction), step in zip(points.T.tolist(), found.tolist(), strict=True):
+        node, loop = loop_of(gamma, zeta, ratio, stiction)
+        brute = largest_stable_step(node, loop, rtol=1e-3, largest=1e5) / node.dynamic_friction
+        assert step == pytest.approx(brute, rel=CLOSE), (gamma, zeta, ratio, stiction)
+    assert 30 < np.count_nonzero(found) < 60
+
+
+def test_boundaries_are_those_of_solve_ivp() -> None:
+    points = [(1.1, 0.25, 1.0, 1.0), (1.4, 0.4, 0.4, 1.0), (1.9, 0.2, 3.0, 1.3), (1.3, 0.08, 1.0, 1.0)]
+    fine = solve_ivp.Tolerances("DOP853", 1e-8, 1e-10)
+    for point in points:
+        step = float(largest_stable_steps(*point))
+        node = solve_ivp.Node.of(*point)
+        assert not solve_ivp.grows(node, (1.0 - CLOSE) * step, fine), point
+        assert solve_ivp.grows(node, (1.0 + CLOSE) * step, fine), point
+
+
+def test_no_step_below_the_boundary_diverges_and_every_step_above_it_does() -> None:
+    rng = np.random.default_rng(8)
+    points = random_points(25, 9)
+    for point, step in zip(points.T.tolist(), largest_stable_steps(*points).tolist(), strict=True):
+        node, loop = loop_of(*point)
+        for share in rng.uniform(0.05, 0.98, 4) if step else ():
+            assert assess(node, loop, share * step * 0.7).verdict is not Verdict.DIVERGED, (point, share)
+        for more in 1.02 + rng.exponential(2.0, 4):
+            assert assess(node, loop, more * max(step, 0.1) * 0.7).verdict is Verdict.DIVERGED, (point, more)
+
+
+def test_largest_steps_of_the_errata() -> None:
+    np.testing.assert_allclose(largest_stable_steps([1.1, 1.5, 2.0], 0.25), [25.3, 3.45, 1.17], rtol=5e-3)
+
+
+def test_domain_one_has_no_largest_step_and_domain_three_none_at_all() -> None:
+    steps = largest_stable_steps([[0.4, 0.97, 1.0], [2.19, 2.5, 40.0]], 0.25)
+    np.testing.assert_array_equal(steps, [[math.inf] * 3, [0.0] * 3])
+    assert largest_stable_steps(2.18, 0.25) > 0.7
+
+
+def test_boundary_ends_in_point_b() -> None:
+    zeta = np.geomspace(0.03, 3.0, 12)
+    for ratio in (0.3, 1.0, 4.0):
+        below = largest_stable_steps(gamma_3(zeta) * (1.0 - 1e-9), zeta, ratio)
+        np.testing.assert_allclose(below, 1.0 / point_b(zeta, ratio, 1.0), rtol=CLOSE)
+        assert not largest_stable_steps(gamma_3(zeta) * (1.0 + 1e-9), zeta, ratio).any()
+
+
+def test_many_slips_solve_their_equation() -> None:
+    """Backwards by the matrix exponential: from the standstill to the state that they began with."""
+    rng = np.random.default_rng(7)
+    gamma, zeta = rng.uniform(1.01, 4.0, 50), 10.0 ** rng.uniform(-1.5, 0.5, 50)
+    error, acceleration = rng.uniform(-3.0, 1.0, 50), rng.uniform(0.2, 2.0, 50)
+    end = slip(modes(gamma, zeta), error, acceleration)
+    for i in range(50):
+        flow = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-2 * zeta[i] * gamma[i], -1.0, -2 * zeta[i]]])
+        values, vectors = np.linalg.eig(flow)
+        start = np.linalg.solve(vectors, np.array([error[i], 0.0, acceleration[i]]))
+        times = np.linspace(0.0, 40.0, 40_001)
+        speed = ((vectors[1] * start) @ np.exp(np.outer(values, times))).real
+        first = int(np.flatnonzero(speed[1:] <= 0.0)[0])  # the slip ends between this time and the next
+        low, high = times[first], times[first + 1]
+        assert low > 0.0
+        low, high = _halved(lambda t, v=values, m=vectors[1] * start: (m @ np.exp(v * t)).real, low, high)
+        state = (vectors @ (np.exp(values * low) * start)).real
+        np.testing.assert_allclose([end.error[i], 0.0, end.acceleration[i]], state, rtol=1e-7, atol=1e-7)
+
+
+def _halved(value, low: float, high: float) -> tuple[float, float]:
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if value(middle) > 0.0 else (low, middle)
+    return low, high
+
+
+def test_the_map_takes_any_shape_and_each_point_stands_for_itself() -> None:
+    gamma, zeta, stiction = np.linspace(0.9, 2.2, 7)[:, None, None], np.array([0.1, 0.4]), np.array([[1.0], [1.3]])
+    whole = largest_stable_steps(gamma, zeta, 1.0, stiction)
+    assert whole.shape == (7, 2, 2)
+    assert whole[3, 1, 0] == largest_stable_steps(gamma[3, 0, 0], 0.1, 1.0, 1.3)
+
+
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ((-1.0, 0.3), "gamma is -1.0"),
+        ((1.2, [0.3, math.nan]), "zeta is"),
+        ((1.2, 0.3, 0.0), "stiffness_ratio is 0.0"),
+        ((1.2, 0.3, 1.0, 0.9), "stiction is 0.9"),
+        ((1.2, 0.3, 1.0, 1.0, math.inf), "rtol is inf"),
+    ],
+)
+def test_a_refusal_names_the_value(values: tuple[float, ...], names: str) -> None:
+    with pytest.raises(ValueError, match=names):
+        largest_stable_steps(*values)

@@ -1,0 +1,20 @@
+"""What touches the arm: external torques, contact positions, tracked model errors.
+
+==========================  ================================================================================
+``contact_estimator``       what touches the arm: observer, detection and inference together
+``contact_estimator_node``  the node
+``contact_fit``             the probability of contact positions along straight links
+``contact_fusion``          several moments of one contact that explain it together
+``contact_inference``       which link is touched, where and how hard
+``contact_table``           hypotheses as rows of numbers, as the topic carries them, and back
+``inference_parameters``    its parameters
+``model_errors``            the errors of the model, tracked in free motion
+``model_prior``             what is known of them before: stated, or identified
+``momentum_observer``       external joint torques and their covariance
+``observer_parameters``     its parameters
+``second_contact``          whether a second contact has joined a steady first one
+``shaft_friction``          nominal friction of motors and joints, and where it is uncertain
+``tool_load``               torques of a mass at the tool
+``velocity_fit``            velocities of the motors from their angles
+==========================  ================================================================================
+"""

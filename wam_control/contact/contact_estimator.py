@@ -1,0 +1,328 @@
+"""Contact estimation: momentum observer, detection and inference together."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact.contact_fusion import ContactFusion
+from wam_control.contact.contact_inference import (
+    CERTAIN_SECOND,
+    SECOND,
+    ContactInference,
+    Hypothesis,
+    detection_statistic,
+    with_second,
+)
+from wam_control.contact.inference_parameters import InferenceParameters
+from wam_control.contact.model_errors import TrackedError
+from wam_control.contact.momentum_observer import MomentumObserver
+from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.second_contact import SecondContact
+from wam_control.force.pressed_pose import has_left
+from wam_description.arm import Arm, Timing
+from wam_description.model import ArmModel
+from wam_description.parameters import parameter, require
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import State
+from wam_description.small_matrices import inverse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactEstimatorParameters:
+    """Parameters of the contact estimator."""
+
+    observer: ObserverParameters
+    inference: InferenceParameters
+    use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
+    detect: float = parameter(
+        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice it in one",
+        low=0.0,
+        high=1e6,
+    )
+    release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
+    second: float = parameter(
+        "chi^2 of a change of the torques that the contact does not explain, above which a second one is suspected; "
+        "0: never",
+        low=0.0,
+        high=1e6,
+        before=0.0,
+    )
+
+    def __post_init__(self) -> None:
+        require(
+            self.release <= self.detect,
+            f"parameter 'release' is {self.release:g}; it must not be above detect, {self.detect:g}",
+        )
+
+
+class ContactEstimate(NamedTuple):
+    """External torques, and the contact that explains them.
+
+    Attributes
+    ----------
+    external_torques : (n,), torques of the world on the joints, N m.
+    torque_sd : (n,), their standard deviations, N m.
+    statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
+    in_contact : whether a contact is detected.
+    contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
+    link : name of the cover in contact, '' without contact.
+    position : contact position, m along the cover's x axis, NaN where it cannot be observed.
+    position_sd : m, NaN where the position is.
+    probability : that this link is in contact, NaN without contact.
+    direction_sd : rad, of the angle of the force about the link, NaN without contact.
+    force : (3,), N, of the world on the link, in the cover's frame; zeros without contact, the
+        smallest possible force where the position is NaN.
+    moment : (3,), N m, of that force about the origin of the cover's frame.
+    hypotheses : every explanation, the most probable first, empty without contact.
+    reason : why the position is NaN or the estimate not reliable, '' where neither.
+    warning : which part of the model is off, '' for none.
+    """
+
+    external_torques: tuple[float, ...]
+    torque_sd: tuple[float, ...]
+    statistic: float
+    in_contact: bool
+    contacts: int
+    link: str
+    position: float
+    position_sd: float
+    probability: float
+    direction_sd: float
+    force: tuple[float, float, float]
+    moment: tuple[float, float, float]
+    hypotheses: tuple[Hypothesis, ...]
+    reason: str
+    warning: str = ""
+
+
+NOTHING = (0.0, 0.0, 0.0)
+SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
+SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
+SHAKEN = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
+ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
+TOO_EARLY = "too few samples yet"
+SMALLEST = 1e-12  # of the statistic of the torques, for a division
+
+
+class ContactEstimator:
+    """Observes at the inner rate, estimates contacts at the outer one.
+
+    Parameters
+    ----------
+    arm : the arm as configured; the observer's model differs from it by its own factors.
+    timing : periods of the loops; the observer's time constant must cover two inner periods.
+    parameters : of observer, detection and inference.
+    model : the identified model of the arm with its covariance, None for none.
+
+    Raises
+    ------
+    ParameterError
+        where joint sensors are to be used and the arm has none, or parameters do not fit each other.
+    """
+
+    def __init__(
+        self, arm: Arm, timing: Timing, parameters: ContactEstimatorParameters, model: ArmModel | None = None
+    ) -> None:
+        require(
+            arm.joint_sensors or not parameters.use_joint_sensors,
+            "parameter 'use_joint_sensors' is true but arm.joint_sensors is false; set it to false",
+        )
+        require(
+            parameters.observer.time_constant >= 2.0 * timing.period,
+            f"parameter 'observer.time_constant' is {parameters.observer.time_constant:g} s; "
+            f"it must be at least two periods, {2.0 * timing.period:g} s",
+        )
+        self._parameters, self._made_of = parameters, (arm, timing, parameters, model)
+        self._observer = MomentumObserver(
+            arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle, model
+        )
+        cycle = 0 if parameters.use_joint_sensors else timing.dither_cycle
+        self._delay = parameters.observer.time_constant + 0.5 * cycle * timing.period  # s, of the torques
+        body = RigidBody(arm, parameters.observer.mass_scale)
+        self._inference = ContactInference(arm, body, parameters.inference)
+        self._fusion = ContactFusion(parameters.inference.fusion_time)
+        self._second = SecondContact(parameters.second)
+        self._in_contact = self._is_above = self._is_blind = False
+        self._ended = -math.inf  # by the age of the observer, s
+        # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
+        self._before: tuple[float, list[float], float] = 0.0, [], 0.0
+        self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
+        self.refused = 0
+
+    def brake(self, on: bool) -> None:
+        """Set whether brakes hold the motors, whose torques then carry no information."""
+        self._is_blind = on and not self._parameters.use_joint_sensors
+
+    def tare(self) -> str:
+        """Identify the payload, within the declared range, from the present torques; '' or why that is not possible."""
+        return self._observer.identify_payload()
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._observer.reset()
+        self._before = 0.0, [], 0.0
+        self._end_contact()
+        self._in_contact = self._is_above = False
+        self._ended = -math.inf
+
+    def restarted_copy(self) -> "ContactEstimator":
+        """Another one that has seen no sample, but knows what this one has learned and keeps at a `reset`."""
+        other = ContactEstimator(*self._made_of)
+        other._observer.learn(self._observer)
+        return other
+
+    def _end_contact(self) -> None:
+        self._fusion.reset()
+        self._second.reset()
+
+    def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
+        """Take the signals of one inner period.
+
+        Parameters
+        ----------
+        motor : theta, rad, thetad, rad/s, motor torque in the period that ends, N m, each (n,).
+        sensors : q, rad, qd, rad/s, strain torque, N m, each (n,); ignored without
+            `use_joint_sensors`, required with it.
+        dt : time since the call before, s, from stamps.
+
+        Returns
+        -------
+        bool
+            False if the sample is refused; `refused` counts these.
+        """
+        if self._is_blind:
+            self.reset()
+            return True
+        state = sensors if self._parameters.use_joint_sensors else motor
+        is_taken = state is not None and self._observer.observe(state, dt)
+        if not is_taken:
+            self.refused += 1
+        return is_taken
+
+    def estimate(self, is_pressing: bool = False) -> ContactEstimate:
+        """Estimate the contact from the samples so far.
+
+        Parameters
+        ----------
+        is_pressing : whether a force is commanded.  What it has touched lasts until the arm leaves, though it may be
+            too small to be detected: taken for an error of the model, it would be held ever larger.
+        """
+        observer, parameters = self._observer, self._parameters
+        residual, covariance = observer.torques()
+        torques = tuple(residual)
+        sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
+        if not observer.is_ready:
+            self._in_contact = self._is_above = False
+            self._ended = -math.inf
+            self._end_contact()
+            return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
+        precision = inverse(covariance)
+        late = self._late(residual, precision)
+        statistic = detection_statistic(torques, precision)
+        is_calm = self._in_contact or observer.age - self._ended > SHAKING
+        fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
+        if fast is not None:
+            quick = detection_statistic(fast[0], inverse(fast[1]))
+            statistic = max(statistic, quick / SUDDEN)
+        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
+        if was_in_contact and not self._in_contact:
+            self._ended = observer.age
+        observer.follow(statistic, self._is_touched(is_pressing))
+        if not self._in_contact:
+            if was_in_contact:
+                self._end_contact()
+            return _nothing(torques, sd, statistic, "no contact", observer.warning)
+        load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
+        now = observer.moment() if parameters.inference.fusion_time else None
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
+        self._second.step(observer.age, hypotheses, observer, self._inference)
+        if self._second.is_suspected:
+            self._fusion.reset()
+            why = CERTAIN_SECOND if self._second.is_certain else SECOND
+            hypotheses = tuple(with_second(hypothesis, why) for hypothesis in hypotheses)
+        hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
+        best = hypotheses[0]
+        return ContactEstimate(
+            external_torques=torques,
+            torque_sd=sd,
+            statistic=statistic,
+            in_contact=True,
+            contacts=1 + self._second.is_suspected,
+            link=best.cover,
+            position=best.position,
+            position_sd=best.position_sd,
+            probability=best.probability,
+            direction_sd=best.direction_sd,
+            force=best.force,
+            moment=best.moment,
+            hypotheses=hypotheses,
+            reason=best.reason,
+            warning=observer.warning,
+        )
+
+    def _late(self, torques: list[float], precision: Array) -> float:
+        """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
+        then, before, late = self._before
+        passed = self._observer.age - then
+        if before and not passed:
+            return late
+        weighted = precision.dot(torques)
+        size, change = float(weighted.dot(torques)), float(weighted.dot(np.subtract(torques, before or torques)))
+        late = self._delay / passed * abs(change) / max(size, SMALLEST) if passed > 0.0 else 0.0
+        self._before = self._observer.age, torques, late
+        return late
+
+    def _is_touched(self, is_pressing: bool) -> bool:
+        """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
+        q, at = self._observer.q, self._pressed_at
+        if is_pressing and (self._in_contact or at):
+            self._pressed_at = q
+        elif at and has_left(at, q):
+            self._pressed_at = []
+        return self._in_contact or bool(self._pressed_at)
+
+    def _is_detected(self, statistic: float, is_calm: bool) -> bool:
+        detect, was_above = self._parameters.detect, self._is_above
+        self._is_above = statistic > (detect if is_calm else SHAKEN * detect)
+        if self._in_contact:
+            return statistic > self._parameters.release
+        return (is_calm and statistic > ALONE * detect) or (self._is_above and was_above)
+
+    @property
+    def model_errors(self) -> dict[str, TrackedError]:
+        """Errors of the model that are tracked between contacts, by name; of joint sensors none."""
+        return self._observer.model_errors
+
+
+def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
+    """The same where the force has changed by a fraction that the torques do not show yet."""
+    if hypothesis.is_lower_bound:
+        return hypothesis
+    return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))
+
+
+def _nothing(
+    torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reason: str, warning: str = ""
+) -> ContactEstimate:
+    return ContactEstimate(
+        external_torques=torques,
+        torque_sd=sd,
+        statistic=statistic,
+        in_contact=False,
+        contacts=0,
+        link="",
+        position=math.nan,
+        position_sd=math.nan,
+        probability=math.nan,
+        direction_sd=math.nan,
+        force=NOTHING,
+        moment=NOTHING,
+        hypotheses=(),
+        reason=reason,
+        warning=warning,
+    )

@@ -1,0 +1,131 @@
+"""Node `contact_estimator`: what touches the arm, where, how hard, with what uncertainty."""
+
+from typing import Any
+
+from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_inference import SECOND
+from wam_control.contact.contact_table import friction_table, hypothesis_table
+from wam_control.force.task import is_pressing
+from wam_description.arm import Shared, seconds
+from wam_description.signals import (
+    BASE,
+    NO_CONTACT,
+    Answer,
+    Contact,
+    ContactView,
+    Level,
+    LikelyRange,
+    NodeStatus,
+    Point,
+    State,
+    Wrench,
+)
+from wam_description.status import ENABLED
+from wam_description.synchroniser import Inputs
+from wam_description.wiring import Input, Outputs, reaction
+
+DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
+
+
+class ContactEstimatorNode:
+    """Observes every motor state, publishes the estimate every outer period."""
+
+    name, parameters = "contact_estimator", ContactEstimatorParameters
+    services = ("tare",)
+
+    def __init__(self, shared: Shared, own: ContactEstimatorParameters) -> None:
+        self._estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
+        self._arm, self._friction_scale = shared.model_arm, own.observer.friction_scale
+        self._covers, self._timing = shared.arm.covers.names, shared.timing
+        self._samples: list[tuple[State, State | None, float]] = []
+        self._in_contact: bool | None = None
+        self._warned = ""
+        self._doubted, self._second = 0.0, -1
+        commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
+        self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors"})
+        self.estimate = self._estimator.estimate()
+
+    @reaction(
+        Input("motor_states"),
+        Input("joint_sensors", absent="zero"),
+        Input("force_command", age="command", answers=True),
+        Input("task_command", age="command", answers=True),
+        outputs=(
+            "external_joint_torques",
+            "external_joint_torques_sd",
+            "contact/wrench",
+            "contact/point",
+            "contact/hypotheses",
+            "contact/tracked_friction",
+            "contact/markers",
+            "contact/in_contact",
+        ),
+    )
+    def step(self, inputs: Inputs) -> Outputs:
+        """Keep the samples of one inner period; in an outer one, observe them and estimate."""
+        self._samples.append((inputs["motor_states"], inputs["joint_sensors"], inputs.dt))
+        if not self._timing.is_outer(inputs.stamp):
+            return {}
+        self._observe()
+        self.estimate = estimate = self._estimator.estimate(_is_pressing(inputs))
+        frame = estimate.link or BASE
+        outputs: dict[str, Any] = {
+            "external_joint_torques": State([], [], list(estimate.external_torques)),
+            "external_joint_torques_sd": State([], [], list(estimate.torque_sd)),
+            "contact/wrench": Wrench(frame, estimate.force, estimate.moment),
+            "contact/point": Point(frame, (estimate.position, 0.0, 0.0)),
+            "contact/hypotheses": hypothesis_table(estimate.hypotheses, self._covers),
+        }
+        if self._timing.is_display(inputs.stamp):
+            outputs["contact/markers"] = _view(estimate)
+        second = int(seconds(inputs.stamp))
+        if second != self._second and (errors := self._estimator.model_errors):
+            self._second = second
+            outputs["contact/tracked_friction"] = friction_table(errors, self._arm, self._friction_scale)
+        if estimate.in_contact is not self._in_contact:
+            self._in_contact = estimate.in_contact
+            outputs["contact/in_contact"] = estimate.in_contact
+        self._doubted += (estimate.contacts > 1) * seconds(self._timing.outer_period_ns)
+        self._doubted *= estimate.in_contact
+        warning = SECOND if self._doubted > DOUBTED else estimate.warning
+        if warning != self._warned:
+            self._warned = warning
+            outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)
+        return outputs
+
+    def _observe(self) -> None:
+        """Observe the samples since the last time: together a third faster than one by one between other nodes."""
+        for motor, sensors, dt in self._samples:
+            self._estimator.observe(motor, sensors, dt)
+        self._samples.clear()
+
+    def diagnostics(self) -> dict[str, float]:
+        """The errors of the model as they are tracked between contacts, by name."""
+        return {name: error.value for name, error in self._estimator.model_errors.items()}
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Follow the brakes in realtime.
+
+        A status has no fixed time among the states: in lockstep the motor torque, exactly zero, shows the brakes.
+        """
+        if status.node == "driver" and self._timing.mode == "realtime":
+            self._observe()
+            self._estimator.brake((status.mode or ENABLED) != ENABLED)
+
+    def tare(self) -> Answer:
+        """Identify the payload from the present external torques."""
+        self._observe()
+        reason = self._estimator.tare()
+        return Answer(not reason, reason or "the payload has been identified from the present external torques")
+
+
+def _is_pressing(inputs: Inputs) -> bool:
+    """Whether a force is commanded, alone or along an axis of a task."""
+    force, task = inputs["force_command"], inputs["task_command"]
+    return bool(force and any(force.force)) or bool(task and is_pressing(task))
+
+
+def _view(estimate: ContactEstimate) -> ContactView:
+    likely = tuple(LikelyRange(h.cover, h.low, h.high) for h in estimate.hypotheses if h.low < h.high)
+    contact = Contact(estimate.link, estimate.position, estimate.force) if estimate.link else NO_CONTACT
+    return ContactView(contact, likely)

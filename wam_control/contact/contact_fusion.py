@@ -1,0 +1,284 @@
+"""Several moments of one contact that explain it together.
+
+While a contact lasts, part of the errors of its torques changes from moment to moment (cogging, noise, friction of a
+motor that has moved on), and part stays (a wrong friction level, a shaft at rest).  The torques of some moments, each
+4 numbers of an arm of 4 joints, are taken as one measurement of 4 numbers per moment, with the covariance of both:
+
+    C_jk = H_j P H_k^T + L_j L_k^T + delta_jk R_j,
+
+H the effects of the model's errors and P their covariance, which are the same in all moments; L the errors of shafts at
+rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
+moments, by a force that grows and shrinks with the torques; how else it may change is in the covariance, too, by the
+links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since,
+and by the speed of a contact that slides along its link.  Few do: how probable that is follows from the same moments,
+by how much better a speed explains them, whatever the force and the position.
+How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
+`BELIEF` degrees of freedom of the statement itself.
+
+The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past moments are
+computed when one joins them; with the present one, of covariance C_nn, they are those of (Rasmussen & Williams,
+2006, A.6) Z_n - C_np C_pp^-1 Z_p with C_nn - C_np C_pp^-1 C_pn, added to those of the past.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact.contact_fit import LARGEST_EXPONENT
+from wam_description.small_matrices import inverse, solution, solutions
+
+Array = NDArray[np.float64]
+
+EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
+MOST = 6  # past moments
+FINEST = 1e-3  # N m, sd of the errors of one moment, below which rounding decides what moments have in common
+ROUNDING = 1e-4  # difference of inner products that are equal but for rounding, above which it decides what they are
+MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments show nothing
+TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
+SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
+DRIFTS = 0.02  # m/s: the same, of what touches an arm that does not move
+FAST = 0.5  # m/s: sd of the speed along its link of a contact that slides
+SLIDES = 0.05  # probability of such a contact
+ANY_FORCE, ANY_PLACE = 2.0, 0.1  # of its size, and m: sd of its force and position where only its speed counts
+LATE = 0.03  # s that a contact moves on after the last moment: torques are 20 ms late, and moments that far apart
+UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
+LIKE, GROWN = 0.25, 4.0  # least and largest torques of the same contact, of those of its last moment
+BELIEF = 10.0  # degrees of freedom
+UNKNOWN = 3  # of a contact: its position and the force across the link
+DIFFERENT = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
+
+
+class Torques(NamedTuple):
+    """External torques of one moment, with what is known of their errors.
+
+    Attributes
+    ----------
+    time : s.
+    residual : (n,), N m.
+    effects : (n, k), N m, of errors that stay, of the covariance `covariance`.
+    covariance : (k, k).
+    own : (n, n), N^2 m^2, covariance of the errors of this moment alone.
+    pose : (n,), rad.
+    """
+
+    time: float
+    residual: Array
+    effects: Array
+    covariance: Array
+    own: Array
+    pose: Array
+
+
+class Guess(NamedTuple):
+    """Position of a contact on a link, m, and its probability."""
+
+    position: float
+    probability: float
+
+
+class _Seen(NamedTuple):
+    torques: Torques
+    rows: Array
+
+
+class _Past(NamedTuple):
+    """What past moments contribute; their forces in units of that of the last one.
+
+    `gram` (links, 7, 7) of them alone; `predicts` (links, k, 7) and `explains` (k, k): C_np C_pp^-1 Z_p and
+    C_np C_pp^-1 C_pn without the effects of the present moment at their outer sides.
+    """
+
+    gram: Array
+    predicts: Array
+    explains: Array
+    expected: float  # chi^2 of the errors alone, without what the force may have changed
+    last: Torques  # of the last moment
+    slope: Array  # (links, n), N m per m of its contact position, by the square roots of the links' probabilities
+    moments: int
+
+
+class ContactFusion:
+    """Keeps the moments of a contact, and their inner products.
+
+    Parameters
+    ----------
+    duration : s, for which a moment counts; 0 for the present one alone.
+
+    Attributes
+    ----------
+    count : number of moments that explain the present contact together.
+    """
+
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
+        self.reset()
+
+    def reset(self) -> None:
+        """The contact has ended, or is another one."""
+        self._last: _Seen | None = None  # its errors are still those of the present one
+        self._moments: deque[_Seen] = deque()
+        self._past: _Past | None = None
+        self._widening = 1.0
+        self._speed = _speed(SLIDES)
+        self.count = 1
+
+    def gram(self, rows: Array, now: Torques) -> Array | None:
+        """Inner products of all moments, (links, 7, 7); None for no past, another contact, or where rounding decides.
+
+        Parameters
+        ----------
+        rows : (links, 7, n), those of `ContactFit` of the present moment; the last link may be a payload.
+        now : its torques.
+        """
+        past = self._past
+        self.count = 1
+        if past is None:
+            return None
+        effects = now.effects
+        covariance = effects.dot(now.covariance).dot(effects.T) + now.own
+        way = self._speed * (now.time - past.last.time)
+        grown = _grown(now.residual, past.last.residual, covariance, way * past.slope)
+        if not LIKE < grown < GROWN:
+            self.reset()
+            return None
+        scale = np.array([1.0, *[1.0 / grown] * 6])
+        rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
+        precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
+        found: Array = (
+            past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)
+        ) / self._widening
+        if np.abs(found - found.transpose(0, 2, 1)).max() > ROUNDING:
+            self.reset()
+            return None
+        self.count = 1 + past.moments
+        return found
+
+    def remember(self, rows: Array, now: Torques, guess: Sequence[Guess], residual: float) -> None:
+        """Take the present moment, with what was fitted to it.
+
+        Parameters
+        ----------
+        guess : of each link.
+        residual : chi^2 of all moments that the fit does not explain.
+        """
+        if self._past is not None and self.count > 1:
+            freedom = max(0.0, self._past.expected + len(now.residual) - UNKNOWN)
+            self._widening = (BELIEF + self._widening * residual) / (BELIEF + freedom)
+            if self._widening > DIFFERENT:
+                self.reset()
+        moments, last = self._moments, self._last
+        is_early = last is not None and now.time - last.torques.time < EVERY
+        if is_early or not self._duration or now.own.diagonal().min() < FINEST**2:
+            return
+        has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > MOVED
+        if has_moved:
+            moments.extend([] if last is None else [last])
+            self._last = _Seen(now, rows)
+        count = len(moments)
+        while moments and (len(moments) > MOST or now.time - moments[0].torques.time > self._duration):
+            moments.popleft()
+        if has_moved or len(moments) < count:
+            self._past = self._of(list(moments), now, guess) if moments else None
+
+    def _of(self, moments: list[_Seen], now: Torques, guess: Sequence[Guess]) -> _Past:
+        n, last = len(now.residual), moments[-1].torques
+        effects = np.concatenate([moment.torques.effects for moment in moments])
+        shared = effects @ last.covariance
+        common = shared @ effects.T
+        found, count = len(guess), len(moments)
+        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
+        for j, moment in enumerate(moments):
+            rows[:, :, j] = moment.rows
+        chances = np.sqrt([each.probability for each in guess])
+        sides, slopes = _sides(rows[:found, :, -1:], guess)
+        present = sides[:, :, 0]
+        levers = present @ present.transpose(0, 2, 1) + UNMEASURED
+        forces = solutions(levers, present @ last.residual)  # (links, 3), N
+        moved = SLIPS * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
+        elapsed = np.array([now.time + LATE - moment.torques.time for moment in moments])
+        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
+        certain = common[-n:, -n:] + last.own
+        ways = (moved + self._speed * elapsed).tolist()
+        sizes = [
+            _grown(moment.torques.residual, last.residual, certain, way * slope)
+            for moment, way in zip(moments, ways, strict=True)
+        ]
+        rows[:, 1:] *= np.array(sizes)[:, None]
+        sides, slopes = _sides(rows[:found], guess)
+        for j, moment in enumerate(moments):
+            common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
+        covariance = common.copy()
+        turned = sides * (chances * TURNED * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
+        for j in range(count):
+            of = slice(n * j, n * j + n)
+            side = turned[:, :, j].reshape(-1, n)
+            covariance[of, of] += side.T @ side
+        per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
+        link = int(chances.argmax())
+        unknown = np.concatenate(
+            (
+                ANY_FORCE * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),
+                ANY_PLACE * per_metre[link].reshape(1, -1),
+                (per_metre[link] * (moved + DRIFTS * elapsed)[:, None]).reshape(1, -1),
+            )
+        )
+        slides = probability_of_slide(
+            np.concatenate([moment.torques.residual for moment in moments]),
+            self._widening * (covariance + unknown.T @ unknown),
+            FAST * (per_metre[link] * elapsed[:, None]).reshape(-1),
+        )
+        self._speed = _speed(slides)
+        far = np.multiply.outer(chances, moved + self._speed * elapsed)
+        slips = (per_metre * far[:, :, None]).reshape(found, -1)
+        covariance += slips.T @ slips
+        rows = rows.reshape(len(rows), 7, count * n)
+        precision = inverse(covariance)
+        weighted_rows = precision @ rows.transpose(0, 2, 1)
+        return _Past(
+            gram=rows @ weighted_rows,
+            predicts=shared.T @ weighted_rows,
+            explains=shared.T @ precision @ shared,
+            expected=float((precision * common).sum()),
+            last=last,
+            slope=slope,
+            moments=count,
+        )
+
+
+def _sides(rows: Array, guess: Sequence[Guess]) -> tuple[Array, Array]:
+    """Torques of a force across a link and along it, (links, 3, moments, n), m, and those across per metre, (2)."""
+    places = np.array([each.position for each in guess])[:, None, None, None]
+    sides, slopes = rows[:, [1, 2, 6]], rows[:, 3:5]
+    sides[:, :2] += places * slopes
+    return sides, slopes
+
+
+def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
+    """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
+    weighted = solution(covariance + slips.T @ slips, before)
+    return float(torques.dot(weighted)) / float(before.dot(weighted))
+
+
+def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> float:
+    """Probability that a contact slides, by the ratio of the evidence with and without, of prior odds `SLIDES`.
+
+    Parameters
+    ----------
+    torques : (m,), N m, of all moments.
+    covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
+    slide : (m,), N m, torques of the standard deviation of its speed.
+    """
+    weighted = solution(covariance, slide)
+    gain = float(slide.dot(weighted))
+    evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
+    odds = SLIDES / (1.0 - SLIDES) * math.exp(min(evidence, LARGEST_EXPONENT))
+    return odds / (1.0 + odds)
+
+
+def _speed(slides: float) -> float:
+    """Standard deviation of the speed along the link, m/s, of a contact that slides with a probability."""
+    return math.sqrt(slides * FAST**2 + (1.0 - slides) * DRIFTS**2)

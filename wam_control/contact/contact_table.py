@@ -1,0 +1,116 @@
+"""Contact hypotheses as rows of numbers, as the topic `contact/hypotheses` carries them, and back; tracked friction."""
+
+from collections.abc import Mapping, Sequence
+
+from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, Hypothesis
+from wam_control.contact.model_errors import TrackedError
+from wam_control.contact.model_prior import WAYS, friction_error, load_error
+from wam_description.arm import Arm
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
+from wam_description.topics import HYPOTHESIS_COLUMNS
+
+_COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
+_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
+_FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
+_LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
+CERTAINLY_TWO = 2 ** REASONS.index(CERTAIN_SECOND)
+
+
+def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
+    """Rows in the order of `HYPOTHESIS_COLUMNS`, the most probable hypothesis first."""
+    rows = tuple(
+        (
+            float(covers.index(h.cover)),
+            h.probability,
+            h.position,
+            h.position_sd,
+            h.low,
+            h.high,
+            *h.force,
+            h.force_sd,
+            float(h.is_lower_bound),
+            h.direction,
+            h.direction_sd,
+            *h.moment,
+            h.residual,
+            float(h.reasons),
+        )
+        for h in hypotheses
+    )
+    return Table(hypotheses[0].cover if hypotheses else BASE, rows)
+
+
+def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
+    """The contact of the most probable hypothesis; none without a row or a table."""
+    if table is None or not table.rows:
+        return NO_CONTACT
+    row = table.rows[0]
+    x, y, z = row[_FORCE : _FORCE + 3]
+    is_single = not int(row[_REASONS]) & CERTAINLY_TWO
+    cover = covers[int(row[_LINK])]
+    return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD], is_single)
+
+
+def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, ...]:
+    """The parts of covers that hold the contact with 90 % probability in all."""
+    rows = () if table is None else table.rows
+    parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
+    return tuple(part for part in parts if part.low < part.high)
+
+
+def reasons_of(row: Sequence[float]) -> tuple[str, ...]:
+    """Why the position of a hypothesis is unknown or the estimate is not to be trusted."""
+    return tuple(reason for i, reason in enumerate(REASONS) if int(row[_REASONS]) >> i & 1)
+
+
+def hypotheses_of(table: Table, covers: Sequence[str]) -> tuple[Hypothesis, ...]:
+    """The hypotheses that the rows of a table describe; the inverse of `hypothesis_table`."""
+    return tuple(_hypothesis(row, covers) for row in table.rows)
+
+
+def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
+    value = dict(zip(HYPOTHESIS_COLUMNS, row, strict=True))
+
+    def vector(name: str) -> Triple:
+        return value[f"{name}_x"], value[f"{name}_y"], value[f"{name}_z"]
+
+    return Hypothesis(
+        cover=covers[int(value["link"])],
+        probability=value["probability"],
+        position=value["position"],
+        position_sd=value["position_sd"],
+        low=value["low"],
+        high=value["high"],
+        force=vector("force"),
+        force_sd=value["force_sd"],
+        is_lower_bound=bool(value["is_lower_bound"]),
+        direction=value["direction"],
+        direction_sd=value["direction_sd"],
+        moment=vector("moment"),
+        residual=value["residual"],
+        reason="; ".join(reasons_of(row)),
+        reasons=int(value["reasons"]),
+    )
+
+
+def friction_table(errors: Mapping[str, TrackedError], arm: Arm, scale: float) -> Table:
+    """Rows in the order of `FRICTION_COLUMNS`: motors, then joints.
+
+    Parameters
+    ----------
+    errors : of the model, by name.
+    arm : of the observer, with the mean friction of both directions.
+    scale : its friction per that of the arm.
+    """
+    names = (*arm.motors.names, *arm.joints.names)
+    levels = (*arm.motors.dynamic_friction, *arm.joints.dynamic_friction)
+    rows = tuple(
+        (
+            *(scale * level * (1.0 + errors[friction_error(name, way)].value) for way in WAYS),
+            errors[load_error(name)].value,
+            *(scale * level * errors[friction_error(name, way)].sd for way in WAYS),
+            errors[load_error(name)].sd,
+        )
+        for name, level in zip(names, levels, strict=True)
+    )
+    return Table(BASE, rows)

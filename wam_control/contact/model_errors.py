@@ -1,0 +1,210 @@
+"""Errors of the estimator's model, tracked by a Kalman filter in free motion.
+
+The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
+the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
+r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
+is, with a dither, too, however many samples there are: they show more and more of that pose, which x and P then take
+in, but of others no more than one sample of R. The rest is forgotten where the arm is away from there without contact.
+
+How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, S is so much
+larger.  Never smaller: on a better arm, links that are wrong by friction of the contact would seem certain.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact.model_prior import ModelPrior
+
+Array = NDArray[np.float64]
+
+LEARN_EVERY = 0.01  # s
+HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
+MOVED = 2e-3  # rad, of any joint: another pose
+AWAY = 0.005  # rad, from a pose where the arm has rested: what was learned there is no longer true
+CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
+GATE = 12.0  # of the detection statistic, above which nothing is learned
+HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
+NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
+TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
+MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
+LARGEST = 4.0  # of that size
+ALIKE = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
+LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
+SURE = 2.0  # sd of an error that it must have beyond what is tolerable
+
+
+class Observation(NamedTuple):
+    """What the observer knows of one moment.
+
+    Attributes
+    ----------
+    residual : (n,), N m.
+    effects : (n, k), N m, H.
+    rest : (n, n), N^2 m^2, R without the noise of the motors that is followed here.
+    moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.
+    pose : (n,), joint angles, rad, as late as the residual.
+    lasting : (n, m), N m, torques of those errors of the rest, of one sd, that may stay as they are in a pose.
+    """
+
+    residual: Array
+    effects: Array
+    rest: Array
+    moving: Array
+    pose: Array
+    lasting: Array
+
+
+class TrackedError(NamedTuple):
+    """An error of the model and its standard deviation, in the unit of `ModelPrior`."""
+
+    value: float
+    sd: float
+
+
+class ModelErrors:
+    """Kalman filter of the errors of the model.
+
+    Parameters
+    ----------
+    prior : of the errors, before any motion.
+    drift : sd of the errors' random walk per largest sd, 1/sqrt(s).
+    through : (n, n), joint torques per motor torque.
+    noise : (n,), N^2 m^2, variance of the motors' torque that is assumed at the start.
+
+    Attributes
+    ----------
+    size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
+        at least 1.
+    beyond : names of the errors that are certainly larger than tolerable, the largest first.
+    """
+
+    def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
+        self._prior = prior
+        self._walk = drift**2 * np.diag(prior.limit)
+        self._through, self._to_motors = through, np.linalg.inv(through)
+        self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
+        self.noise, self.size = noise.copy(), 1.0
+        self.beyond = self._beyond()
+        self._waiting: deque[Observation] = deque()
+        self._at, self._of_pose, self._rested = np.full(len(through), np.inf), 0, 0.0
+        self._elsewhere: tuple[Array, Array] | None = None  # errors and covariance as they are for other poses
+        self._since = self._contact = self._hold = 0.0
+
+    @property
+    def by_name(self) -> dict[str, TrackedError]:
+        """The errors by name."""
+        sds = np.sqrt(self.covariance.diagonal()).tolist()
+        return dict(zip(self._prior.names, map(TrackedError, self.errors.tolist(), sds), strict=True))
+
+    def reset(self) -> None:
+        """Forget the samples that wait, not the errors."""
+        self._waiting.clear()
+        self._since = self._contact = self._hold = 0.0
+
+    def learn(self, other: "ModelErrors") -> None:
+        """Take over what another one has learned."""
+        self.errors, self.covariance = other.errors.copy(), other.covariance.copy()
+        self.noise, self.size, self.beyond = other.noise.copy(), other.size, other.beyond
+        self._at, self._of_pose, self._rested = other._at, other._of_pose, other._rested
+        elsewhere = other._elsewhere
+        self._elsewhere = None if elsewhere is None else (elsewhere[0].copy(), elsewhere[1].copy())
+
+    def corrected(self, seen: Observation) -> tuple[Array, Array]:
+        """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
+        effects = seen.effects
+        covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + self._noise_of(seen)
+        return seen.residual - effects.dot(self.errors), covariance
+
+    def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
+        """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
+        effects = np.concatenate((seen.effects, seen.lasting), axis=1)
+        k = len(self.errors)
+        covariance = np.eye(effects.shape[1])
+        covariance[:k, :k] = self.covariance
+        return effects, self.size * covariance, self.size * (seen.rest + self._noise_of(seen))
+
+    def change(self, now: Observation, then: Observation) -> tuple[Array, Array]:
+        """Change of the external torques, (n,), N m, and its covariance, (n, n): errors that stay drop out.
+
+        `then` is a mean, of which the noise of the motors is left out.
+        """
+        effects = now.effects - then.effects
+        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + self._noise_of(now)
+        return now.residual - then.residual - effects.dot(self.errors), covariance
+
+    def _noise_of(self, seen: Observation) -> Array:
+        """Covariance, (n, n), N^2 m^2, of the torques by the noise of the motors."""
+        # dot: of small arrays faster than @, the same bits
+        found: Array = (self._through * (self.noise * seen.moving)).dot(self._through.T)
+        return found
+
+    def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
+        """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""
+        if in_contact:
+            self._contact += span
+            self._hold = min(HOLD_OFF * self._contact, LONGEST_HOLD_OFF)
+            self._waiting.clear()
+        elif self._hold > 0.0:
+            self._hold, self._contact = self._hold - span, 0.0
+        self._since += span
+        if self._since < LEARN_EVERY:
+            return
+        self._grow(self._since)
+        self._rested += self._since
+        if not in_contact and np.abs(seen.pose - self._at).max() > (AWAY if self._elsewhere else MOVED):
+            self._leave(seen.pose)
+        if not in_contact and self._hold <= 0.0:
+            self._contact = 0.0
+            self._waiting.append(seen)
+            if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
+                before = self._waiting.popleft()
+                self._of_pose += 1
+                if self._of_pose > CORRELATED and self._elsewhere is None:
+                    self._elsewhere, self._rested = (self.errors.copy(), self.covariance.copy()), 0.0
+                self._learn(before, self._since)
+        self._since = 0.0
+
+    def _leave(self, pose: Array) -> None:
+        """Forget what is true of one pose alone."""
+        self._at, self._of_pose = pose, 0
+        if self._elsewhere is not None:
+            (self.errors, self.covariance), self._elsewhere = self._elsewhere, None
+            self._grow(self._rested)
+            self.beyond = self._beyond()
+            self._waiting.clear()
+
+    def _grow(self, span: float) -> None:
+        covariance = self.covariance
+        covariance += span * self._walk
+        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), LEAST)))
+        covariance *= scale
+        covariance *= scale[:, None]
+
+    def _learn(self, seen: Observation, span: float) -> None:
+        innovation, covariance = self.corrected(seen)
+        # of a shaft at rest stiction hides the errors
+        rate = span / TRUST_TIME * float(seen.moving.min())
+        squared = float(innovation.dot(np.linalg.solve(covariance, innovation))) / len(innovation)
+        self.size = min(max(self.size + rate * (MARGIN * squared - self.size), 1.0), LARGEST)
+        rate = span / NOISE_TIME
+        at_motors = self._to_motors @ innovation
+        known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
+        # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
+        self.noise += rate * seen.moving * (at_motors * at_motors - known - self.noise)
+        self.noise = np.maximum(0.0, self.noise)
+        gain_torques = self.covariance @ seen.effects.T
+        coloured = covariance + (CORRELATED - 1.0) * (covariance - seen.effects @ gain_torques)
+        gain = np.linalg.solve(coloured, gain_torques.T).T
+        self.errors += gain @ innovation
+        self.covariance -= gain @ gain_torques.T
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.beyond = self._beyond()
+
+    def _beyond(self) -> list[str]:
+        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
+        ratio = excess / self._prior.tolerable
+        found = np.flatnonzero(ratio > 1.0)
+        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []

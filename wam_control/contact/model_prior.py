@@ -1,0 +1,119 @@
+"""What is known of the errors of the model before any motion: as configured, or as identified from a recording."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact.observer_parameters import ObserverParameters
+from wam_description.arm import Arm
+from wam_description.model import ArmModel
+from wam_description.transmission_map import TransmissionMap
+
+Array = NDArray[np.float64]
+WAYS = ("positive", "negative")
+# friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
+TOLERABLE = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
+LEAST = 0.02  # sd of an identified friction, per friction: what changes from the identification to the use
+
+
+class ModelPrior(NamedTuple):
+    """Errors of the model: friction in positive, then in negative motion; masses; load; constants; delay; payload.
+
+    Friction and its share of the load are those of motors, then joints.
+
+    Attributes
+    ----------
+    names : of the k errors.
+    errors : (k,), friction per dynamic friction, delay in s, payload in kg, the others per torque.
+    covariance : (k, k).
+    limit : (k,), largest variances.
+    tolerable : (k,), errors above which the model is off.
+    """
+
+    names: tuple[str, ...]
+    errors: Array
+    covariance: Array
+    limit: Array
+    tolerable: Array
+
+
+def friction_error(shaft: str, way: str) -> str:
+    """Name of the error of the friction of a motor or joint in one of `WAYS`."""
+    return f"friction of {shaft} in {way} motion"
+
+
+def load_error(shaft: str) -> str:
+    """Name of the error of its friction by load."""
+    return f"load friction of {shaft}"
+
+
+def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None) -> ModelPrior:
+    """The errors of the model of an arm; `payload_sd` in kg; `model` is the identified one, if there is any."""
+    n = len(arm.joints.names)
+    motors, joints = arm.motors.names, arm.joints.names
+    # the load friction of a joint that one motor drives is that of the motor
+    driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
+    covariance = np.diag(
+        np.square(
+            [
+                *[np.hypot(given.moving_uncertainty, given.asymmetry_uncertainty)] * (4 * n),
+                *[given.mass_uncertainty] * n,
+                *[given.load_uncertainty] * n,
+                *np.where(driven_by > 1, given.load_uncertainty, 0.0),
+                *[given.torque_scale_uncertainty] * n,
+                given.torque_delay_uncertainty,
+                payload_sd,
+            ]
+        )
+    )
+    both = np.arange(2 * n)
+    covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
+    limit, errors = covariance.diagonal().copy(), np.zeros(len(covariance))
+    if model is not None and model.is_identified:
+        _identify(arm, model, errors, covariance)
+    shafts = [*motors, *joints]
+    names = (
+        *(friction_error(name, way) for way in WAYS for name in shafts),
+        *(f"masses at {name}" for name in joints),
+        *map(load_error, shafts),
+        *(f"torque constant of {name}" for name in motors),
+        "delay of the torques",
+        "payload",
+    )
+    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, 2 * n, n, 1, 1]))
+
+
+def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
+    """Put in place what was identified: friction, per mean of both directions, load friction, torques of the inertias.
+
+    Errors of joints in both directions are one identified parameter, errors of load the mean of two.
+    """
+    n, motors, joints = len(arm.joints.names), arm.motors.names, arm.joints.names
+    known = model.covariance.parameters
+    mixing = np.zeros((len(errors), len(known)))
+
+    def add(row: int, name: str, part: float) -> None:
+        if name in known:
+            mixing[row, known.index(name)] = part
+
+    for way, values in enumerate((model.motors.coulomb_positive, model.motors.coulomb_negative)):
+        first = 2 * n * way
+        for j, (value, level) in enumerate(zip(values, arm.motors.dynamic_friction, strict=True)):
+            if level:
+                errors[first + j] = value / level - 1.0
+                add(first + j, f"motors.coulomb_{WAYS[way]}.{motors[j]}", 1.0 / level)
+        for j, level in enumerate(arm.joints.dynamic_friction):
+            if level:
+                add(first + n + j, f"joints.coulomb.{joints[j]}", 1.0 / level)
+    for j, (motor, joint) in enumerate(zip(motors, joints, strict=True)):
+        add(4 * n + j, f"links.torque.{joint}", 1.0)
+        add(5 * n + j, f"motors.load_positive.{motor}", 0.5)
+        add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
+        add(6 * n + j, f"joints.load.{joint}", 1.0)
+    errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
+    errors[6 * n : 7 * n] = model.joints.load
+    rows = np.flatnonzero(mixing.any(axis=1))
+    found = mixing[rows] @ np.reshape(model.covariance.values, (len(known), len(known))) @ mixing[rows].T
+    covariance[rows] = covariance[:, rows] = 0.0
+    covariance[np.ix_(rows, rows)] = found + np.diag(np.where(rows < 4 * n, LEAST, 0.0) ** 2)

@@ -1,0 +1,96 @@
+"""Nominal friction of shafts as a function of their motion, and where it is uncertain."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from wam_control.contact.observer_parameters import ObserverParameters
+from wam_description.parts import Joints, Motors
+
+SLOW = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
+# of `shape_uncertainty`, and seconds at the rest velocity: angle after a reversal over which it counts (presliding)
+STEEP, NEAR = 2.0, 0.6
+SHALLOW, FAR = 3.2, 0.2
+LONGEST = 6.0 * NEAR
+FULL = 3.0  # sd of the measured velocity that the rest velocity is at least
+
+
+class ShaftMotion(NamedTuple):
+    """Nominal friction of n shafts and how they move.
+
+    Attributes
+    ----------
+    friction : (n,), N m, against the motion.
+    sliding : (n,), signed fraction of Coulomb friction that acts.
+    resting : (n,), how far each shaft is at rest, 0..1.
+    shape : (n,), fraction of `shape_uncertainty` that counts: slow, or just reversed.
+    """
+
+    friction: list[float]
+    sliding: list[float]
+    resting: list[float]
+    shape: list[float]
+
+
+class ShaftFriction:
+    """Friction of shafts by their velocities.
+
+    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
+    the friction on a shaft that has just stopped still acts as it did, that on a shaft long at rest is unknown.  k is
+    the friction scale.
+
+    Attributes
+    ----------
+    dynamic, static : (n,), N m, nominal F_d and F_s.
+    """
+
+    def __init__(self, shafts: Motors | Joints, parameters: ObserverParameters, rest_velocity: float) -> None:
+        scale = parameters.friction_scale
+        self.dynamic = [scale * f for f in shafts.dynamic_friction]
+        self.static = [scale * f for f in shafts.static_friction]
+        self._viscous = [scale * b for b in shafts.viscous_friction]
+        self._rest_velocity = rest_velocity
+        self._rest = [rest_velocity] * len(self.dynamic)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the motion."""
+        self._held = [0.0] * len(self.dynamic)
+        self._travel = [0.0] * len(self.dynamic)
+
+    def learn(self, other: "ShaftFriction") -> None:
+        """Take over how certain the velocities are from another one."""
+        self._rest = list(other._rest)
+
+    def expect(self, velocity_sd: Sequence[float]) -> None:
+        """Take the standard deviations of the velocities, (n,), rad/s: a shaft slower than them may be at rest."""
+        self._rest = [max(self._rest_velocity, FULL * sd) for sd in velocity_sd]
+
+    def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
+        """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
+
+        `keep` is the decay of the memory in it, 0 for none: with a dither.
+        """
+        friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
+        slowest = self._rest_velocity
+        for i, v in enumerate(velocity):
+            share, fraction, rests = v / self._rest[i], 1.0, 0.0
+            if share >= 1.0 or share <= -1.0:
+                held[i] = acting = share = 1.0 if share > 0.0 else -1.0
+                # counted in the direction of the motion
+                travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
+            else:
+                held[i] *= keep
+                fraction = abs(share)
+                acting, rests = share + (1.0 - fraction) * held[i], 1.0 - share * share
+            friction.append(self.dynamic[i] * acting + self._viscous[i] * v)
+            sliding.append(share)
+            resting.append(rests)
+            slow, since = abs(v) / (SLOW * slowest), abs(travel[i]) / slowest
+            if travel[i] * v < 0.0 < keep:
+                since = 0.0  # it turns back; a dither ends each of its swings in that way
+            uncertain = math.exp(-slow) if slow < LONGEST else 0.0
+            if since < LONGEST:
+                uncertain = max(uncertain, STEEP * math.exp(-since / NEAR) + SHALLOW * math.exp(-since / FAR))
+            shape.append(fraction * uncertain)
+        return ShaftMotion(friction, sliding, resting, shape)

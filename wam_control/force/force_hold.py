@@ -1,0 +1,768 @@
+"""When the force loop holds its position instead of controlling the commanded force, and why."""
+
+import math
+from collections.abc import Callable, Iterable
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.contact_position import ForcePoint
+from wam_control.force.force_axis import ForceAxis
+from wam_control.force.force_case import ForceCase
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_measurement import STEADY, LowPass
+from wam_control.force.force_swing import Reversals, Shake
+from wam_control.force.sensing_advice import TURNS, Advice, OtherForces
+from wam_description.number_text import brief
+
+Array = NDArray[np.float64]
+TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
+TOUCH = 0.2  # of the commanded force, from which something is touched
+UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
+TURNED, BACK_AGAIN = 3.0, 1.0  # chi^2 of a change of the torques at a settled force: something else acts, or no more
+CONFLICT = 0.1  # s, after which another contact counts
+DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
+IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
+DETECTED = 0.04  # s, until a touch is detected there
+LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
+BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
+FED = 0.3  # s, in which the torque of the force is fed forward after the touch
+CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
+SLOPE = 0.01  # of a surface that moves across the force, or of the link on it, against the direction of its motion
+TURNING = 0.3  # s, in which the friction of the arm turns round on a surface that moves
+SETTLED = 3.0  # time constants within the settling time
+LIKELY = 0.6  # of the errors that are stated of torques; those of friction on a surface are as large as stated
+CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
+FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
+FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
+SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
+LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
+BOUNCING = 0.1  # s after the first touch, in which an impact turns the force as often as a limit cycle
+FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
+FAINT = 0.5  # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
+SLOWED = 0.5  # of the speed along the force, from then on
+SHAKE_SAMPLES = 8  # outer periods, at least: a dither of 25 Hz
+RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
+WATCHED = 0.2  # s, for which the shaking is watched before the arm moves, or for a whole cycle of a slower dither
+SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
+SENSORS = "use joint sensors"
+RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
+UNLOAD = "the arm holds its position: declare what it carries (arm.payload), or end the command and tare in free space"
+STILL = [0.0]  # m/s
+NOT_SLOWED = 0.95  # of the speed along the force
+RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
+
+
+class ForceReaction(IntEnum):
+    """What the force loop does instead of what is commanded, as a number for a topic."""
+
+    NONE = 0  # the command is obeyed
+    NOT_SENSED = 1  # holds: the commanded force cannot be measured here
+    OTHER_LINK = 2  # holds: another link is touched
+    NOTHING_TOUCHED = 3  # holds: it has gone as far as allowed and nothing was touched
+    CONTACT_FORCE = 4  # does not move against the world
+    JOINT_END = 5  # a joint is at its end
+    NOT_REACHED = 6  # goes on: the force or the motion is not reached within the time for it
+    POSITION_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
+    NOT_EXPLAINED = 8  # goes on: the torques are not those of the commanded force where it is thought to act
+    TASK_REFUSED = 9  # holds: the axes of the task cannot be done here
+    UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
+    CYCLE = 11  # goes on: the measured force is in a limit cycle
+    SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
+    TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
+    SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
+    NOT_FOLLOWED = 15  # goes on: the commanded posture or position moves faster than the arm may
+
+    @property
+    def holds(self) -> bool:
+        """Whether the arm holds its position instead of controlling the force."""
+        return self in (
+            ForceReaction.NOT_SENSED,
+            ForceReaction.OTHER_LINK,
+            ForceReaction.NOTHING_TOUCHED,
+            ForceReaction.TASK_REFUSED,
+            ForceReaction.SHAKEN,
+            ForceReaction.TOO_SLOW,
+            ForceReaction.SECOND_CONTACT,
+        )
+
+
+Found = tuple[ForceReaction, str]  # a reaction and its reason
+SERIOUS = (ForceReaction.CONTACT_FORCE, ForceReaction.NOT_REACHED)  # of those that do not hold
+
+
+def by_seriousness(found: Iterable[Found]) -> dict[ForceReaction, str]:
+    """Each reaction that there is with its first reason, the most serious one first; one that holds is alone."""
+    there: dict[ForceReaction, str] = {}
+    for reaction, reason in found:
+        if reaction.holds:
+            return {reaction: reason}
+        if reaction is not ForceReaction.NONE:
+            there.setdefault(reaction, reason)
+    return {one: there[one] for one in dict.fromkeys((*SERIOUS, *there)) if one in there}
+
+
+class Refusal(NamedTuple):
+    """Why a force is refused before the arm moves.
+
+    Attributes
+    ----------
+    reaction, why : what the loop reports.
+    besides : what else helps than is computed; '' for nothing.
+    """
+
+    reaction: ForceReaction
+    why: str
+    besides: str = ""
+
+
+class ForceHold:
+    """Watches one commanded force.
+
+    Attributes
+    ----------
+    is_touching : whether the measured force shows that something is touched.
+    has_touched : whether it was, since the force is commanded.
+    goes_back : whether the arm goes back against the force in this period, as what it presses pushes on.
+    share : of the speed along the force: less where the late force of the motors was seen to swing.
+    fed : fraction of the torque of the commanded force that is fed forward.
+    """
+
+    def __init__(self) -> None:
+        self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
+        self._pace = LowPass()
+        self._advice = Advice()
+        self.reset()
+
+    @property
+    def is_advised(self) -> bool:
+        """Whether what would help a refused force is known."""
+        return self._advice.is_complete
+
+    def reset(self) -> None:
+        """Another force is commanded."""
+        self._shake.reset()
+        self.share, self.fed = 1.0, 0.0
+        self._bouncing = 0.0  # s, for which the force may still turn by an impact
+        self._frequency = self._watched = self._shaking = self._blocked = 0.0
+        self._is_watching = False
+        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
+            self._has_settled
+        ) = self._has_begun = False
+        self.goes_back = self._is_led = False
+        self._wanted = self._unloading = 0.0  # N, commanded before; s, for which the arm may still unload itself
+        self._least = math.inf  # N, that has been measured meanwhile
+        self._most = 0.0  # N, that has been measured
+        self._is_slow, self._other, self._gone = False, "", ""
+        self._pace.reset()
+        self._advice.reset()
+        self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
+        self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
+        self._settled: Array | None = None  # torques per force, 1/m, once it has settled
+        self._pattern.reset()
+        self._forget_swings()
+
+    def _forget_swings(self) -> None:
+        """What the force was before something was touched shows nothing of how it is held."""
+        self._strayed = self._within = 0.0
+        self._report, self._returns = "", LEFT
+        self._turns.reset()
+
+    def approach_speed(
+        self, axis: ForceAxis, point: ForcePoint, desired: float, parameters: ForceLoopParameters
+    ) -> float:
+        """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
+
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `BY_MOTORS`
+        from these, unless friction would move the arm in jerks.  At a position that is not known, slower: what is
+        touched has to be identified before the force is too large.
+        """
+        if not parameters.limits.impact:
+            return math.inf
+        stiffness = parameters.guard.contact_stiffness
+        yielding = 1.0 / stiffness + axis.compliance
+        is_known = point.is_pinned or point.is_certain
+        slowest = CREEP / parameters.limits.settling_time
+        if self.is_touching:
+            is_stiff = desired * yielding < COARSE
+            is_slow = not is_known and not (is_stiff and self._identified >= DOUBTED)
+            rise = IDENTIFIED if is_slow else BY_MOTORS if parameters.is_estimated else LATE
+            return max(desired * yielding / axis.speed_fraction / rise, slowest)
+        fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
+        if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
+            detected = BY_MOTORS if parameters.is_estimated else DETECTED
+            fastest = min(fastest, max(desired * yielding / detected, slowest))
+        return fastest / axis.speed_fraction
+
+    def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
+        """Fraction of the torque of the force that is fed forward in this period: `force_feedforward` at least.
+
+        From the motors it rises after the touch: the velocity loop would take seconds to wind up to it on a stiff
+        surface.  Without dither it would only wind up the friction of the arm.
+        """
+        is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
+        self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
+        return max(parameters.force_feedforward, self.fed)
+
+    def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
+        """Whether the arm is to keep a force, N, that is nearly the commanded one.
+
+        On a stiff surface a small error would wind up the velocity loop until friction lets go, with a jerk that
+        changes the force by more than that error.
+        """
+        whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+        band = (LEAVE if self._is_kept else SETTLE) * desired * min(FINE / whole, 1.0)
+        self._is_kept = self.is_touching and whole < COARSE and abs(desired - measured) < band
+        return self._is_kept
+
+    def travel(self, distance: float, dt: float, is_led: bool) -> None:
+        """Count a way along the force, m, that the arm has moved in a period of dt, s.
+
+        `is_led`: another motion is commanded besides, which may lead the arm along a slope of what it presses.
+        """
+        self._travel += distance
+        self._pace.step([distance / dt], STEADY, dt)
+        self._is_led = is_led
+
+    def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
+        """Force above the commanded one, N, beyond the uncertainty of the measured one; 0 where it is not.
+
+        An arm that holds its position goes back by it: it must not press harder than commanded either.
+        """
+        return max(measured - desired - math.hypot(axis.force_sd, torque_error), 0.0)
+
+    def watch_shaking(self, axis: ForceAxis, moved: Array, frequency: float, dt: float) -> bool:
+        """Watch the motion of the joints in a period (n,), rad, under a dither, rad/s; False where it is known.
+
+        It is watched before the arm moves: what is touched would add its own motion.
+        """
+        samples = max(SHAKE_SAMPLES, round(2.0 * math.pi / (frequency * dt)))
+        if samples != self._shake.samples:
+            self._shake = Shake(samples)
+        self._is_watching = self._watched < max(WATCHED, (samples + 1) * dt)
+        if not self._is_watching:
+            return False
+        self._shake.step(moved)
+        self._watched += dt
+        self._frequency = frequency
+        self._shaking, self._blocked = self._shaking_along(axis)
+        return True
+
+    def _shaking_along(self, axis: ForceAxis) -> tuple[float, float]:
+        """How far the arm shakes along a force, m, and the force, N, that a hard surface takes from it."""
+        shaking = self._shake.along(axis.lever)
+        return shaking, axis.impact_mass * self._frequency * self._frequency * shaking
+
+    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the arm shakes too much for the surface, None where it does not.
+
+        A soft surface, in series with the cables, follows the swing of the position, and the force swings by k times
+        its size; a hard one stops the swing with the force that moved the mass of the arm.  Where the two are alike,
+        the arm swings on the surface in resonance, 1/F = |1/F_stopped - 1/F_followed|, and friction limits it.  Above
+        twice the commanded force the contact is lost and hit again in every cycle of the dither.
+        """
+        yielding = 1.0 / parameters.guard.contact_stiffness + axis.compliance
+        least = min(self._shaking / yielding, self._blocked)
+        if self.is_touching or least <= 0.0:
+            return None
+        apart = 1.0 / self._blocked - yielding / self._shaking
+        force = 1.0 / math.hypot(apart, 1.0 / (RESONANCE * least))
+        if force <= parameters.limits.shake_force * desired:
+            return None
+        return Refusal(
+            ForceReaction.SHAKEN,
+            f"the arm shakes by {brief(self._shaking)} m along the force (dither): on "
+            f"{parameters.guard.contact_stiffness:g} N/m the force would swing by {force:.3g} N; allowed: "
+            f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N",
+            f"{SENSORS}, or, {SOFTER}",
+        )
+
+    def step(
+        self,
+        case: ForceCase,
+        external: Array,
+        measured: float,
+        parameters: ForceLoopParameters,
+        dt: float,
+        pushed: float | None = None,
+        others: Callable[[], OtherForces] | None = None,
+        given_way: float = 0.0,
+    ) -> list[Found]:
+        """What to do instead of what is commanded, and why; nothing where it is obeyed.
+
+        Parameters
+        ----------
+        case : the commanded force.
+        external : torques of the world on the joints (n,), N m.
+        measured : force along it, N.
+        parameters : of the force loop.
+        dt : outer period, s.
+        pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
+        others : the same force in other poses and of other sizes, for the advice where it is refused.
+        given_way : how far the arm has given way to what pushes it, m, where it does not hold.
+        """
+        axis, point, desired = case.axis, case.point, case.desired
+        self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
+        blind = self._not_sensed(case, parameters)
+        is_loaded = not self._has_begun and abs(case.unknown) > TOLERANCE * desired
+        pushed = measured if pushed is None else pushed
+        self.is_touching = pushed >= TOUCH * desired and not is_loaded
+        self._has_begun = self._has_begun or self.is_touching
+        if self.is_touching and not self.has_touched:
+            self.has_touched, self._bouncing = True, BOUNCING
+            self._forget_swings()
+        self._count(measured, desired, given_way, parameters, dt)
+        # tangential forces grow with the force
+        unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
+        is_strange = self._is_sensed and unexplained > UNEXPLAINED
+        self._conflict = max(self._conflict + dt * self._against(point, is_strange), 0.0)
+        if self._conflict > CONFLICT and not self._other:
+            touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
+            self._other = f"{touched}; the arm goes back to where it was free until the command ends"
+        weak = self._too_weak(case, parameters)
+        if is_loaded:
+            return [(ForceReaction.NOT_SENSED, _loaded(case.unknown, case.meaning, desired))]
+        if ended := self._ended(parameters, is_blind=bool(blind or weak)):
+            return [ended]
+        if refusal := blind or weak or self._shaken(axis, desired, parameters) or self._too_slow(case, parameters):
+            why = f"{refusal.why}; the arm holds its position{self._advised(case, refusal, parameters, others)}"
+            return [(refusal.reaction, why)]
+        self._advice.reset()
+        is_double = not point.is_single and (is_strange or not point.is_pinned)
+        self._double = self._double + dt if is_double else 0.0
+        if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
+            why = (
+                f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
+                "commanded force alone; the arm holds its position until the second contact has gone"
+            )
+            return [(ForceReaction.SECOND_CONTACT, why)]
+        # what is off already leaves less of the tolerance to what is not known
+        left = max(1.0 - abs(desired - measured) / (TOLERANCE * desired), 0.0)
+        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
+        self._strange = self._strange + dt if is_touching and is_strange else 0.0
+        is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
+        self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
+        force_sd = math.hypot(_likely_sd(axis, case.torque_error, parameters), case.unknown)
+        is_uncertain = force_sd > known
+        self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
+        is_late, limits = parameters.is_estimated and self.share > SLOWED, parameters.limits
+        is_faint = is_late and not (limits.surface_speed or limits.slide_speed)  # such a surface swings the force, too
+        swing = limits.cycle_force * desired * (FAINT if is_faint else 1.0)
+        is_cycling = self._turns_again(measured, swing, limits.settling_time, dt) and is_touching
+        missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
+        turned = self._has_turned(axis, external, measured, desired, parameters, dt)
+        if is_late and is_touching and self._turns.count > FEW:
+            self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
+            self._turns.reset()
+            is_cycling = False
+        found = [(ForceReaction.CYCLE, _cycle(self._turns, desired, parameters))] if is_cycling else []
+        found += [(ForceReaction.NOT_REACHED, missed)] if missed else []
+        found += [(ForceReaction.NOT_EXPLAINED, turned)] if turned else []
+        return found or [self._doubted(case, force_sd, unexplained, parameters)]
+
+    def _turns_again(self, measured: float, least: float, window: float, dt: float) -> bool:
+        """Whether the measured force turns back again and again, as `Reversals.step`, and not by an impact."""
+        if self._bouncing > 0.0:
+            self._turns.reset()
+        self._bouncing -= dt
+        return self._turns.step(measured, least, window, dt)
+
+    def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the force is not measured well enough, None where it is.
+
+        What the estimator states of its torques counts until the force is controlled: it states more while the arm
+        moves and presses, which is reported.
+        """
+        axis, point, desired, sensing = case.axis, case.point, case.desired, parameters.sensing
+        limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, case.torque_error)
+        is_known = self._is_sensed or not case.torque_error or stated <= sensing.stated_fraction * desired
+        self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        if self._is_sensed:
+            return None
+        if not is_known:
+            return Refusal(
+                ForceReaction.NOT_SENSED,
+                f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
+                f"to start, it must be known to {sensing.stated_fraction * desired:.3g} N, "
+                f"{sensing.stated_fraction:.0%} of the commanded force (sensing.stated_fraction)",
+                f"{SENSORS}, or allow more where less accuracy will do",
+            )
+        return Refusal(
+            ForceReaction.NOT_SENSED,
+            f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
+            f"of {point.cover}; to start, it must be below {RESUME * limit:.3g} N, {RESUME:.0%} of the limit "
+            "(sensing.force_sd_limit, force_sd_fraction)",
+        )
+
+    def _advised(
+        self,
+        case: ForceCase,
+        refusal: Refusal,
+        parameters: ForceLoopParameters,
+        others: Callable[[], OtherForces] | None,
+    ) -> str:
+        """What to do in place of a refused command, in words to follow the reason; '' while that is looked for."""
+        besides = f", or {refusal.besides}" if refusal.besides else ""
+        if others is None:
+            return f": bend the arm, or command more force, another direction or position{besides}"
+        if self._is_watching:
+            return ""  # how the dither shakes the arm counts, too
+        self._advice.step(
+            case.desired, (refusal.reaction, parameters), others, lambda one: self._admits(one, parameters)
+        )
+        if not self._advice.is_complete:
+            return ""
+        if self._advice.ways:
+            return f": {', or '.join(self._advice.ways)}{besides}"
+        pinned = "" if case.point.is_pinned else ", with a pinned position or without"
+        return (
+            f"; no force up to 5 times and no angle of one joint up to {TURNS[-1]:g} rad away was found that would be "
+            f"accepted with a margin{pinned}: command another direction or position{besides}"
+        )
+
+    def _admits(self, case: ForceCase, parameters: ForceLoopParameters) -> bool:
+        """Whether another force would be accepted in place of the commanded one, with a reserve."""
+        hold, still = ForceHold(), np.zeros(len(case.axis.lever))
+        hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
+        largest = min(parameters.force_limit, parameters.limits.contact_force)
+        found = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
+        return case.desired <= largest and not any(reaction.holds for reaction, _ in found)
+
+    def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the contact estimator would not detect the force, None where it would or something is touched."""
+        point, desired, sensing = case.point, case.desired, parameters.sensing
+        name, least = ("least_signal", sensing.least_signal)
+        if not point.is_pinned:
+            name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
+        begins = RESUME if self._is_detectable else 1.0
+        is_weak, is_unseen = case.signal < begins * least, case.elsewhere < begins * sensing.least_signal
+        self._is_detectable = self.has_touched or not (is_weak or is_unseen)
+        if self._is_detectable:
+            return None
+        if is_weak:
+            return Refusal(
+                ForceReaction.NOT_SENSED,
+                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {brief(case.signal)} "
+                f"times the standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, "
+                "and above, or the force is detected late or on the wrong link",
+                SENSORS,
+            )
+        return Refusal(
+            ForceReaction.NOT_SENSED,
+            f"the torques of {desired:.3g} N on another link than {point.cover} are {brief(case.elsewhere)} times the "
+            "standard deviation with which the motors show them; allowed: sensing.least_signal, "
+            f"{sensing.least_signal:g}, and above, or that link is pressed harder than commanded before it is detected",
+            SENSORS,
+        )
+
+    def _against(self, point: ForcePoint, is_strange: bool) -> float:
+        """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
+        # at a pinned position the estimated link counts only where the torques are not those of the force
+        if point.conflict and (is_strange or not point.is_pinned):
+            return 1.0
+        return CONFLICT / DOUBTED if point.is_doubtful else -FADING
+
+    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> Found | None:
+        """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
+        if self._other:
+            return ForceReaction.OTHER_LINK, self._other
+        if self._gone:
+            return ForceReaction.NOTHING_TOUCHED, self._gone
+        if is_blind:
+            return None
+        if self._travel > parameters.limits.free_travel:
+            since = "since the force last was right, or rose" if self.has_touched else "and nothing was touched"
+            return ForceReaction.NOTHING_TOUCHED, (
+                f"the arm has moved {self._travel:.3g} m along the force {since}; allowed: "
+                f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
+                "force, then again"
+            )
+        if not self.has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+            return ForceReaction.NOTHING_TOUCHED, (
+                f"nothing was touched {brief(self._missed)} s after the command: the arm creeps, and has moved "
+                f"{brief(1e3 * self._travel)} mm; it holds its position: go nearer, or pin the "
+                f"position, or, {SOFTER}; command no force, then again"
+            )
+        return None
+
+    def _count(
+        self, measured: float, desired: float, given_way: float, parameters: ForceLoopParameters, dt: float
+    ) -> None:
+        """End the way along the force where that is right or rises, and find the one back against it.
+
+        What presses moves the arm back if it is too large, or the arm goes back all the same, and not because less is
+        commanded than before.
+        """
+        limits, tolerated = parameters.limits, tolerance(desired, parameters)
+        is_unloading = self._unloads(measured, desired, limits.settling_time, dt)
+        # where it neither has the force nor takes more of it, it may be gone, or go away
+        if self.is_touching and (self._is_led or measured >= min(desired - tolerated, self._most + SETTLE * desired)):
+            self._most = max(self._most, measured)
+            if self._travel <= limits.free_travel:
+                self._travel = 0.0
+        slowest = limits.surface_speed + CREEP / limits.settling_time
+        is_pushed = measured > desired + tolerated or (self._pace.value or STILL)[0] < -slowest
+        self.goes_back = self.is_touching and is_pushed and not (self._is_led or is_unloading)
+        if self.goes_back and given_way > limits.free_travel and not self._gone:
+            self._gone = _gone(given_way, measured, desired, parameters)
+
+    def _unloads(self, measured: float, desired: float, lasting: float, dt: float) -> bool:
+        """Whether less is commanded than before, N, and the force still falls, or did until `lasting`, s, ago."""
+        self._unloading = max(self._unloading - dt, 0.0)
+        if desired < self._wanted:
+            self._unloading, self._least = lasting, math.inf
+        if self._unloading and measured < self._least - SETTLE * desired:
+            self._unloading, self._least = lasting, measured
+        self._wanted = desired
+        if self._unloading:
+            self._most = min(self._most, measured)
+        return self._unloading > 0.0
+
+    def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the arm would be too slow on its way or on the surface, None where it is not or something is touched."""
+        axis, point, desired = case.axis, case.point, case.desired
+        if self.is_touching:
+            return None
+        stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+        pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
+        self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
+        if self._is_slow:
+            return Refusal(
+                ForceReaction.TOO_SLOW,
+                f"the force would settle with a time constant of {brief(1.0 / pace)} s{_slowed(axis)}; allowed: "
+                f"1/{SETTLED:g} of limits.settling_time",
+            )
+        way = desired / parameters.guard.contact_stiffness
+        if parameters.is_estimated and not point.is_pinned and way < COARSE:
+            return Refusal(
+                ForceReaction.TOO_SLOW,
+                f"the whole force is {brief(1e3 * way)} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
+                f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
+                "least, as the velocity loops wind up through friction for longer than limits.settling_time",
+                SENSORS,
+            )
+        if moves := _left_behind(axis, desired, parameters):
+            return moves
+        speed = self.approach_speed(axis, point, desired, parameters)
+        if speed * parameters.limits.settling_time < CREEP:
+            return Refusal(
+                ForceReaction.TOO_SLOW,
+                f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
+                f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm "
+                "within limits.settling_time, in which friction moves the arm in jerks",
+                SOFTER,
+            )
+        return None
+
+    def _doubted(self, case: ForceCase, force_sd: float, unexplained: float, parameters: ForceLoopParameters) -> Found:
+        """Why the measured force may not be the true one, where that lasts."""
+        point, desired, lasting = case.point, case.desired, parameters.limits.settling_time
+        if self._strange > lasting:
+            return ForceReaction.NOT_EXPLAINED, (
+                f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
+                f"{point.cover} ({_deviation(unexplained, UNEXPLAINED)}): it acts elsewhere or on another "
+                "link, or is not the only one; pin it where it acts, or free the arm"
+            )
+        if self._assumed > lasting:
+            return ForceReaction.POSITION_ASSUMED, _position_assumed(
+                point, math.hypot(case.axis.free_sd, case.torque_error)
+            )
+        if self._uncertain > lasting:
+            return ForceReaction.UNCERTAIN, (
+                f"the force is known to +-{brief(force_sd)} N, {force_sd / desired:.0%} of the commanded "
+                f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
+                "known, less where it is measured off: tare in free space, command more force, or another direction "
+                "or pose"
+            )
+        return ForceReaction.NONE, ""
+
+    def _has_turned(
+        self,
+        axis: ForceAxis,
+        external: Array,
+        measured: float,
+        desired: float,
+        parameters: ForceLoopParameters,
+        dt: float,
+    ) -> str:
+        """Why something else seems to act since the force has settled, '' where nothing does.
+
+        The torques of one contact keep their proportions while the arm rests, unless its friction turns.
+        """
+        if not self.is_touching or (desired != self._desired and self._turned <= CONFLICT):
+            self._settled, self._turned = None, 0.0
+            self._pattern.reset()
+        self._desired = desired
+        if not self.is_touching:
+            return ""
+        if self._settled is None:
+            pattern, _ = self._pattern.step((external / measured).tolist(), STEADY, dt)
+            self._settled = np.array(pattern) if self._within >= LEFT * parameters.limits.settling_time else None
+            return ""
+        change = axis.turned(external - measured * self._settled)
+        lasts = change > (BACK_AGAIN if self._turned > CONFLICT else TURNED)
+        self._turned = self._turned + dt if lasts else 0.0
+        if self._turned <= CONFLICT:
+            return ""
+        return (
+            f"the torques are no longer those with which the force of {desired:.3g} N has settled "
+            f"({_deviation(change, TURNED)}): something else acts on the arm, and the measured force is that of both "
+            "together, or the friction of the surface has turned; free the arm, or command the force again"
+        )
+
+    def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
+        """A reason, or the last one until the force has been within the tolerance for as long as it may be off.
+
+        A force that had been right before has to be right for the whole settling time: what takes it away comes again.
+        """
+        if missed:
+            self._returns = 1.0 if self._has_settled else LEFT
+        if missed or self._within >= self._returns * parameters.limits.settling_time:
+            self._report = missed
+        return self._report
+
+    def _not_reached(
+        self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters, dt: float
+    ) -> str:
+        """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
+        error, lasting = desired - measured, parameters.limits.settling_time
+        is_off = abs(error) > tolerance(desired, parameters)
+        self._within = 0.0 if is_off else self._within + dt
+        if self._has_settled and desired - self._reached > tolerance(desired, parameters):
+            self._has_settled, self._missed = False, 0.0  # more is commanded: that takes its time again
+        if self.has_touched and not is_off:
+            self._has_settled, self._reached = True, desired
+        if not is_off or error * self._missed < 0.0:
+            self._missed = 0.0
+        self._missed += math.copysign(dt, error)
+        has_rested = not self._has_settled or self._within >= LEFT * lasting
+        self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
+        if not self.has_touched and abs(self._missed) > lasting:
+            return (
+                f"nothing is touched yet, {brief(abs(self._missed))} s after the command: the arm has moved "
+                f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position, or, {SOFTER}"
+            )
+        is_late = self._missed > 0.0 and not self._has_settled
+        if abs(self._missed) > (lasting if is_late else LEFT * lasting):
+            return (
+                f"{measured:.3g} N are measured and {desired:.3g} N commanded; the force has been too "
+                f"{'small' if error > 0.0 else 'large'} for {brief(abs(self._missed))} s{_slowed(axis)}: command what "
+                "can be reached, another direction, or bend the arm"
+            )
+        if self._strayed > LEFT * lasting:
+            return (
+                f"the force was reached, and leaves {desired:.3g} N again and again by more than "
+                f"{brief(tolerance(desired, parameters))} N: the surface moves, something else pushes, friction turns, "
+                "the position is unknown, or it is a limit cycle; free the arm of what else touches it, pin the "
+                "position, or, for a cycle, lower force_gain"
+            )
+        return ""
+
+
+def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
+    """Error, N, up to which a force counts as reached."""
+    return max(TOLERANCE * desired, parameters.limits.least_tolerance)
+
+
+def _deviation(unexplained: float, most: float) -> str:
+    """A chi^2 and the largest one in the standard deviations that they are."""
+    return f"off by {math.sqrt(unexplained):.3g} standard deviations; allowed: {math.sqrt(most):.2g}"
+
+
+def _slowed(axis: ForceAxis) -> str:
+    """Why the arm is slow along the force, '' where it is not."""
+    if axis.speed_fraction > NOT_SLOWED:
+        return ""
+    return (
+        f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
+        "own inertia resists like a large mass in this pose (sensing.apparent_mass_limit)"
+    )
+
+
+def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParameters) -> float:
+    """Standard deviation of the measured force, N, with `LIKELY` of what is stated of the torques themselves."""
+    sensing = parameters.sensing
+    each = sensing.estimated_torque_sd if parameters.is_estimated else sensing.torque_sd
+    stated = math.hypot(each * float(np.linalg.norm(axis.sense)), torque_error)
+    whole = math.hypot(axis.force_sd, torque_error)
+    return math.sqrt(max(whole * whole - (1.0 - LIKELY * LIKELY) * stated * stated, 0.0))
+
+
+def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+    """Why a surface that moves would keep the force off, None where it would not.
+
+    Along the force the integral law is v/G_I behind, and the force rises in no less than `LATE`.  A surface that moves
+    across it comes nearer by a slope that nobody knows, if it is stiff by more than the force allows before the
+    friction of the arm has turned round.
+    """
+    limits, yielding = parameters.limits, 1.0 / parameters.guard.contact_stiffness + axis.compliance
+    lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+    most = parameters.sensing.reported_fraction * desired
+    if lag > most:
+        return Refusal(
+            ForceReaction.TOO_SLOW,
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
+            f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction)",
+            "set a larger force_gain, or let the surface move more slowly",
+        )
+    fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
+    if limits.impact and limits.surface_speed > fastest:
+        return Refusal(
+            ForceReaction.TOO_SLOW,
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
+            f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
+            f"{brief(fastest)} m/s",
+            "let the surface move more slowly",
+        )
+    nearer = TURNING * SLOPE * limits.slide_speed
+    off = nearer / yielding
+    if off > tolerance(desired, parameters):
+        return Refusal(
+            ForceReaction.TOO_SLOW,
+            f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
+            f"by {brief(1e6 * nearer)} um while the friction of the arm turns round, which is {brief(off)} N on "
+            f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
+            f"{brief(tolerance(desired, parameters))} N",
+            "let the surface move more slowly",
+        )
+    return None
+
+
+def _gone(way: float, measured: float, desired: float, parameters: ForceLoopParameters) -> str:
+    return (
+        f"the arm has gone back by {way:.3g} m against the force of {desired:.3g} N, as what presses it with "
+        f"{measured:.3g} N moves on: it is not at rest, or is no surface; allowed: limits.free_travel, "
+        f"{parameters.limits.free_travel:g} m; the arm holds its position: free it, or, for a surface that moves, "
+        "declare limits.surface_speed; command no force, then again"
+    )
+
+
+def _loaded(force: float, meaning: str, desired: float) -> str:
+    return (
+        f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
+        f"{TOLERANCE:g} of the commanded; {UNLOAD}"
+    )
+
+
+def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:
+    swing, period = turns.cycle
+    return (
+        f"the measured force is in a limit cycle of {brief(swing)} N peak to peak and {brief(period)} s about "
+        f"{desired:.3g} N; allowed: limits.cycle_force, {parameters.limits.cycle_force:g} of the commanded; friction "
+        "or the surface keeps it up: lower force_gain, or use joint sensors"
+    )
+
+
+def _position_assumed(point: ForcePoint, force_sd: float) -> str:
+    known = (
+        f"where it is known from the torques alone, so that the force is known to {brief(force_sd)} N"
+        if point.is_identified
+        else "it is not known where"
+    )
+    return (
+        f"something is touched and {known}; {point.position:.3g} m of {point.cover} is assumed, and the force is as "
+        "wrong as that; pin it by the torque of a command across a link, or set contact_source to pinned "
+        "(contact_position)"
+    )

@@ -1,0 +1,188 @@
+"""Node `force_loop`: the outer loop, forces and postures in, joint velocities and torques out."""
+
+import math
+from typing import Any
+
+from wam_control.contact.contact_table import contact_of
+from wam_control.force.force_hold import ForceReaction
+from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force.guard_report import Report
+from wam_control.force.reaction_status import facts_of
+from wam_control.force.task import TaskCommand, task_of
+from wam_control.task.trajectory_player import TrajectoryPlayer
+from wam_description.arm import Shared
+from wam_description.number_text import brief
+from wam_description.parameters import ParameterError
+from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
+from wam_description.synchroniser import Inputs
+from wam_description.wiring import Followed, Input, Outputs, reaction
+
+
+class ForceLoopNode:
+    """Answers each joint state with a joint velocity and a feed-forward torque."""
+
+    name, parameters = "force_loop", ForceLoopParameters
+    services = ("tare",)
+    follows = Followed("velocity_loop", "servo")
+
+    def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
+        self._loop = ForceLoop(shared.model_arm, shared.servo, own, shared.timing, shared.ages.command)
+        self.tune = self._loop.tune
+        self.retune = self._loop.retune_servo
+        self._arm = shared.arm
+        self._player = TrajectoryPlayer(shared.arm, shared.motion)
+        self._is_on_trajectory = False
+        self._command: Table | None = None
+        self._known: TaskCommand | None = None
+        self._refusal = ""
+        self._covers = shared.arm.covers.names
+        self._timing = shared.timing
+        self._reported: tuple[Any, ...] | None = None
+        self._reaction = ForceReaction.NONE
+
+    @reaction(
+        Input("joint_states"),
+        Input("joint_sensors", absent="hold"),
+        Input("external_joint_torques", "effort", absent="brake"),
+        Input("external_joint_torques_sd", "effort"),
+        Input("contact/hypotheses", absent="brake"),
+        Input("force_command", age="command", absent="hold"),
+        Input("joint_posture_command", "position velocity?", age="command", absent="hold"),
+        Input("joint_trajectory", age="command", absent="hold"),
+        Input("joint_torque_command", "effort", age="command", absent="hold"),
+        Input("task_command", age="command", absent="hold"),
+        outputs=(
+            "joint_velocity_command",
+            "joint_effort_command",
+            "force_measured",
+            "force_error",
+            "force_error_limited",
+            "force_axis",
+            "task_axes",
+        ),
+    )
+    def step(self, inputs: Inputs) -> Outputs:
+        """One outer period."""
+        command, posture, torque = (
+            inputs[topic] for topic in ("force_command", "joint_posture_command", "joint_torque_command")
+        )
+        task, joints = self._task(inputs["task_command"]), inputs["joint_states"]
+        if inputs["joint_trajectory"] is not None or self._is_on_trajectory:
+            posture = self._on_trajectory(inputs)
+        if self._refusal:
+            command = posture = torque = None  # the arm holds its position
+        external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
+        torque_sd = inputs["external_joint_torques_sd"]
+        out = self._loop.step(
+            joints,
+            inputs["joint_sensors"],
+            contact_of(hypotheses, self._covers) if external and hypotheses else None,
+            external.effort if external else None,
+            ForceCommand(command.frame, command.force, command.torque) if command else None,
+            posture.position if posture else None,
+            torque.effort if torque else None,
+            inputs.dt,
+            task,
+            posture.velocity if posture else None,
+            torque_sd.effort if torque_sd else None,
+        )
+        return {
+            "joint_velocity_command": State([], out.velocity, []),
+            "joint_effort_command": State([], [], out.effort),
+            "force_measured": Wrench(out.frame, out.measured, ZERO),
+            "force_error": Wrench(out.frame, out.error, ZERO),
+            "force_error_limited": Wrench(out.frame, out.limited, ZERO),
+            **self._force_axis(out, inputs.stamp),
+            **self._status(command, torque, task),
+        }
+
+    def _on_trajectory(self, inputs: Inputs) -> State | None:
+        """The posture on a trajectory, None where the arm is to stay where it is."""
+        trajectory, joints = inputs["joint_trajectory"], inputs["joint_states"]
+        self._is_on_trajectory = trajectory is not None
+        moving = self._player.step(trajectory, joints.position, joints.velocity, inputs.dt)
+        return State(moving.position, moving.velocity, []) if moving else None
+
+    def _task(self, command: Table | None) -> TaskCommand | None:
+        """The commanded task; one that is not understood is refused, and the arm holds its position."""
+        if command != self._command:
+            self._command, self._refusal = command, ""
+            try:
+                self._known = task_of(command, self._arm)
+            except ParameterError as error:
+                self._known, self._refusal = None, f"{error}; the arm holds its position"
+        return self._known
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The estimate, where the force is controlled by it."""
+        is_fed_back = self._loop.parameters.is_estimated
+        return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
+
+    def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:
+        """How well the force is known, at the display rate and where the reaction has changed."""
+        reaction, before = self._loop.reaction, self._reaction
+        self._reaction = reaction
+        if reaction is before and not self._timing.is_display(stamp):
+            return {}
+        axis, point = out.axis, out.point
+        if out.rows:
+            return {"force_axis": Table(BASE, ()), "task_axes": Table(out.frame, out.rows)}
+        if axis is None or point is None:
+            return {"force_axis": Table(BASE, ())}
+        lever = math.hypot(*axis.lever)
+        row = (float(reaction), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
+        return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
+
+    def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
+        """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
+        report, reactions = self._loop.report, self._loop.reactions
+        refused = self.refusals
+        refused.pop("contact/hypotheses", None)
+        why = self._loop.is_advised, self._loop.is_stopping, self._refusal or self._player.refusal
+        commanded: tuple[str, ...] = ()
+        if self._loop.reason or refused:  # which is that of the command for which it was given
+            values = [*(command.force if command else ()), *(torque.effort if torque else ())]
+            values += [axis.value or 0.0 for axis in task.axes] if task else []
+            commanded = tuple(map(brief, values))
+        present = report, tuple(reactions), self._loop.is_pushed, tuple(refused), why, commanded
+        if present == self._reported:
+            return {}
+        self._reported = present
+        message, facts = facts_of(reactions, refused)
+        level = Level.WARN if report.is_warning or message else Level.OK
+        return {"status": NodeStatus(level, message or report.message, facts={**report.facts, **facts})}
+
+    @property
+    def refusals(self) -> dict[str, str]:
+        """Why a present command or contact is not used, by topic."""
+        refusals = self._loop.refusals.copy()
+        if self._refusal:
+            refusals["task_command"] = self._refusal
+        if self._player.refusal:
+            refusals["joint_trajectory"] = self._player.refusal
+        return refusals
+
+    @property
+    def reason(self) -> str:
+        """Why the loop does not do what is commanded, '' where it does."""
+        return self._loop.reason
+
+    @property
+    def force_reaction(self) -> ForceReaction:
+        """What the loop does instead of what is commanded."""
+        return self._loop.reaction
+
+    @property
+    def guard_report(self) -> Report:
+        """What the guard reports of the parameters in force."""
+        return self._loop.report
+
+    def diagnostics(self) -> dict[str, str]:
+        """Why the estimated contact position is not used."""
+        return {"estimated contact position not used": self._loop.fallback or "-"}
+
+    def tare(self) -> Answer:
+        """Take the present external torques as zero."""
+        reason = self._loop.tare()
+        return Answer(not reason, reason or "the present external torques now count as zero in the force loop")

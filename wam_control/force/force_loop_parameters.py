@@ -1,0 +1,208 @@
+"""Parameters of the force loop, and the laws built from them."""
+
+import math
+from dataclasses import dataclass
+
+from wam_control.force.force_axis import SensingParameters
+from wam_control.force.force_law import ForceLaw
+from wam_control.force.motion_limits import LimitParameters
+from wam_control.force.sampled_loop import Feedback
+from wam_control.force.stability_guard import GuardedTask, GuardParameters
+from wam_control.force.task_parameters import TaskParameters
+from wam_description.arm import Arm
+from wam_description.parameters import lengths, parameter, require, tunable
+
+AXES = ("x", "y", "z")  # of the force command's frame
+
+
+@dataclass(frozen=True)
+class ForceLoopParameters:
+    """Gains and limits of the force loop."""
+
+    guard: GuardParameters
+    sensing: SensingParameters
+    limits: LimitParameters
+    task: TaskParameters
+    mode: str = parameter(
+        "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
+        "open_loop: J^T F fed forward, no feedback",
+        choices=("hybrid", "joint_torque", "open_loop"),
+        live=True,
+    )
+    feedback: str = parameter(
+        "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
+    )
+    force_gain: tuple[float, ...] = tunable(
+        "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
+        "m/s/N",
+        high=100.0,
+    )
+    force_proportional_gain: tuple[float, ...] = tunable(
+        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", high=100.0
+    )
+    force_error_limit: tuple[float, ...] = tunable(
+        "saturation of F_error of each axis, or one for all; above the deadband", "N"
+    )
+    force_deadband: tuple[float, ...] = tunable(
+        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
+    )
+    force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
+    force_rate_limit: float = tunable(
+        "largest rate at which the desired force follows its command", "N/s", low=1.0, before=1e9
+    )
+    torque_gain: tuple[float, ...] = tunable(
+        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", high=100.0
+    )
+    torque_proportional_gain: tuple[float, ...] = tunable("G_P of each joint, or one for all", "rad/(N m)", high=100.0)
+    torque_error_limit: tuple[float, ...] = tunable(
+        "saturation of the torque error of each joint, or one for all; above the deadband", "N m"
+    )
+    torque_deadband: tuple[float, ...] = tunable(
+        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
+    )
+    torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
+    torque_rate_limit: float = tunable(
+        "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0, before=1e9
+    )
+    delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
+    blend_time: float = tunable(
+        "time constant of the bumpless transfer of the velocity when a command begins or ends, the mode or a gain is "
+        "changed, or the motors start; zero for none",
+        "s",
+        high=60.0,
+    )
+    force_feedforward: float = tunable(
+        "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
+        "arm at the surface",
+        high=1.0,
+        before=1.0,
+    )
+    friction_feedforward: float = tunable(
+        "fraction of the dry friction of the model that is fed forward along the commanded motion while a force is "
+        "controlled; with feedback contact_estimate none, as a dither does the same",
+        high=1.0,
+        before=0.0,
+    )
+    posture_gain: float = tunable("joint velocity per posture error", "1/s", high=1e3)
+    joint_speed_limit: float = tunable("largest joint speed due to the posture and to the force", "rad/s", high=1e3)
+    force_filter: float = tunable("time constant of the low pass on the measured force", "s", high=10.0)
+    spring_stiffness: tuple[float, ...] = tunable(
+        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad"
+    )
+    spring_rest: tuple[float, ...] = tunable("joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0)
+    contact_source: str = parameter(
+        "where the force acts: estimated: at the estimated contact if it is certain enough, else as pinned; pinned: at "
+        "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
+        choices=("estimated", "pinned"),
+        live=True,
+        before="estimated",
+    )
+    contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
+    contact_position: float = tunable("contact position assumed along it", "m", high=3.0)
+    contact_position_sd: float = tunable(
+        "standard deviation of a pinned contact position, as of a surface that moves along the link",
+        "m",
+        high=1.0,
+        before=0.0,
+    )
+    schedule: str = parameter(
+        "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "
+        "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",
+        choices=("off", "position"),
+        live=True,
+    )
+    position_uncertainty_limit: float = tunable(
+        "largest standard deviation of an estimated contact position that is used", "m", high=10.0
+    )
+    link_probability_limit: float = tunable(
+        "least probability of the estimated link with which its contact position is used", high=1.0
+    )
+
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the estimated torques are fed back, in place of those of sensors."""
+        return self.feedback == "contact_estimate"
+
+    def impact_energy(self, force: float) -> float:
+        """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""
+        own = self.limits
+        return (own.impact * force) ** 2 / (2.0 * self.guard.contact_stiffness) if own.impact else math.inf
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse parameters that do not fit the arm.
+
+        Raises
+        ------
+        ParameterError
+            names the parameter and what is allowed.
+        """
+        covers = arm.covers.names
+        require(
+            self.contact_cover in covers,
+            f"contact_cover is '{self.contact_cover}'; allowed: {', '.join(covers)}",
+        )
+        length = arm.covers.length_of(self.contact_cover)
+        require(
+            self.contact_position <= length,
+            f"contact_position is {self.contact_position:g} m; allowed: 0 to {length:g}, on {self.contact_cover}",
+        )
+        slowest = min(arm.joints.speed_limit)
+        require(
+            self.joint_speed_limit <= slowest or self.guard.mode in ("off", "warn"),
+            f"joint_speed_limit is {self.joint_speed_limit:g} rad/s; the driver stops the arm at "
+            f"arm.joints.speed_limit; allowed: 0 to {slowest:g}",
+        )
+        require(
+            self.is_estimated or arm.joint_sensors,
+            f"feedback is '{self.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
+        )
+        springs = {"spring_stiffness": self.spring_stiffness, "spring_rest": self.spring_rest}
+        lengths("force_loop", arm.joints.names, springs)
+        require(
+            self.feedback != "joint_position" or any(self.spring_stiffness),
+            "feedback is 'joint_position' but spring_stiffness is 0 at each joint, so that no force is measured; give "
+            "the stiffness, N m/rad, of the known spring that the arm presses, or use 'joint_sensors' or "
+            "'contact_estimate'",
+        )
+
+
+def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:
+    """How the force is sensed with the feedback of a parameter set."""
+    return parameters.sensing.of_estimate if parameters.is_estimated else parameters.sensing
+
+
+def force_law(parameters: ForceLoopParameters) -> ForceLaw:
+    """The law of the axes of the force's frame."""
+    return ForceLaw(
+        "force",
+        AXES,
+        parameters.force_gain,
+        parameters.force_proportional_gain,
+        parameters.force_error_limit,
+        parameters.force_deadband,
+    )
+
+
+def torque_law(parameters: ForceLoopParameters, joints: tuple[str, ...]) -> ForceLaw:
+    """The law of the joints."""
+    return ForceLaw(
+        "torque",
+        joints,
+        parameters.torque_gain,
+        parameters.torque_proportional_gain,
+        parameters.torque_error_limit,
+        parameters.torque_deadband,
+    )
+
+
+def task_of(parameters: ForceLoopParameters, law: ForceLaw) -> GuardedTask:
+    """What the guard needs to know of a parameter set."""
+    is_joints = parameters.mode == "joint_torque"
+    return GuardedTask(
+        law=law,
+        is_joints=is_joints,
+        feedback=Feedback(parameters.feedback, parameters.spring_stiffness, parameters.guard.feedback_lag),
+        hold_gain=parameters.posture_gain,
+        filter_time=0.0 if is_joints else parameters.force_filter,
+        delay_samples=parameters.delay_samples,
+    )

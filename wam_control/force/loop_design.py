@@ -1,0 +1,126 @@
+"""Chapter 5 for a force loop of your own: one inertia with friction between transmission and contact."""
+
+import math
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_control.force.friction_verdict import Domain, FrictionVerdict, friction_verdict
+from wam_control.force.stability_guard import rounded_down
+from wam_theory.linear_loop import damping_ratio, gain_ratio
+from wam_theory.stick_slip import FrictionNode, IntegralLoop
+
+LONGEST = 50  # periods of delay
+EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
+CLOSE = 0.9  # of the margin; no plant is known better
+ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop leaves another margin"
+ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
+
+
+class LoopDesign(NamedTuple):
+    """What chapter 5 predicts for a loop.
+
+    Attributes
+    ----------
+    node, loop : as designed; the loop sampled with its delay in whole periods, rounded up.
+    gamma, zeta : coordinates of figure 5.8, (5.15) and (5.12): of the loop without sampling and delay.
+    verdict : domain, margin, largest safe error and limit cycles, with this contact and all softer ones.
+    """
+
+    node: FrictionNode
+    loop: IntegralLoop
+    gamma: float
+    zeta: float
+    verdict: FrictionVerdict
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether the saturation of the loop is not above the largest safe error."""
+        return self.loop.error_limit <= self.verdict.stable_error
+
+    def text(self) -> str:
+        """For people, with what to do where the loop is not safe."""
+        node, verdict, cycle = self.node, self.verdict, self.verdict.cycle
+        part, ratio = self.loop.gain / verdict.margin, node.transmission_stiffness / node.contact_stiffness
+        stiction = "none"
+        if cycle.peak_to_peak:
+            stiction = f"{cycle.peak_to_peak:.4g} peak to peak every {cycle.period:.3g} s, without a deadband of "
+            stiction += f"{cycle.deadband:.3g}"
+        undecided = verdict.undecided_error
+        lines = [
+            f"domain {verdict.domain}: {MEANING[verdict.domain]}",
+            f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}",
+            f"largest safe error: {verdict.stable_error:.4g}; the loop has {self.loop.error_limit:.4g}",
+            *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
+            f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
+            ASSUMED,
+        ]
+        if undecided > verdict.stable_error:
+            lines.append(
+                f"undecided: up to {undecided:.4g} no response was found that does not come to rest, but not all were "
+                f"followed to their end ({EVENTS} events)"
+            )
+        if verdict.saturated_cycle:
+            lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
+        lower = f"lower the gain to {rounded_down(CLOSE * verdict.margin):g}, {CLOSE:g} of the margin"
+        if not self.is_safe:
+            error = rounded_down(verdict.stable_error)
+            saturate = f", or saturate the error at {error:g}" if error else ""
+            finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
+            lines.append(f"{finding}: {lower}{saturate}")
+        elif CLOSE < part <= 1.0:
+            lines.append(f"close to the margin: a plant a little other than the one given may be unstable; {lower}")
+        return "\n".join(lines)
+
+
+MEANING = {
+    Domain.I: "stable for every error",
+    Domain.II: "friction stabilises it for small errors",
+    Domain.BEYOND: "II or III, undecided: no error was shown to be safe, and not all were shown to be unsafe",
+    Domain.III: "no error was found for which every response comes to rest",
+}
+
+
+def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay: float = 0.0) -> LoopDesign:
+    """Assess a loop on a plant; units are free but consistent (N, m, s or N m, rad, s).
+
+    Parameters
+    ----------
+    node : inertia, damping, stiffness of transmission and contact, friction.
+    loop : G_I, saturation and deadband.
+    rate : of the samples, Hz; 0 for a continuous loop.
+    delay : from a sample to its command, s.
+
+    Raises
+    ------
+    ValueError
+        where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `LONGEST` periods, or
+        a number is `ABSURD`.
+    """
+    if not node.damping > 0.0:
+        raise ValueError(f"damping is {node.damping:g}; without damping no gain is stable, give one above 0")
+    for name, value in (("rate", rate), ("delay", delay)):
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"{name} is {value:g}; it must be 0 or more")
+    given = {f.name: getattr(one, f.name) for one in (node, loop) for f in fields(one)} | {"rate": rate, "delay": delay}
+    for name, value in given.items():
+        if 0.0 < abs(value) < 1.0 / ABSURD or ABSURD < abs(value) < math.inf:
+            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / ABSURD:g} and {ABSURD:g}")
+    if delay and not rate:
+        raise ValueError(f"delay is {delay:g} s and rate is 0; give the rate of the samples, Hz")
+    samples = math.ceil(delay * rate - 1e-9)
+    if samples > LONGEST:
+        raise ValueError(f"delay is {delay:g} s, {samples} periods; allowed: {LONGEST} periods, {LONGEST / rate:g} s")
+    sampled = replace(loop, sample_period=1.0 / rate if rate else 0.0, delay_samples=samples)
+    plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
+    zeta = float(damping_ratio(*plant))
+    gamma = float(gain_ratio(loop.gain, *plant))
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            return LoopDesign(node, sampled, gamma, zeta, friction_verdict(node, sampled, EVENTS))
+    except ArithmeticError:
+        worst = max((name for name in given if 0.0 < given[name] < math.inf), key=lambda n: abs(math.log(given[n])))
+        raise ValueError(
+            f"{worst} is {given[worst]:g}; compared with the other numbers it is too far off to compute"
+        ) from None

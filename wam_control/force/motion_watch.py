@@ -1,0 +1,148 @@
+"""Whether an axis gets where the position or the velocity commanded along it takes an arm that nothing hinders."""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from wam_control.force.force_hold import LEFT, SETTLED, TOLERANCE, ForceReaction, Found
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_measurement import REST
+from wam_control.force.posture_watch import PAUSE
+from wam_description.number_text import brief
+
+IN_THE_WAY: Final = (
+    "something is in the way, a joint is at its end, or the arm has no lever for it here: command what is free and "
+    "within reach, or another posture"
+)
+TOO_FAST: Final = "a joint would be faster than force_loop:joint_speed_limit: command less speed, or raise it"
+OBEYS: Final[Found] = (ForceReaction.NONE, "")
+
+
+class MotionWatch:
+    """Watches one axis of a task, or a joint of the posture, next to an ideal arm that does what its law commands.
+
+    An axis counts as behind from where its law commands a joint speed at which the arm is not at rest, REST:
+    e > REST |r| / k, with the lever r and the velocity per error k.  On the way to a position, at the velocity v of
+    the ideal arm, it may be late by the time constant of its law, v/k, too.  A velocity may be off by `TOLERANCE`, too,
+    in the mean over `limits.settling_time` T, e' = v - r.qd - e/T, or over `LEFT` of T.  What is behind for `LEFT` of T
+    is reported.
+
+    Parameters
+    ----------
+    name, unit : of the axis, 'm' or 'rad'.
+    advice : what to do where it is behind.
+    """
+
+    def __init__(self, name: str, unit: str, advice: str = IN_THE_WAY) -> None:
+        self._name, self._unit, self._advice = name, unit, advice
+        self.restart()
+
+    def restart(self) -> None:
+        """Something else is commanded, or the arm holds its position."""
+        self._ideal, self._goal, self._rested = math.nan, math.nan, 0.0
+        self._behind, self._mean, self._error, self._made = 0.0, math.nan, 0.0, 0.0
+        self._off = self._within = 0.0  # s
+        self._found = OBEYS
+
+    def velocity(
+        self, speed: float, moved: float, lever: float, share: float, parameters: ForceLoopParameters, dt: float
+    ) -> Found:
+        """What a commanded velocity does not reach, and why.
+
+        Parameters
+        ----------
+        speed : commanded along the axis, m/s or rad/s.
+        moved : along the axis since the period before, m or rad.
+        lever : velocity along the axis per joint velocity, its size, m or 1.
+        share : of the commanded joint velocities, which `joint_speed_limit` allows.
+        parameters : of the force loop.
+        dt : outer period, s.
+        """
+        lasting = max(parameters.limits.settling_time, dt)
+        if math.isnan(self._mean):
+            self._mean = abs(speed)
+        self._mean += (abs(speed) - self._mean) * dt / lasting
+        self._behind += speed * dt - moved - self._behind * dt / lasting
+        brief_time = max(LEFT * lasting, dt)
+        self._error += (speed * dt - moved - self._error * dt) / brief_time
+        self._made += (moved - self._made * dt) / brief_time
+        allowed = _allowed(lever, parameters.task.largest_rate, lasting) + TOLERANCE * self._mean * lasting
+        return self._reported(
+            min(self._behind, self._error * lasting, key=abs),  # a push that is over does not count for all of T
+            allowed,
+            LEFT * lasting,
+            dt,
+            share < 1.0,
+            lambda: f"{speed:.4g} {self._unit}/s are commanded, and it moves with {brief(self._made)} {self._unit}/s",
+        )
+
+    def position(
+        self,
+        goal: float,
+        rate: float,
+        at: float,
+        lever: float,
+        law: tuple[float, float],
+        share: float,
+        parameters: ForceLoopParameters,
+        dt: float,
+    ) -> Found:
+        """What a commanded position does not reach, and why.
+
+        Parameters
+        ----------
+        goal, at : commanded and present position, m or rad.
+        rate : at which the commanded one moves, m/s or rad/s; it counts while that changes.
+        lever, share, parameters, dt : as of `velocity`.
+        law : velocity per error, 1/s, and largest velocity, m/s or rad/s.
+        """
+        lasting = max(parameters.limits.settling_time, dt)
+        gain, fastest = max(law[0], SETTLED / lasting), law[1]  # slower, no position would be reached in time
+        was_at_rest = self._rested > PAUSE
+        self._goal, self._rested = goal, self._rested + dt if goal == self._goal else dt
+        if is_at_rest := self._rested > PAUSE:
+            rate = 0.0
+        if math.isnan(self._ideal) or (is_at_rest and not was_at_rest):
+            self._ideal = at  # the joints may go there more slowly
+        speed = rate + min(gain, 1.0 / dt) * (goal - self._ideal)
+        speed = min(max(speed, -fastest), fastest) * (share if is_at_rest else 1.0)
+        self._ideal += speed * dt
+        return self._reported(
+            self._ideal - at,
+            _allowed(lever, law[0], lasting) + abs(speed) / gain,
+            LEFT * lasting,
+            dt,
+            share < 1.0 and not is_at_rest,
+            lambda: f"{goal:.4g} {self._unit} is commanded, and it is at {at:.4g} {self._unit}",
+        )
+
+    def _reported(
+        self,
+        behind: float,
+        allowed: float,
+        lasting: float,
+        dt: float,
+        is_limited: bool,
+        what: Callable[[], str],
+    ) -> Found:
+        """The reaction to a way, m or rad, that is missing for so long, s, until it is not for as long."""
+        if abs(behind) <= allowed:
+            self._within += dt
+            if self._within >= lasting:
+                self._off, self._found = 0.0, OBEYS
+            return self._found
+        self._within = 0.0
+        self._off += dt
+        if self._off > lasting and self._found is OBEYS:
+            why = TOO_FAST if is_limited else self._advice
+            text = (
+                f"{self._name}: {what()}; it has been off by more than {brief(allowed)} {self._unit} for "
+                f"{brief(self._off)} s; {why}"
+            )
+            self._found = (ForceReaction.NOT_FOLLOWED if is_limited else ForceReaction.NOT_REACHED), text
+        return self._found
+
+
+def _allowed(lever: float, gain: float, lasting: float) -> float:
+    """Way, m or rad, that may be missing."""
+    return REST * lever / max(gain, SETTLED / lasting)

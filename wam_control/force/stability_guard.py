@@ -1,0 +1,399 @@
+"""Which parameters of the force loop are stable on the arm: domain, margin, and what would be accepted.
+
+The linear part is the whole sampled loop of `wam_control.force.sampled_loop`, rotors, cables, velocity
+loop, hold and delay, in contact with every stiffness up to the largest.  Below its margin no set
+of parameters can diverge, whatever the friction (domain I).  Above it, friction may still stabilise
+the loop for small errors (domain II); the guard relies on that for an arm of one joint only, and
+never above the saturation found stable.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.force_axis import REACH, ForceAxes, ForceAxis, PressedForce, SensingParameters
+from wam_control.force.force_law import ForceLaw
+from wam_control.force.friction_trial import FrictionTrial
+from wam_control.force.friction_verdict import SOFTER, Domain, PredictedCycle, stiction_cycle
+from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
+from wam_description.arm import Arm, Servo, Timing
+from wam_description.parameters import lengths, parameter, tunable
+from wam_theory.linear_loop import series_stiffness
+from wam_theory.stick_slip import FrictionNode
+
+Array = NDArray[np.float64]
+ESTIMATE = "contact_estimate"
+LARGEST = 10.0  # scale of the gains up to which a margin is searched
+SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, LARGEST, 19).tolist())
+SLACK = 0.003  # the search for a margin ends within 0.2 %
+FORCES = (1.0, 40.0)  # N, of commands at which parameters are assessed: the sensed force depends on them
+
+
+@dataclass(frozen=True)
+class GuardParameters:
+    """Assumptions of the guard, and what it does about parameters that are not stable."""
+
+    mode: str = parameter(
+        "off: no guard; warn: reports what it finds; refuse: refuses parameters that are not stable; "
+        "limit: lowers the saturation to the stable error in domain II, refuses the rest",
+        choices=("off", "warn", "refuse", "limit"),
+        live=True,
+    )
+    contact_stiffness: float = tunable("stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0)
+    posture: tuple[float, ...] = tunable(
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0
+    )
+    stability_fraction: float = tunable(
+        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0
+    )
+    feedback_lag: float = tunable("time constant of the estimate with feedback contact_estimate", "s", high=10.0)
+    extra_delay: int = parameter(
+        "inner periods by which a command may be later than timing.outer_delay, as in real time",
+        low=0,
+        high=100,
+        live=True,
+    )
+    interval: float = tunable(
+        "shortest time between two assessments while pose, force direction or contact position change",
+        "s",
+        low=0.01,
+        high=3600.0,
+    )
+
+
+class GuardedTask(NamedTuple):
+    """What the force loop controls, and how.
+
+    Attributes
+    ----------
+    law : of the axes or the joints.
+    is_joints : whether the joints are controlled, else the force along a direction.
+    feedback : where the force comes from.
+    hold_gain : posture gain, 1/s.
+    filter_time : time constant of the low pass on the force, s.
+    delay_samples : delay of the command in outer periods.
+    """
+
+    law: ForceLaw
+    is_joints: bool
+    feedback: Feedback
+    hold_gain: float
+    filter_time: float
+    delay_samples: int
+
+
+class GuardedContact(NamedTuple):
+    """A contact, and the force commanded there.
+
+    Attributes
+    ----------
+    q : joint angles (n,), rad.
+    cover, position, position_sd : position along the cover and its standard deviation, m.
+    direction : of the force (3,), base frame.
+    force : commanded, N.
+    """
+
+    q: tuple[float, ...]
+    cover: str
+    position: float
+    position_sd: float
+    direction: tuple[float, float, float]
+    force: float
+
+    @property
+    def contacts(self) -> tuple["GuardedContact", ...]:
+        """Itself alone."""
+        return (self,)
+
+
+class GuardedForces(NamedTuple):
+    """Forces at several contacts at once, which the guard considers together: two that are stable alone may not be.
+
+    Attributes
+    ----------
+    contacts : all of them, in one posture.
+    sense, move, gain, proportional_gain, hold : as in `wam_control.force.sampled_loop.Axes`, of all axes of the task.
+    """
+
+    contacts: tuple[GuardedContact, ...]
+    sense: Array
+    move: Array
+    gain: Array
+    proportional_gain: Array
+    hold: Array
+
+    @property
+    def q(self) -> tuple[float, ...]:
+        """Joint angles (n,), rad."""
+        return self.contacts[0].q
+
+
+Guarded = GuardedContact | GuardedForces
+
+
+class GuardAssessment(NamedTuple):
+    """What the guard finds at some contacts.
+
+    Attributes
+    ----------
+    domain : of figure 5.8; below `stability_fraction` of the linear margin counts as I.
+    scale : factor of the gains at which the loop becomes linearly unstable, up to `LARGEST`.
+    stable_error : largest saturation accepted, N or N m; infinite in domain I, 0 where none is.
+    stiffness : k_tr k_c/(k_tr + k_c) at the contact or the joint, N/m or N m/rad.
+    cycle : stiction limit cycle by (5.8) and (5.9).
+    where : the worst contact: joint or direction of the force, position and posture.
+    reason : why the parameters are refused, '' if they are accepted.
+    """
+
+    domain: Domain
+    scale: float
+    stable_error: float
+    stiffness: float
+    cycle: PredictedCycle
+    where: str
+    reason: str
+
+
+class StabilityGuard:
+    """Assesses parameters of the force loop on one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    servo : gains of the velocity loop.
+    timing : periods of the loops, and the delay of the outer one.
+    parameters : of the guard.
+    sensing : how the force is sensed.
+
+    Raises
+    ------
+    ParameterError
+        where lists do not fit the arm.
+    """
+
+    def __init__(
+        self, arm: Arm, servo: Servo, timing: Timing, parameters: GuardParameters, sensing: SensingParameters
+    ) -> None:
+        lengths("guard", arm.joints.names, {"posture": parameters.posture})
+        lengths("servo", arm.motors.names, vars(servo))
+        self.parameters = parameters
+        self._arm, self._timing = arm, timing
+        self._loop = SampledLoop(arm, timing, servo)
+        self._sensing = sensing
+        self._force_axes = ForceAxes(arm, self._loop.body, sensing)
+
+    def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
+        """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
+        rotation = self._loop.body.cover_pose(q, cover).rotation
+        candidates = [
+            GuardedContact(tuple(q), cover, position, position_sd, _triple(rotation[:, axis]), force)
+            for axis in (1, 2)
+            for force in FORCES
+        ]
+        return [contact for each in candidates for contact in self.with_lever(each)]
+
+    def with_lever(self, contact: GuardedContact) -> list[GuardedContact]:
+        """The contact itself; nothing where its force has no lever on any joint."""
+        lever = self.axis(contact).lever
+        return [contact] if float(lever @ lever) > REACH * REACH else []
+
+    def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
+        """Those contacts whose force is known well enough to be controlled, pinned or not."""
+        most = [self._sensing.sd_limit(contact.force, is_pinned=False) for contact in contacts]
+        return [each for each, sd in zip(contacts, most, strict=True) if self.axis(each).force_sd <= sd]
+
+    def axis(self, contact: GuardedContact) -> ForceAxis:
+        """How the force loop senses the force of a contact, and moves along it."""
+        q, cover, position, position_sd, direction, force = contact
+        return self._force_axes.axis(q, PressedForce(cover, position, position_sd, np.array(direction), force))
+
+    def scales(
+        self, task: GuardedTask, contacts: Sequence[Guarded], tried: Sequence[float] = SCALES
+    ) -> Iterator[float]:
+        """Largest linearly stable scales of the gains, each for one contact or several, stiffness, delay and lag.
+
+        One at a time, so that the work can be distributed over periods; the smallest counts.
+
+        Parameters
+        ----------
+        task : what is controlled.
+        contacts : contacts to consider.
+        tried : scales to try, in rising order; the last one is returned where all are stable.
+        """
+        for each in contacts:
+            alone = [self._stiffness(contact) for contact in each.contacts]
+            together = [np.sum(alone, axis=0), *alone] if len(alone) > 1 else alone
+            for late, feedback in product(self._delays(task), _lags(task.feedback)):
+                axes = self._axes(task, each, late)
+                for part, stiffness in product(self._parts(task), together):
+                    yield self._loop.margin(each.q, axes, part * stiffness, feedback, tried)
+
+    def assess(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
+        """Assess a task at its worst contact.
+
+        Parameters
+        ----------
+        task : what is controlled.
+        contacts : contacts to consider; none counts as a task that controls nothing.
+        """
+        law = task.law
+        if not contacts or not any((*law.gain, *law.proportional_gain)):
+            return GuardAssessment(
+                Domain.I, LARGEST, math.inf, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
+            )
+        scale, contact = min((min(self.scales(task, [each])), each) for each in contacts)
+        nodes = {name: self.node(task, contact, i) for i, name in enumerate(law.names)}
+        cycles = {name: stiction_cycle(node, gain) for (name, node), gain in zip(nodes.items(), law.gain, strict=True)}
+        name = max(cycles, key=lambda axis: cycles[axis].peak_to_peak)
+        node = nodes[name]
+        ktr, kc = node.transmission_stiffness, node.contact_stiffness
+        what = name if task.is_joints else f"force along {_list(contact.direction)} in the base frame"
+        where = f"{what} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
+        domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
+        found = GuardAssessment(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
+        return found if domain is Domain.I else self._beyond(task, contact, found)
+
+    def node(self, task: GuardedTask, contact: GuardedContact, axis: int) -> FrictionNode:
+        """The arm as the one friction node of figure 5.4, along the direction or at a joint.
+
+        With the friction of the joints alone: the velocity loop encloses that of the rotors.
+        """
+        joints, loop = self._arm.joints, self._loop
+        stiffness = self.parameters.contact_stiffness
+        if task.is_joints:
+            reach = np.zeros(len(joints.names))
+            reach[axis] = 1.0
+            jacobian = loop.body.point_jacobian(contact.q, contact.cover, (contact.position, 0.0, 0.0))
+            stiffness *= float(np.sum(jacobian[:, axis] ** 2))
+        else:
+            reach = self.axis(contact).lever
+        square = float(reach @ reach)
+        inertia = loop.body.mass_matrix(contact.q) + loop.armature
+
+        def along(matrix: Array) -> float:
+            return 1.0 / float(reach @ np.linalg.solve(matrix, reach))
+
+        def friction(values: Sequence[float]) -> float:
+            return float(np.abs(reach) @ np.array(values)) / square
+
+        damping = np.array(joints.viscous_friction)
+        return FrictionNode(
+            inertia=along(inertia),
+            damping=along(np.diag(damping)) if damping.all() else 0.0,
+            transmission_stiffness=along(loop.joint_stiffness),
+            contact_stiffness=max(stiffness, 1e-9),
+            dynamic_friction=friction(joints.dynamic_friction),
+            static_friction=friction(joints.static_friction),
+        )
+
+    def _beyond(self, task: GuardedTask, contact: GuardedContact, found: GuardAssessment) -> GuardAssessment:
+        """The task above its linear margin: what would be accepted."""
+        share, law = self.parameters.stability_fraction, task.law
+        group = law.group
+        error, domain = 0.0, found.domain
+        if len(self._arm.joints.names) == 1:
+            error = self._stable_error(task, contact)
+            domain = Domain.II if error else Domain.III
+        found = found._replace(domain=domain, stable_error=error)
+        if max(law.error_limit) <= error:
+            return found
+        most = (1.0 - SLACK) * share * found.scale
+        allowed = f"{group}_gain up to {_list([rounded_down(most * gain) for gain in law.gain])}"
+        if error:
+            allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
+        reason = (
+            f"at most {share:g} of the largest linearly stable gain is accepted (guard.stability_fraction); "
+            f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
+            f"one ({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m): domain {domain}; "
+            f"allowed: {allowed}; lower one of them or guard.contact_stiffness"
+        )
+        if not found.scale:
+            reason = (
+                f"{group}_gain {_list(law.gain)} is not stable, nor is a hundredth of it "
+                f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, "
+                f"{group}_proportional_gain or guard.contact_stiffness"
+            )
+        return found._replace(reason=reason)
+
+    def _stable_error(self, task: GuardedTask, contact: GuardedContact) -> float:
+        """Largest saturation with which friction stabilises the loop of one joint, in every contact."""
+        law = task.law
+        node = self.node(task, contact, 0)
+        least = math.inf
+        for late in {0, self.parameters.extra_delay}:
+            axes = self._axes(task, contact, late)
+            for part in self._parts(task):
+                softer = replace(node, contact_stiffness=part * node.contact_stiffness)
+                cycle = stiction_cycle(softer, max(law.gain)).peak_to_peak
+                stiffness = part * self._stiffness(contact)
+                trial = FrictionTrial(self._loop, contact.q, axes, stiffness, task.feedback, softer, max(law.deadband))
+                least = min(least, trial.stable_error(cycle))
+        return least
+
+    def _delays(self, task: GuardedTask) -> list[int]:
+        """Inner periods by which a command may be later; the mean over a cycle of a dither is half a cycle old."""
+        extra = self.parameters.extra_delay
+        mean = self._timing.dither_cycle // 2 if task.feedback.kind == ESTIMATE else 0
+        return sorted({0, extra, extra + mean})
+
+    def _parts(self, task: GuardedTask) -> tuple[float, ...]:
+        """Fractions of the stiffness to consider; a known spring has its own alone."""
+        return SOFTER[:1] if task.feedback.kind == "joint_position" else SOFTER
+
+    def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
+        timing = self._timing
+        n = len(self._arm.joints.names)
+        delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
+        if isinstance(contact, GuardedForces):
+            return Axes(*contact[1:], task.filter_time, delay)
+        law = task.law
+        if task.is_joints:
+            gains = np.array(law.gain), np.array(law.proportional_gain)
+            return Axes(np.eye(n), np.eye(n), *gains, np.zeros((n, n)), 0.0, delay)
+        axis = self.axis(contact)
+        lever = axis.lever
+        hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
+        gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])
+        return Axes(axis.sense[None], axis.move[:, None], *gains, hold, task.filter_time, delay)
+
+    def _stiffness(self, contact: GuardedContact) -> Array:
+        lever = self.axis(contact).lever
+        return self.parameters.contact_stiffness * np.outer(lever, lever)
+
+
+def _lags(feedback: Feedback) -> list[Feedback]:
+    """The feedback with and without its lag: a lag can also stabilise a loop, which is not relied on."""
+    return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
+
+
+def rounded_down(value: float) -> float:
+    """To three digits, never up: a value that is named as allowed has to be accepted."""
+    if not value:
+        return 0.0
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / digit) * digit
+
+
+def rounded_up(value: float) -> float:
+    """To three digits, never down: as `rounded_down`, for what is named as the least allowed."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value else 1.0
+    return math.ceil(value / digit) * digit
+
+
+def posture_of(contact: GuardedContact) -> str:
+    """The posture of a contact in words."""
+    return f"posture {_list(contact.q)} rad"
+
+
+def _list(values: Sequence[float]) -> str:
+    return "[" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.3g}" for value in values) + "]"
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,729 @@
+"""A scenario: the steps of a task as data, played at the outer rate."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import yaml
+
+from wam_control.force.contact_position import torque_of_position
+from wam_control.force.posture_watch import BEHIND, CAUGHT_UP
+from wam_control.force.task import AxisKind, TaskCommand
+from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
+from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
+from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list, require_made
+from wam_control.task.task_text import as_of_file, require_task, task_of_text, torque_task
+from wam_description import yaml_text
+from wam_description.arm import Arm, Shared
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, parameter, require
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE, Contact, ForceCommand, PathPoint, PosturePath, Triple
+
+STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
+    "name": "text; needed",
+    "seconds": "s of the arm's time, at most where the step waits for a contact; needed",
+    "posture": "rad, an angle for each joint, at which the command is at the end of the step; the arm is behind it by "
+    "0.01 rad after 2 s with the packaged `posture_gain`, by more after a quicker step or with a lower gain: give the "
+    "step after it some time",
+    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad through which the arm goes; `times`, s, may be "
+    "left out",
+    "tip": "`[x, y, z]`, m in the base frame, to which the tool goes along a straight line",
+    "force": "`{frame, newtons: [x, y, z], contact_position}`: N on the world in `base` or in the frame of a link; "
+    "`contact_position`, m along the link, may be left out and pins it",
+    "task": "`{frame, axes: [...]}`, see [task frame](task-frame.md)",
+    "torque": "N m, a torque for each joint",
+    "until_force": "N; the step ends when a contact of this force is detected, and the scenario fails where none is",
+    "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
+    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
+    " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. It lasts for "
+    "one outer period at least. A push of several steps is given in each",
+    "request": "`enable` or `disable` at the start of the step; the scenario fails where a step commands an arm that "
+    "nobody has enabled",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
+}
+MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
+FORCES = ("force", "task", "torque")
+REQUESTS = ("", "enable", "disable")
+ZERO: Final[Triple] = (0.0, 0.0, 0.0)
+NO_FORCE = ForceCommand("base", ZERO)
+ROUNDING = 1e-9  # s, of a sum of periods
+SLOWEST_CHIRP, FASTEST_CHIRP = 1e-6, 1e6  # Hz; their ratio is a number, too
+FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
+Motion = GoalMotion | PostureMotion | LineMotion
+
+
+@dataclass(frozen=True)
+class ScenarioParameters:
+    """The task to play."""
+
+    script: str = parameter(
+        "YAML file with the steps; a name without a path is looked up in the folder of the configurations"
+    )
+
+
+class Push(NamedTuple):
+    """A push on a cover; times count from the start of the step.
+
+    It acts on the tube's axis, which may be off the x axis of the cover's frame.
+    """
+
+    cover: str
+    position: float  # m along the cover
+    force: tuple[float, float, float]  # N, in the cover's frame
+    begin: float  # s
+    end: float  # s
+    aside: tuple[float, float] | None = None  # m, y and z where it acts, within the tube; on its axis by default
+
+    @property
+    def torque(self) -> Triple:
+        """About the origin of the cover, N m."""
+        x, y, z = self.position, *(self.aside or (0.0, 0.0))
+        fx, fy, fz = self.force
+        return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+
+    def acts(self, elapsed: float, dt: float) -> bool:
+        """Whether it acts in the outer period that begins now; one within a single period acts for all of that.
+
+        Parameters
+        ----------
+        elapsed : s from the start of the step.
+        dt : outer period, s.
+        """
+        is_within = elapsed <= self.begin and self.end <= elapsed + dt + ROUNDING
+        return is_within or self.begin <= elapsed + ROUNDING < self.end
+
+
+class Chirp(NamedTuple):
+    """A sine added to a step's force; its frequency grows exponentially."""
+
+    newtons: float  # amplitude
+    start: float  # Hz
+    end: float  # Hz
+
+
+class ScenarioStep(NamedTuple):
+    """One step of a scenario."""
+
+    name: str
+    seconds: float
+    posture: tuple[float, ...] = ()  # rad; empty keeps the last one
+    until_force: float = 0.0  # N; above zero the step ends when a contact of this force is detected
+    force: ForceCommand = NO_FORCE
+    push: Push | None = None
+    request: str = ""  # to the driver, when the step begins
+    chirp: Chirp | None = None  # along the force
+    settings: tuple[Setting, ...] = ()  # applied when the step begins
+    task: TaskCommand | None = None  # in place of a force
+    trajectory: PosturePath | None = None  # in place of a posture
+    tip: Triple | None = None  # m, base frame, to which the tool goes along a straight line, in place of a posture
+
+    @property
+    def moves(self) -> bool:
+        """Whether the posture of the arm is commanded."""
+        return bool(self.posture) or self.trajectory is not None or self.tip is not None
+
+    @property
+    def presses(self) -> bool:
+        """Whether a force or a task is commanded, which moves the arm away from the posture."""
+        return self.force != NO_FORCE or self.task is not None
+
+    @property
+    def commands_arm(self) -> bool:
+        """Whether a motion, a force or a task is commanded."""
+        return self.moves or self.presses
+
+
+class ScenarioOutput(NamedTuple):
+    """Commands of the scenario in one outer period."""
+
+    posture: list[float]
+    force: ForceCommand
+    push_cover: str
+    push_force: tuple[float, float, float]
+    push_torque: tuple[float, float, float]
+    request: str
+    settings: tuple[Setting, ...]
+    step: str
+    begins: bool  # the step, in this period
+    done: bool
+    failure: str
+    commands_arm: bool  # in this step
+    task: TaskCommand | None = None
+    rate: tuple[float, ...] = ()  # rad/s, of a posture that moves; empty where it is not known
+
+
+class Scenario:
+    """Plays steps one after the other.
+
+    Postures are reached along minimum-jerk paths.  If a step waits for a contact and none is
+    detected, the scenario fails: it requests the brakes and ends.
+
+    Parameters
+    ----------
+    steps : at least one.
+    shared : of the arm, for motions that have limits; the values of the steps are checked against it as those of a
+        file are.
+    controllers : node classes by name that take the place of those in `shared.nodes`, for what the steps set.
+
+    Attributes
+    ----------
+    steps : as they are played.
+
+    Raises
+    ------
+    ParameterError
+        names the step and the value that is not allowed.
+    """
+
+    def __init__(
+        self, steps: Sequence[ScenarioStep], shared: Shared | None = None, controllers: Mapping[str, Any] = NONE
+    ) -> None:
+        require(isinstance(steps, Sequence), f"steps is {steps!r}; it must be a list of ScenarioStep")
+        require(len(steps) > 0, "the scenario has no steps")
+        for i, step in enumerate(steps):
+            require(isinstance(step, ScenarioStep), f"step {i + 1} is {step!r}; give a ScenarioStep")
+        if shared is not None:
+            steps = [_checked(f"step {i + 1}", step, shared, controllers) for i, step in enumerate(steps)]
+        self.steps, self._shared = list(steps), shared
+        self._motion: Motion | None = None
+        self._rate: tuple[float, ...] = ()
+        self._index = -1
+        self._elapsed = 0.0
+        self._posture: list[float] = []
+        self.failure = ""
+        self.done = False
+
+    def step(self, q: Sequence[float], contact: Contact, dt: float) -> ScenarioOutput:
+        """One outer period.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        contact : estimated contact.
+        dt : outer period, s.
+        """
+        begins = self._index < 0
+        if begins:
+            self._posture = list(q)
+            self._begin(0, q)
+        else:
+            self._elapsed += dt
+            begins = self._advance(q, contact)
+        step = self.steps[self._index]
+        self._rate = ()
+        if self._motion is not None and not self.done:
+            self._posture, rate = self._motion.at(self._elapsed)
+            self._rate = tuple(rate)
+        push = step.push
+        pushing = push is not None and push.acts(self._elapsed, dt) and not self.done
+        request = "disable" if self.failure else step.request
+        return ScenarioOutput(
+            posture=list(self._posture),
+            force=NO_FORCE if self.done else self._force(step),
+            push_cover=push.cover if push else "",
+            push_force=push.force if push and pushing else ZERO,
+            push_torque=push.torque if push and pushing else ZERO,
+            request=request if begins else "",
+            settings=step.settings if begins and not self.done else (),
+            step=step.name,
+            begins=begins and not self.done,
+            done=self.done,
+            failure=self.failure,
+            commands_arm=step.commands_arm,
+            task=None if self.done else step.task,
+            rate=self._rate,
+        )
+
+    def _begin(self, index: int, q: Sequence[float]) -> None:
+        """Begin a step; where its motion is not possible, the scenario fails before it moves."""
+        before = self.steps[self._index] if self._index >= 0 else None
+        self._index, self._elapsed = index, 0.0
+        step = self.steps[index]
+        if before is not None and before.presses and (step.moves or not step.presses):
+            self._posture = list(q)
+        try:
+            self._motion = motion_of(step, self._posture, self._shared)
+        except ParameterError as error:
+            self._motion, self.done, self.failure = None, True, str(error)
+
+    def _advance(self, q: Sequence[float], contact: Contact) -> bool:
+        """Go on to the next step if this one is over; whether a request may be due."""
+        step = self.steps[self._index]
+        if self.done:
+            return False
+        detected = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
+        if not detected and self._elapsed < step.seconds - ROUNDING:
+            return False
+        if step.until_force > 0.0 and not detected:
+            self.failure = (
+                f"step '{step.name}': no contact of {step.until_force:g} N detected within {step.seconds:g} s"
+            )
+            self.done = True
+            return True
+        if self._motion is not None and not detected:
+            self._posture = self._motion.at(step.seconds).position
+        if self._index + 1 == len(self.steps):
+            self.done = True
+            return False
+        self._begin(self._index + 1, q)
+        return True
+
+    def _force(self, step: ScenarioStep) -> ForceCommand:
+        if step.chirp is None:
+            return step.force
+        share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
+        x, y, z = (newtons * (1.0 + share) for newtons in step.force.force)
+        tx, ty, tz = (torque * (1.0 + share) for torque in step.force.torque)
+        return ForceCommand(step.force.frame, (x, y, z), (tx, ty, tz))
+
+
+def motion_of(
+    step: ScenarioStep, start: Sequence[float], shared: Shared | None, followed: float = math.inf
+) -> Motion | None:
+    """The motion of a step from joint angles (n,), rad; None where it has none.
+
+    Parameters
+    ----------
+    shared : of the arm; None where its limits are not known.
+    followed : largest joint speed of the force loop, rad/s, as far as it is known.
+
+    Raises
+    ------
+    ParameterError
+        where it leaves the limits, or does not end in the time of the step.
+    """
+    try:
+        motion = _planned(step, start, shared)
+        if motion is not None and shared is not None:
+            require(
+                motion.duration <= step.seconds + ROUNDING,
+                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
+            )
+            _require_speed(step, motion, start, shared, followed)
+    except ParameterError as error:
+        raise ParameterError(f"step '{step.name}': {error}") from None
+    return motion
+
+
+def _planned(step: ScenarioStep, start: Sequence[float], shared: Shared | None) -> Motion | None:
+    if step.posture:
+        return GoalMotion(start, step.posture, step.seconds)
+    if not step.moves:
+        return None
+    if shared is None:
+        raise ParameterError("a motion has limits; give them to the scenario: Scenario(steps, shared)")
+    if step.trajectory is not None:
+        return PostureMotion(start, step.trajectory, shared.arm, shared.motion)
+    assert step.tip is not None
+    return LineMotion(start, step.tip, shared.arm, RigidBody(shared.arm), shared.motion)
+
+
+def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], shared: Shared, followed: float) -> None:
+    """Refuse a motion at which the driver would stop the arm, or with which the force loop would not keep up."""
+    joints, allowed = shared.arm.joints, CAUGHT_UP if step.posture else 1.0
+    loop = allowed * followed, (f"{allowed:g} times " if allowed > 1.0 else "") + f"{FORCE_LOOP}:{FOLLOWED}"
+    found = []
+    for k, (speed, fault) in enumerate(zip(motion.fastest, joints.speed_limit, strict=True)):
+        most, limit = min((fault, "arm.joints.speed_limit"), loop)
+        found.append((speed / most if most else math.copysign(math.inf, speed) if speed else 0.0, k, most, limit))
+    excess, k, most, limit = max(found)
+    if excess <= 1.0 + ROUNDING:
+        return
+    what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
+    if step.posture:
+        what = f"goes from {round(start[k], 6) + 0.0:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
+        least = FASTEST * abs(step.posture[k] - start[k]) / most if most else 0.0
+        advice = f"give the step at least {math.ceil(1e3 * (least - ROUNDING)) / 1e3:g} s"
+        if followed == math.inf:
+            advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
+    elif step.trajectory is not None and any(point.time for point in step.trajectory.points):
+        advice = f"give it {excess:.3g} times the time, or no times and {advice}"
+    raise ParameterError(
+        f"{joints.names[k]} {what} at up to {motion.fastest[k]:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
+        + (advice if most else "raise it")
+    )
+
+
+def _require_motions(
+    where: str, steps: Sequence[ScenarioStep], shared: Shared, start: Sequence[float], followed: float
+) -> None:
+    """Refuse motions that are not possible, as far as it is known from where, (n,) rad, and how fast they go.
+
+    A force, a task or a detected contact leaves the arm wherever it is.
+    """
+    for step in steps:
+        for setting in step.settings:
+            if (setting.node, setting.name) == (FORCE_LOOP, FOLLOWED):
+                assert isinstance(setting.value, (int, float))
+                followed = setting.value
+        try:
+            motion = motion_of(step, start, shared, followed) if start else None
+        except ParameterError as error:
+            raise ParameterError(f"{where}, {error}") from None
+        before = start
+        if motion is not None:
+            start = motion.at(step.seconds).position
+        elif step.moves:
+            start = step.posture or (step.trajectory.points[-1].position if step.trajectory else ())
+        if step.moves and step.task is not None and start:
+            _require_free(f"{where}, step '{step.name}'", step.task, before, start, shared.arm.joints.names)
+        if step.until_force or step.presses:
+            start = ()
+
+
+def _require_free(
+    where: str, task: TaskCommand, start: Sequence[float], goal: Sequence[float], names: Sequence[str]
+) -> None:
+    """Refuse a posture (n,), rad, that moves joints which a task takes, as far as it is known from where, rad."""
+    for axis in task.axes:
+        if axis.joint < 0:
+            continue
+        taken = axis.value if axis.kind is AxisKind.POSITION else None
+        if taken is None and start:
+            taken = start[axis.joint]
+        require(
+            taken is None or abs(goal[axis.joint] - taken) <= BEHIND,
+            f"{where}: the posture moves {names[axis.joint]} to {goal[axis.joint]:.4g} rad, and has no effect on it "
+            f"next to the axis '{axis.name}' of the task; leave one of them out",
+        )
+
+
+def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
+    """Force of a chirp of `seconds`, N, at the time `elapsed`, s."""
+    growth = math.log(chirp.end / chirp.start)
+    turns = chirp.start * seconds / growth * math.expm1(growth * elapsed / seconds)
+    return chirp.newtons * math.sin(2.0 * math.pi * turns)
+
+
+def script_file(script: str) -> Path:
+    """The file of a scenario: a path that ends in '.yaml' or '.yml', or the name of one that comes with the package."""
+    return Path(script) if script.endswith((".yaml", ".yml")) else packaged(script, "scenario")
+
+
+def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
+    """Read the steps of a scenario, for an arm that may be anywhere, with any parameters of the nodes.
+
+    Parameters
+    ----------
+    path : of a YAML file; not its text.
+    shared : of the arm whose joints and links the steps may name, and how it may be pushed.
+
+    Raises
+    ------
+    ParameterError
+        names the file, the step and the value that is not allowed.
+    """
+    steps = _read(path, shared)
+    _require_motions(str(path), steps, shared, (), math.inf)
+    return steps
+
+
+def _read(path: str | Path, shared: Shared) -> list[ScenarioStep]:
+    if "\n" in str(path):
+        raise ParameterError("the scenario is given as a text of several lines; write it to a file and give its path")
+    path = Path(path)
+    if not path.is_file():
+        raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
+    try:
+        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ParameterError(f"scenario {path} is not YAML: {error}") from error
+    if isinstance(tree, dict):
+        known(f"scenario {path}", tree, ("steps",), ("steps",))
+    if not isinstance(tree, dict) or not isinstance(tree["steps"], list):
+        raise ParameterError(f"scenario {path} has no list 'steps'")
+    require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
+    return [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
+
+
+def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
+    """Read the steps of a scenario as a configuration plays it: what they set and how they move fits its values.
+
+    Parameters
+    ----------
+    configuration : of all nodes.
+    script : as in `ScenarioParameters`.
+    """
+    path = script_file(script)
+    steps = _read(path, configuration.shared)
+    require_playable(str(path), steps, configuration)
+    return steps
+
+
+def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: Configuration) -> None:
+    """Refuse steps whose settings, forces or motions do not fit a configuration; its simulated arm begins at its start.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the value and what is allowed.
+    """
+    require_settings(where, [step.settings for step in steps], configuration)
+    shared = configuration.shared
+    start = shared.arm.joints.start if "driver" in shared.nodes else ()
+    loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in shared.nodes else {}
+    _require_forces(where, steps, float(loop.get(LARGEST_FORCE, math.inf)))
+    _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))
+
+
+def _require_forces(where: str, steps: Sequence[ScenarioStep], limit: float) -> None:
+    """Refuse forces that the force loop would refuse in each pose; `limit` is its largest force, N, at the start."""
+    for step in steps:
+        for setting in step.settings:
+            if (setting.node, setting.name) == (FORCE_LOOP, LARGEST_FORCE):
+                assert isinstance(setting.value, (int, float))
+                limit = setting.value
+        largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
+        require(
+            largest <= limit,
+            f"{where}, step '{step.name}': {largest:.4g} N is commanded; allowed: up to {LARGEST_FORCE}, {limit:g} N; "
+            f"command less, or raise {FORCE_LOOP}:{LARGEST_FORCE}",
+        )
+
+
+def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
+    arm = shared.arm
+    if not isinstance(body, dict):
+        raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
+    known(where, body, tuple(STEP_KEYS), ("name", "seconds"))
+    seconds = number(where, "seconds", body["seconds"])
+    force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
+    for keys in (FORCES, MOTIONS):
+        _require_one(where, [key for key in keys if key in body])
+    step = ScenarioStep(
+        name=body["name"],
+        seconds=seconds,
+        posture=numbers(where, "posture", body["posture"], len(arm.joints.names)) if "posture" in body else (),
+        until_force=number(where, "until_force", body.get("until_force", 0.0)),
+        force=force,
+        push=_push(where, body["push"], arm, seconds) if "push" in body else None,
+        request=body.get("request", ""),
+        chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
+        settings=tuple(settings_of(where, body["set"], shared)) if "set" in body else (),
+        task=_task(where, body, arm),
+        trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
+        tip=_tip(where, body["tip"]) if "tip" in body else None,
+    )
+    _require_step(where, step, shared)
+    return step
+
+
+def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any]) -> ScenarioStep:
+    """A step made in Python, with tuples and floats as those of a file have them; compiled code takes no others."""
+    _require_step(where, step, shared)
+    return step._replace(
+        seconds=float(step.seconds),
+        posture=floats(step.posture),
+        until_force=float(step.until_force),
+        force=ForceCommand(step.force.frame, *map(floats, step.force[1:])),
+        push=step.push and _on_axis(_push_of_floats(step.push), shared.arm),
+        chirp=step.chirp and Chirp(*floats(step.chirp)),
+        settings=checked_settings(where, step.settings, shared, controllers),
+        task=step.task and as_of_file(step.task),
+        trajectory=step.trajectory and PosturePath(tuple(map(_point_of_floats, step.trajectory.points))),
+        tip=step.tip and floats(step.tip),
+    )
+
+
+def _push_of_floats(push: Push) -> Push:
+    begin, end = float(push.begin), float(push.end)
+    return Push(push.cover, float(push.position), floats(push.force), begin, end, push.aside and floats(push.aside))
+
+
+def _point_of_floats(point: PathPoint) -> PathPoint:
+    return PathPoint(floats(point.position), floats(point.velocity), float(point.time))
+
+
+def _require_one(where: str, keys: Sequence[str]) -> None:
+    require(len(keys) <= 1, f"{where}: {' and '.join(keys)} are given; give one of them")
+
+
+def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
+    """Refuse a step whose values cannot be, whether it is from a file or made in Python."""
+    arm = shared.arm
+    _require_parts(where, step)
+    require(
+        isinstance(step.name, str) and step.name != "", f"{where}: name is {step.name!r}; it must be a text (quote it)"
+    )
+    require(is_one_of(step.request, REQUESTS), f"{where}: request is {step.request!r}; allowed: enable, disable")
+    seconds = number(where, "seconds", step.seconds)
+    require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
+    until = number(where, "until_force", step.until_force)
+    require(until >= 0.0, f"{where}: until_force is {until:g}; it must be 0 (no contact expected) or above")
+    _frame(where, step.force.frame, arm)
+    for key, values in (("newtons", step.force.force), ("torque", step.force.torque)):
+        numbers(where, key, values, 3)
+    if step.chirp is not None:
+        _require_chirp(where, step.chirp)
+        require(any(step.force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+    require_list(where, "posture", step.posture, "joint angles")
+    if step.tip is not None:
+        _tip(where, step.tip)
+    moves = [key for key, given in zip(MOTIONS, (step.posture, step.trajectory, step.tip), strict=True) if given]
+    forces = ["force"] * (step.force != NO_FORCE)
+    if step.task is not None:
+        require_task(where, step.task, arm)
+        are_torques = all(axis.kind is AxisKind.FORCE and axis.joint >= 0 for axis in step.task.axes)
+        forces.append("torque" if are_torques else "task")
+    _require_one(where, moves)
+    _require_one(where, forces)
+    require(
+        not moves or step.task is None or len(step.task.axes) < len(arm.joints.names),
+        f"{where}: {' and '.join((*moves, *forces))} are given; the {' '.join(forces)} leaves no joint free to move; "
+        "give one of them, or a task with fewer axes",
+    )
+    if step.posture:
+        _require_posture(where, step.posture, arm)
+    if step.trajectory is not None:
+        _require_trajectory(where, step.trajectory, arm)
+    if step.push is not None:
+        _require_push(where, step.push, shared, seconds)
+
+
+def _require_parts(where: str, step: ScenarioStep) -> None:
+    """Refuse a part of a step that is of another class."""
+    require_made(where, "force", step.force, ForceCommand)
+    for key, part, kind in (
+        ("push", step.push, Push),
+        ("chirp", step.chirp, Chirp),
+        ("trajectory", step.trajectory, PosturePath),
+    ):
+        if part is not None:
+            require_made(where, key, part, kind)
+
+
+def _require_trajectory(where: str, trajectory: PosturePath, arm: Arm) -> None:
+    require_list(where, "points of the trajectory", trajectory.points, "PathPoint")
+    require(len(trajectory.points) > 0, f"{where}: the trajectory has no points; give at least one")
+    for i, point in enumerate(trajectory.points):
+        require_made(where, f"point {i + 1} of the trajectory", point, PathPoint)
+        _require_posture(where, point.position, arm)
+        require_list(where, "velocity", point.velocity, "joint speeds")
+        if point.velocity:
+            numbers(where, "velocity", point.velocity, len(arm.joints.names))
+        number(where, "times", point.time)
+
+
+def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
+    known(f"{where}, trajectory", body, ("postures", "times"), ("postures",))
+    postures = body["postures"]
+    require(isinstance(postures, list) and len(postures) > 0, f"{where}: postures is {postures!r}; give a list of them")
+    times = numbers(where, "times", body["times"], len(postures)) if "times" in body else (0.0,) * len(postures)
+    points = zip(postures, times, strict=True)
+    count = len(arm.joints.names)
+    return PosturePath(tuple(PathPoint(numbers(where, "posture", one, count), (), time) for one, time in points))
+
+
+def _tip(where: str, body: Any) -> Triple:
+    x, y, z = numbers(where, "tip", body, 3)
+    return x, y, z
+
+
+def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
+    if "torque" in body:
+        return torque_task(where, body["torque"], arm)
+    return task_of_text(where, body["task"], arm) if "task" in body else None
+
+
+def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
+    joints = arm.joints
+    posture = numbers(where, "posture", given, len(joints.names))
+    for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
+        require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
+
+
+def _frame(where: str, frame: Any, arm: Arm) -> str:
+    frames = (BASE, *arm.covers.names)
+    require(is_one_of(frame, frames), f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
+    return str(frame)
+
+
+def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
+    known(where + ", force", body, ("frame", "newtons", "contact_position"), ("frame", "newtons"))
+    frame = _frame(where, body["frame"], arm)
+    x, y, z = numbers(where, "newtons", body["newtons"], 3)
+    if "contact_position" not in body:
+        return ForceCommand(frame, (x, y, z))
+    place = number(where, "contact_position", body["contact_position"])
+    require(
+        frame != BASE and any((y, z)),
+        f"{where}: contact_position is given; it needs the frame of a link and a force across it",
+    )
+    length = arm.covers.length_of(frame)
+    require(
+        0.0 < place <= length,
+        f"{where}: contact_position is {place:g} m; allowed: above 0, up to {length:g} m of {frame}",
+    )
+    return ForceCommand(frame, (x, y, z), torque_of_position((x, y, z), place))
+
+
+def _chirp(where: str, body: Any) -> Chirp:
+    keys = ("newtons", "from", "to")
+    known(where + ", chirp", body, keys, keys)
+    return Chirp(*(number(where + ", chirp", key, body[key]) for key in keys))
+
+
+def _require_chirp(where: str, chirp: Chirp) -> None:
+    keys = ("newtons", "from", "to")
+    _, start, end = (number(where + ", chirp", key, value) for key, value in zip(keys, chirp, strict=True))
+    require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
+    require(
+        start >= SLOWEST_CHIRP and end <= FASTEST_CHIRP,
+        f"{where}: chirp goes from {start:g} to {end:g} Hz; allowed: {SLOWEST_CHIRP:g} to {FASTEST_CHIRP:g} Hz",
+    )
+
+
+def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
+    needed = ("cover", "contact_position", "newtons")
+    known(where + ", push", body, (*needed, "begin", "end"), needed)
+    x, y, z = numbers(where, "newtons", body["newtons"], 3)
+    place = number(where, "contact_position", body["contact_position"])
+    begin, end = number(where, "begin", body.get("begin", 0.0)), number(where, "end", body.get("end", seconds))
+    push = Push(body["cover"], place, (x, y, z), begin, end)
+    _require_place(where, push, arm)
+    return _on_axis(push, arm)
+
+
+def _on_axis(push: Push, arm: Arm) -> Push:
+    """The push with where the tube's axis is, unless it has that."""
+    return push if push.aside else push._replace(aside=arm.covers.aside(push.cover, push.position))
+
+
+def _require_place(where: str, push: Push, arm: Arm) -> None:
+    covers = arm.covers.names
+    require(is_one_of(push.cover, covers), f"{where}: cover is {push.cover!r}; allowed: {', '.join(covers)}")
+    place, length = number(where, "contact_position", push.position), arm.covers.length_of(push.cover)
+    require(
+        0.0 <= place <= length,
+        f"{where}: contact_position is {place:g} m; {push.cover} reaches from 0 to {length:g} m",
+    )
+
+
+def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
+    _require_place(where, push, shared.arm)
+    numbers(where, "newtons", push.force, 3)
+    if push.aside is not None:
+        _require_within_tube(where, push, shared.arm)
+    begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
+    require(
+        0.0 <= begin < end <= seconds + ROUNDING,
+        f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
+        f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
+    )
+    excess = shared.push_excess(push.force, push.torque)
+    require(not excess, f"{where}: push: {excess}")
+
+
+def _require_within_tube(where: str, push: Push, arm: Arm) -> None:
+    """Refuse a push outside the tube, where nothing can touch it."""
+    y, z = numbers(where, "aside", push.aside, 2)
+    at_y, at_z = arm.covers.aside(push.cover, push.position)
+    radius = arm.covers.radius_of(push.cover)
+    require(
+        math.hypot(y - at_y, z - at_z) <= radius + ROUNDING,
+        f"{where}: aside is ({y:g}, {z:g}) m; allowed: up to the radius of {push.cover}, {radius:g} m, from its axis, "
+        f"({at_y:.4g}, {at_z:.4g}) m; leave it out for the axis",
+    )

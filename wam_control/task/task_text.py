@@ -1,0 +1,185 @@
+"""A task as a scenario writes it, in YAML.
+
+One task as an example::
+
+    task:
+      frame: base                      # or a cover, or {of: base, rpy: [0, 0, 0.3]}: axes of a frame of your own
+      axes:                            # in the order of their priority
+        - {force: 10.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}   # or estimated
+        - {velocity: 0.04, along: [0, 1, 0], cover: outer_link, contact_position: 0.28}
+        - {position: here, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}
+        - {impedance: here, stiffness: 400, damping: 100, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}
+        - {free: 100, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}   # led by hand, with this damping
+        - {position: 0.3, joint: joint3}
+        - {line: outer_link, point: [0.4, 0, -0.2], along: [0, 1, 0], hold: [start_up, end_up]}
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import pinocchio as pin
+
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
+from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError, require
+from wam_description.signals import BASE, Triple
+
+PARTS: Final = ("start_side", "start_up", "end_side", "end_up")  # of a line: where, and which way across it
+HERE: Final = "here"
+ESTIMATED: Final = "estimated"
+KINDS: Final = (*(kind.name.lower() for kind in AxisKind), "free")
+
+
+def torque_task(where: str, body: Any, arm: Arm) -> TaskCommand:
+    """A torque of each joint, N m."""
+    return TaskCommand(BASE, joint_axes(AxisKind.FORCE, numbers(where, "torque", body, len(arm.joints.names))))
+
+
+def task_of_text(where: str, body: Any, arm: Arm) -> TaskCommand:
+    """The task of a step.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the axis and the value that is not allowed.
+    """
+    known(f"{where}, task", body, ("frame", "axes"), ("axes",))
+    frame, rotation = _frame(where, body.get("frame", BASE), arm)
+    axes = body["axes"]
+    require(isinstance(axes, list) and len(axes) > 0, f"{where}: axes of the task is {axes!r}; give a list of them")
+    found: list[TaskAxis] = []
+    for i, one in enumerate(axes):
+        place = f"{where}, axis {i + 1}"
+        require(isinstance(one, Mapping), f"{place} is {one!r}; it must be a mapping")
+        found += _line(place, one, frame, arm) if "line" in one else [_axis(place, one, rotation, arm)]
+    return checked_task(TaskCommand(frame, tuple(found)), where)
+
+
+def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
+    """Refuse a task that was made in Python for what one of a file is refused.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the axis and the value that is not allowed.
+    """
+    require(isinstance(task, TaskCommand), f"{where}: task is {task!r}; give a TaskCommand")
+    require_list(where, "axes of the task", task.axes, "TaskAxis")
+    require(is_one_of(task.frame, (BASE, *arm.covers.names)), _no_frame(where, task.frame, arm))
+    require(len(task.axes) > 0, f"{where}: the task has no axes; give at least one, or no task")
+    for i, axis in enumerate(task.axes):
+        _require_axis(f"{where}, axis {i + 1}", axis, arm)
+    checked_task(task, where)
+
+
+def as_of_file(task: TaskCommand) -> TaskCommand:
+    """A task that was made in Python with tuples and floats as one of a file has them."""
+    return task._replace(axes=tuple(_as_of_file(axis) for axis in task.axes))
+
+
+def _as_of_file(axis: TaskAxis) -> TaskAxis:
+    position, value = (None if one is None else float(one) for one in (axis.position, axis.value))
+    rate, stiffness, damping = floats((axis.rate, axis.stiffness, axis.damping))
+    motion = {"value": value, "rate": rate, "stiffness": stiffness, "damping": damping}
+    return axis._replace(position=position, direction=floats(axis.direction), **motion)
+
+
+def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
+    """Refuse what no axis of a file can have, then what is not allowed."""
+    require(isinstance(axis, TaskAxis), f"{where} is {axis!r}; give a TaskAxis")
+    require(isinstance(axis.kind, AxisKind), f"{where}: kind is {axis.kind!r}; give an AxisKind")
+    for key in ("rate", "stiffness", "damping"):
+        number(where, key, getattr(axis, key))
+    if axis.value is not None:
+        number(where, "value", axis.value)
+    joints = arm.joints.names
+    is_whole = isinstance(axis.joint, int) and not isinstance(axis.joint, bool)
+    require(
+        is_whole and axis.joint in range(-1, len(joints)),
+        f"{where}: joint is {axis.joint!r}; allowed: -1 to {len(joints) - 1}, a whole number",
+    )
+    if axis.joint >= 0:
+        place, direction = number(where, "position", axis.position), numbers(where, "direction", axis.direction, 3)
+        require(
+            axis.cover == "" and not place and not any(direction),
+            f"{where}: joint is {axis.joint}, cover {axis.cover!r}, position {place:g}, direction {direction}; give a "
+            "joint alone, or a link with position and direction",
+        )
+    else:
+        _cover(where, axis.cover, arm)
+        if axis.position is not None:
+            number(where, "contact_position", axis.position)
+        _direction(where, axis.direction)
+    checked(where, axis, arm)
+
+
+def _no_frame(where: str, given: Any, arm: Arm) -> str:
+    return f"{where}: frame is {given!r}; allowed: {', '.join((BASE, *arm.covers.names))}"
+
+
+def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
+    """Frame of the table, and the rotation into it from the frame in which the axes are written."""
+    angles: tuple[float, ...] = (0.0, 0.0, 0.0)
+    if isinstance(given, Mapping):
+        known(f"{where}, frame", given, ("of", "rpy"), ("of", "rpy"))
+        angles = numbers(where, "rpy", given["rpy"], 3)
+        given = given["of"]
+    require(given in (BASE, *arm.covers.names), f"{_no_frame(where, given, arm)}, or of one of them with rpy")
+    return given, pin.rpy.rpyToMatrix(*angles)
+
+
+def _line(where: str, body: Mapping[str, Any], frame: str, arm: Arm) -> list[TaskAxis]:
+    known(where, body, ("line", "point", "along", "hold"), ("line", "point", "along"))
+    require(frame == BASE, f"{where}: a line is given in the base frame; the task is in that of {frame}")
+    cover = _cover(where, body["line"], arm)
+    held = body.get("hold", list(PARTS))
+    require(
+        isinstance(held, list) and len(held) > 0 and all(part in PARTS for part in held),
+        f"{where}: hold is {held!r}; allowed: a list of {', '.join(PARTS)}",
+    )
+    point, along = _triple(where, "point", body["point"]), _direction(where, body["along"])
+    return [axis for part, axis in zip(PARTS, line_axes(arm, cover, point, along), strict=True) if part in held]
+
+
+def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskAxis:
+    kinds = [name for name in KINDS if name in body]
+    require(len(kinds) == 1, f"{where} has {', '.join(kinds) or 'no kind'}; give one of {', '.join((*KINDS, 'line'))}")
+    name = kinds[0]
+    is_joint = "joint" in body
+    given = ("joint",) if is_joint else ("along", "cover", "contact_position")
+    extra = ("stiffness", "damping") if name == "impedance" else ("rate",) if name == "position" else ()
+    known(where, body, (name, *given, *extra), (name, *given))
+    kind = AxisKind.IMPEDANCE if name == "free" else AxisKind[name.upper()]
+    value = None if body[name] == HERE or name == "free" else number(where, name, body[name])
+    damping = body[name] if name == "free" else body.get("damping", 0.0)
+    stiffness, rate = (number(where, key, body.get(key, 0.0)) for key in ("stiffness", "rate"))
+    motion = (value, rate, stiffness, number(where, "damping", damping))
+    if is_joint:
+        names = arm.joints.names
+        require(body["joint"] in names, f"{where}: joint is {body['joint']!r}; allowed: {', '.join(names)}")
+        return checked(where, TaskAxis(kind, names.index(body["joint"]), "", 0.0, (0.0, 0.0, 0.0), *motion), arm)
+    cover = _cover(where, body["cover"], arm)
+    place = (
+        None if body["contact_position"] == ESTIMATED else number(where, "contact_position", body["contact_position"])
+    )
+    x, y, z = (rotation @ _direction(where, body["along"])).tolist()
+    return checked(where, TaskAxis(kind, -1, cover, place, (x, y, z), *motion), arm)
+
+
+def _cover(where: str, name: Any, arm: Arm) -> str:
+    if not is_one_of(name, arm.covers.names):
+        raise ParameterError(f"{where}: cover is {name!r}; allowed: {', '.join(arm.covers.names)}")
+    return str(name)
+
+
+def _direction(where: str, body: Any) -> Triple:
+    direction = _triple(where, "along", body)
+    require(any(direction), f"{where}: along is {body!r}; give a direction that is not zero")
+    return unit(direction)
+
+
+def _triple(where: str, key: str, body: Any) -> Triple:
+    values: Sequence[float] = numbers(where, key, body, 3)
+    x, y, z = values
+    return x, y, z

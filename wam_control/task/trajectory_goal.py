@@ -1,0 +1,117 @@
+"""How a goal of the action FollowJointTrajectory goes: whether the arm follows, and why it does not."""
+
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+from wam_control.task.motion import Moving, PostureMotion
+from wam_control.task.trajectory_player import AT_REST
+from wam_description.arm import Arm, MotionParameters
+from wam_description.parameters import ParameterError
+from wam_description.signals import PosturePath, State
+
+GOAL_TOLERANCE: Final = 0.02  # rad, of each joint at the end, where the client names none
+GOAL_TIME: Final = 1.0  # s after the end, in which the arm must be there, where the client gives no time
+
+
+class GoalCode(IntEnum):
+    """The numbers of control_msgs/action/FollowJointTrajectory."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+class GoalEnd(NamedTuple):
+    """How a goal ended; the reason is '' where it was reached."""
+
+    code: GoalCode
+    reason: str
+
+
+class JointTolerance(NamedTuple):
+    """Largest error of a joint, rad and rad/s; 0 for what is usual, below 0 for none."""
+
+    position: float = 0.0
+    velocity: float = 0.0
+
+
+NO_TOLERANCE: Final = JointTolerance()
+
+
+class TrajectoryGoal:
+    """Compares the arm with a trajectory that the force loop plays at the same time.
+
+    Parameters
+    ----------
+    path : of the client.
+    arm : with the limits of the joints.
+    limits : of motions.
+    on_path, at_goal : tolerances by name of the joint; usual is none on the path, and GOAL_TOLERANCE at the goal.
+    goal_time : s after the end; 0 for GOAL_TIME.
+
+    Attributes
+    ----------
+    desired : where the arm is to be; None until it is at rest and the trajectory has begun.
+    time : s, since it began.
+    """
+
+    def __init__(
+        self,
+        path: PosturePath,
+        arm: Arm,
+        limits: MotionParameters,
+        on_path: Mapping[str, JointTolerance],
+        at_goal: Mapping[str, JointTolerance],
+        goal_time: float,
+    ) -> None:
+        self._path, self._arm, self._limits = path, arm, limits
+        names = arm.joints.names
+        self._on_path = [on_path.get(name, NO_TOLERANCE) for name in names]
+        goal = [at_goal.get(name, NO_TOLERANCE) for name in names]
+        self._at_goal = [one._replace(position=one.position or GOAL_TOLERANCE) for one in goal]
+        self._goal_time = goal_time or GOAL_TIME
+        self._motion: PostureMotion | None = None
+        self.desired: Moving | None = None
+        self.time = 0.0
+
+    def step(self, joints: State, dt: float) -> GoalEnd | None:
+        """Go on by one period; how the goal ended, None while it has not.
+
+        Parameters
+        ----------
+        joints : angles and velocities (n,), rad and rad/s.
+        dt : s, since the last period.
+        """
+        if self._motion is None:
+            if max(map(abs, joints.velocity)) > AT_REST:
+                return None
+            try:
+                self._motion = PostureMotion(joints.position, self._path, self._arm, self._limits)
+            except ParameterError as error:
+                return GoalEnd(GoalCode.INVALID_GOAL, str(error))
+        self.time += dt
+        self.desired = self._motion.at(self.time)
+        if off := self._error(joints, self._on_path):
+            return GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"{off}, {self.time:.3f} s after the start")
+        late = self.time - self._motion.duration
+        if late < 0.0:
+            return None
+        if not (off := self._error(joints, self._at_goal)):
+            return GoalEnd(GoalCode.SUCCESSFUL, "")
+        if late <= self._goal_time:
+            return None
+        return GoalEnd(GoalCode.GOAL_TOLERANCE_VIOLATED, f"{off}, {late:.3f} s after the end")
+
+    def _error(self, joints: State, allowed: list[JointTolerance]) -> str:
+        """The first joint that is off by more than is allowed, '' for none."""
+        assert self.desired is not None
+        pairs = ((self.desired.position, joints.position, "rad"), (self.desired.velocity, joints.velocity, "rad/s"))
+        for k, (desired, actual, unit) in enumerate(pairs):
+            for name, want, got, most in zip(self._arm.joints.names, desired, actual, allowed, strict=True):
+                if 0.0 < most[k] < abs(got - want):
+                    return f"{name} is off by {got - want:.3g} {unit}, allowed are {most[k]:g} {unit}"
+        return ""

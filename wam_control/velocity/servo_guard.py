@@ -1,0 +1,187 @@
+"""Which gains of the velocity loop are stable on the arm: the guard of the inner loop.
+
+The linear part is rotors, cables and links under the sampled servo (`wam_theory.velocity_servo`), with the links held
+and with the links free.  Friction only takes energy away; without it the bound holds for any friction.  Gains that
+are too small are stable, but hold nothing: both are assessed here alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.sampled_loop import Feedback, SampledLoop
+from wam_control.force.stability_guard import rounded_down, rounded_up
+from wam_description.arm import Arm, Servo, Timing
+from wam_description.parameters import ParameterError, lengths, parameter, require
+from wam_description.transmission_map import TransmissionMap
+from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
+
+Array = NDArray[np.float64]
+LARGEST = 1e3  # factor on the gains up to which a margin is searched
+DAMPING = 0.03  # least damping ratio of a slow mode: what the integral gain alone holds swings on its spring
+SLOW = 0.6  # rad per period, up to which a mode is slow
+DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
+
+
+@dataclass(frozen=True)
+class ServoGuardParameters:
+    """Assumptions about the velocity loop, and what is done about gains that are not stable."""
+
+    mode: str = parameter(
+        "off: any gains are taken; refuse: gains that are not stable or do not hold the arm are refused",
+        choices=("off", "refuse"),
+        before="off",
+    )
+    stability_fraction: float = parameter(
+        "fraction of the largest stable gains that is accepted, with commands on time",
+        low=0.05,
+        high=1.0,
+        before=1.0,
+    )
+    extra_delay: int = parameter(
+        "inner periods by which a current may be delayed in realtime; the gains have to be stable then, too",
+        low=0,
+        high=10,
+        before=0,
+    )
+    velocity_by_difference: bool = parameter(
+        "true if the motor velocity is the difference of two angles over a period, as with sensors.encoder_resolution",
+        before=False,
+    )
+
+
+class Mechanism(NamedTuple):
+    """Rotors and what they move: rate of the states, rate per motor torque, and what is assumed, in words."""
+
+    rate: Array
+    inlet: Array
+    what: str
+
+
+class ServoGuard:
+    """Assesses gains of the velocity loop on one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    timing : periods of the loops.
+    parameters : of the guard.
+    """
+
+    def __init__(self, arm: Arm, timing: Timing, parameters: ServoGuardParameters) -> None:
+        self._arm, self._timing, self._parameters = arm, timing, parameters
+
+    def require_stable(self, servo: Servo) -> None:
+        """Refuse gains that are not stable, or that do not hold the arm.
+
+        Raises
+        ------
+        ParameterError
+            names the gains, their limit and the smallest or largest that would be taken.
+        """
+        lengths("servo", self._arm.motors.names, vars(servo))
+        if self._parameters.mode == "off":
+            return
+        self._require_holding(servo)
+        if self._accepts(servo, 1.0, 1.0):
+            return
+        kp, ki = servo.proportional_gain, servo.integral_gain
+        proportional = largest_scale(lambda scale: self._accepts(servo, scale, 1.0), 1.0)
+        integral = largest_scale(lambda scale: self._accepts(servo, 1.0, scale), 1.0)
+        ways = []
+        if proportional and any(kp):
+            ways.append(f"servo.proportional_gain up to {_listed(kp, proportional)} with this integral_gain")
+        if integral and any(ki):
+            ways.append(f"servo.integral_gain up to {_listed(ki, integral)} with this proportional_gain")
+        if not ways:
+            alone = largest_scale(lambda scale: self._accepts(servo, scale, 0.0), 1.0)
+            ways.append(f"servo.proportional_gain up to {_listed(kp, alone)} with servo.integral_gain 0")
+        raise ParameterError(
+            f"servo.proportional_gain {_listed(kp)} with servo.integral_gain {_listed(ki)} is not stable: "
+            f"{self._trouble(servo)}; allowed: {', or '.join(ways)}"
+        )
+
+    def margin(self, servo: Servo) -> float:
+        """Largest factor on all gains, up to `LARGEST`, that is stable with currents on time."""
+
+        def is_stable_at(scale: float) -> bool:
+            return all(is_stable(self._period(each, servo, scale, scale, 0)) for each in self._mechanisms)
+
+        return largest_scale(is_stable_at, LARGEST)
+
+    def _require_holding(self, servo: Servo) -> None:
+        """Refuse proportional gains with which a motor at its largest speed is hardly braked.
+
+        The integral gain alone does not brake: it is a spring to the motor.
+        """
+        motors = self._arm.motors
+        speeds = TransmissionMap.of(self._arm).largest_motor_velocities(self._arm.joints.speed_limit)
+        least = [DEAD * peak / speed if speed else 0.0 for peak, speed in zip(motors.peak_torque, speeds, strict=True)]
+        for name, gain, enough, speed in zip(motors.names, servo.proportional_gain, least, speeds, strict=True):
+            require(
+                gain >= enough,
+                f"servo.proportional_gain {_listed(servo.proportional_gain)} cannot hold the arm: {name} at "
+                f"{speed:.3g} rad/s, from arm.joints.speed_limit, is braked with {gain * speed:.3g} N m, less than "
+                f"{DEAD:.0%} of its peak torque, whatever servo.integral_gain is; "
+                f"allowed: at least {_listed([rounded_up(each) for each in least])}",
+            )
+
+    def _accepts(self, servo: Servo, proportional: float, integral: float) -> bool:
+        return not self._trouble(servo, proportional, integral)
+
+    def _trouble(self, servo: Servo, proportional: float = 1.0, integral: float = 1.0) -> str:
+        """Why gains, scaled, are not accepted; '' if they are."""
+        fraction = self._parameters.stability_fraction
+        late = self._parameters.extra_delay if self._timing.mode == "realtime" else 0
+        for mechanism in self._mechanisms:
+            found = least_damping(self._period(mechanism, servo, proportional, integral, 0), SLOW)
+            if found < DAMPING:
+                return (
+                    f"an oscillation hardly decays with {mechanism.what}, its damping ratio is {found:.2g} "
+                    f"(at least {DAMPING:g})"
+                )
+            for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
+                if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):
+                    when = f"delayed by {delay} periods" if delay else "on time"
+                    share = f", of which velocity_loop:guard.stability_fraction, {fraction:g}, is accepted"
+                    return f"an oscillation grows with {mechanism.what}, currents {when}{share if scale > 1.0 else ''}"
+        return ""
+
+    def _period(self, mechanism: Mechanism, servo: Servo, proportional: float, integral: float, delay: int) -> Array:
+        return servo_period(
+            mechanism.rate,
+            mechanism.inlet,
+            [proportional * gain for gain in servo.proportional_gain],
+            [integral * gain for gain in servo.integral_gain],
+            self._timing.period,
+            delay,
+            self._parameters.velocity_by_difference,
+        )
+
+    @cached_property
+    def _mechanisms(self) -> tuple[Mechanism, ...]:
+        """The rotors with the links held, and with the links free in some poses."""
+        arm = self._arm
+        n = len(arm.joints.names)
+        loop = SampledLoop(arm, self._timing, Servo((0.0,) * n, (0.0,) * n))
+        held = locked_rotors(
+            arm.motors.inertia,
+            [circuit.damping for circuit in arm.circuits],
+            [circuit.stiffness for circuit in arm.circuits],
+            arm.motors.viscous_friction,
+        )
+        found = [Mechanism(held, loop.inlet[: 2 * n], "the links held")]
+        # the cables decide, not the links: over all poses the largest stable gain changes by 2 %
+        for pose, q in (("at arm.joints.start", arm.joints.start), ("with all joints at 0", (0.0,) * n)):
+            rate, _ = loop.plant(q, np.zeros((n, n)), Feedback("contact_estimate", (), 0.0))
+            found.append(Mechanism(rate, loop.inlet, f"the links free, {pose}"))
+        return tuple(found)
+
+
+def _listed(gains: Sequence[float], scale: float = 1.0) -> str:
+    """Gains times a scale, rounded down: a gain that is named as allowed has to be accepted."""
+    return f"[{', '.join(f'{gain if scale == 1.0 else rounded_down(scale * gain):.3g}' for gain in gains)}]"

@@ -1,0 +1,90 @@
+"""Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
+
+from operator import gt
+
+from wam_control.velocity.dither import Dither
+from wam_control.velocity.servo_guard import ServoGuard
+from wam_control.velocity.servo_reaction import SERVO_REACTION
+from wam_control.velocity.velocity_loop import VelocityLoop, VelocityLoopParameters
+from wam_description.arm import Servo, Shared
+from wam_description.signals import State
+from wam_description.synchroniser import Inputs
+from wam_description.transmission_map import TransmissionMap
+from wam_description.wiring import Outputs
+
+
+class VelocityLoopNode:
+    """Answers each motor state with currents, from the velocity and effort commands."""
+
+    name, parameters = "velocity_loop", VelocityLoopParameters
+    high_priority = True
+    owns = "servo"
+
+    def __init__(self, shared: Shared, own: VelocityLoopParameters) -> None:
+        self._own = own
+        self._guard = ServoGuard(shared.model_arm, shared.timing, own.guard)
+        self._guard.require_stable(shared.servo)
+        self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
+        self._shared = shared
+        self._set_dither(own)
+        zero = [0.0] * len(shared.arm.motors.names)
+        self._motors = shared.arm.motors.names
+        self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
+        self.refusals: dict[str, str] = {}
+        self._at_rest, self._no_effort = State([], zero, []), State([], [], zero)
+        self._command, self._velocity = self._at_rest, zero  # and within the limits, rad/s
+
+    @SERVO_REACTION
+    def step(self, inputs: Inputs) -> Outputs:
+        """Currents that answer a motor state, A."""
+        motors = inputs["motor_states"]
+        command = inputs["motor_velocity_command"] or self._at_rest
+        if command is not self._command:  # the same in every inner period of an outer one
+            self._command, self._velocity = command, self._limited(command.velocity)
+        effort = inputs["motor_effort_command"] or self._no_effort
+        currents = self._loop.step(
+            motors.velocity,
+            motors.effort,
+            self._velocity,
+            self._dither.added(inputs.stamp, effort.effort),
+            inputs.dt,
+        )
+        return {"motor_current_command": State([], [], currents)}
+
+    def _limited(self, velocity: list[float]) -> list[float]:
+        """A commanded velocity within what the speed limits of the joints allow each motor, rad/s."""
+        if not any(map(gt, map(abs, velocity), self._fastest)):
+            if self.refusals:
+                self.refusals.clear()
+            return velocity
+        each = zip(self._motors, velocity, self._fastest, strict=True)
+        name, speed, most = next(one for one in each if abs(one[1]) > one[2])
+        self.refusals["motor_velocity_command"] = (
+            f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
+            "from arm.joints.speed_limit; it turns no faster than that"
+        )
+        return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
+
+    def _set_dither(self, own: VelocityLoopParameters) -> None:
+        dither = Dither(self._shared.model_arm, self._shared.timing, own.dither)
+        self._cost = dither.cost(self._shared.arm.joints.start)
+        self._dither = dither
+
+    def tune(self, own: VelocityLoopParameters) -> None:
+        """Take another level of the dither while the arm moves; the other parameters need a new start."""
+        self._set_dither(own)
+        self._own = own
+
+    def retune(self, servo: Servo) -> None:
+        """Take new gains while the arm moves, or refuse them."""
+        self._guard.require_stable(servo)
+        self._loop.tune(servo, self._own)
+
+    def diagnostics(self) -> dict[str, str]:
+        """What the dither costs, where it is on."""
+        if not self._cost.tip_motion:
+            return {}
+        return {
+            "dither: largest tip motion": f"{self._cost.tip_motion * 1e3:.2g} mm",
+            "dither: heat": f"{max(self._cost.heat):.2%} of the thermal limit",
+        }

@@ -1,0 +1,296 @@
+"""The scenarios of the benchmark: drawn from a seed, plain data, equal for every way to play them.
+
+The true arm of each scenario has its own model mismatch within the declared range.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
+from wam_studies.contact_benchmark.foam import Foam, FoamCollision, foam_values
+from wam_studies.contact_benchmark.moves import MoveGenerator
+
+# the declared range of the model mismatch, uniform in +- this
+FRICTION, MASS, STIFFNESS = 0.10, 0.02, 0.10
+PAYLOAD = 0.05  # kg, unmodelled, in free motion only
+
+# what the estimator states of an arm that was identified to this range, as standard deviations
+IDENTIFIED = {
+    "contact_estimator:observer.moving_uncertainty": 0.06,
+    "contact_estimator:observer.mass_uncertainty": 0.012,
+    "contact_estimator:observer.asymmetry_uncertainty": 0.0,
+    "contact_estimator:observer.load_uncertainty": 0.0,
+    "contact_estimator:observer.payload_uncertainty": 0.0,
+    "contact_estimator:observer.motor_noise": 0.05,
+}
+
+RELEASE = 0.05  # s, to release the brakes
+SETTLE = 0.3  # s, before the first move
+HOLD = 0.32  # s of contact in motion
+REST_HOLD = 0.6  # s of contact at rest
+FREE_SECONDS = 12.0  # length of one scenario without contact
+LEVELS = (5.0, 10.0, 20.0)  # N, in the table
+WEAKEST, STRONGEST = 1.0, 20.0  # N
+ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
+MARGIN = 0.02  # m at the ends of a link without contacts
+DITHER_CYCLE = 0.04  # s: 25 Hz
+BEYOND_FIRST = 0.7  # of the contacts are not on the first cover
+FOAM_SHARE = 0.15  # of the scenarios in motion
+KINDS = ("push", "sphere", "flat", "foam")
+AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
+
+
+class PlannedContact(NamedTuple):
+    """A planned contact; the simulation decides whether it happens."""
+
+    kind: str
+    cover: str
+    position: float  # m along the link
+    angle: float  # rad, of the force around the cover
+    force: float  # N
+    begin: float  # s since power-up
+    end: float
+    friction: float  # coefficient
+
+
+class BenchmarkScenario(NamedTuple):
+    """Values of a configuration and steps of a scenario.
+
+    Attributes
+    ----------
+    group : 'moving', 'rest', 'dither' or 'free'.
+    values : override the configuration.
+    steps : of the scenario.
+    planned : contacts.
+    """
+
+    name: str
+    group: str
+    values: Mapping[str, Any]
+    steps: tuple[ScenarioStep, ...]
+    planned: tuple[PlannedContact, ...]
+
+
+def dither_values(configuration: Configuration) -> dict[str, Any]:
+    """Values that switch on the dither at rest; empty if the configuration has none."""
+    shared = configuration.sections["/**"]
+    return (
+        {"timing.dither_cycle": round(DITHER_CYCLE / shared["timing.period"])}
+        if "timing.dither_cycle" in shared
+        else {}
+    )
+
+
+def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
+    """Values of every scenario: no obstacle within reach, fast moves allowed, the estimator's model as configured."""
+    estimator = configuration.sections["contact_estimator"]
+    joints = len(configuration.shared.arm.joints.names)
+    values: dict[str, Any] = {
+        **foam_values(AWAY, WEAKEST, 0.0),
+        "force_loop:joint_speed_limit": 3.5,
+        "contact_estimator:use_joint_sensors": joint_sensors,
+    }
+    own = {"observer.mass_scale": [1.0] * joints, "observer.friction_scale": 1.0}
+    values |= {f"contact_estimator:{name}": value for name, value in own.items() if name in estimator}
+    return values
+
+
+class ScenarioGenerator:
+    """Scenarios of one seed.
+
+    Parameters
+    ----------
+    configuration : under test.
+    seed : of the random numbers.
+    joint_sensors : whether the estimator uses the joint sensors.
+    """
+
+    def __init__(self, configuration: Configuration, seed: int, joint_sensors: bool = False) -> None:
+        self._configuration, self._seed = configuration, seed
+        self._arm: Arm = configuration.shared.arm
+        self._moves, self._body = MoveGenerator(self._arm), RigidBody(self._arm)
+        self._base = base_values(configuration, joint_sensors) | IDENTIFIED
+
+    def contacts(self, count: int) -> list[BenchmarkScenario]:
+        """Scenarios with `count` contacts in motion, two per scenario."""
+        return [self._moving(i) for i in range((count + 1) // 2)]
+
+    def resting(self, count: int, dither: Mapping[str, Any] | None = None) -> list[BenchmarkScenario]:
+        """Scenarios with `count` contacts at rest, two per scenario; equal with and without dither."""
+        return [self._resting(i, dither) for i in range((count + 1) // 2)]
+
+    def free(self, seconds: float) -> list[BenchmarkScenario]:
+        """Motion with stops and reversals and an unmodelled payload, without contact."""
+        return [self._free(i) for i in range(math.ceil(seconds / FREE_SECONDS - 1e-9))]
+
+    def _random(self, group: int, i: int) -> np.random.Generator:
+        return np.random.default_rng((self._seed, group, i))
+
+    def _moving(self, i: int) -> BenchmarkScenario:
+        random = self._random(0, i)
+        if random.random() < FOAM_SHARE:
+            return self._foam(random, i)
+        start = self._moves.pose(random)
+        moves = self._moves.moves(random, start, 2)
+        steps, planned = _opening(), []
+        now = RELEASE + SETTLE
+        for number, move in enumerate(moves):
+            begin = now + 0.3 * move.seconds
+            contact = self._contact(random, begin, begin + HOLD)
+            planned.append(contact)
+            push = self._push(contact, now) if contact.kind == "push" else None
+            steps.append(ScenarioStep(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
+            now += move.seconds
+        steps.append(ScenarioStep("end", 0.1))
+        values = self._values(random, start, planned)
+        return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
+
+    def _foam(self, random: np.random.Generator, i: int) -> BenchmarkScenario:
+        """The arm runs into foam and moves back."""
+        foam = None
+        while foam is None:
+            start = self._moves.pose(random)
+            (move,) = self._moves.moves(random, start, 1)
+            contact = self._contact(random, RELEASE + SETTLE, RELEASE + SETTLE + move.seconds + 0.5)
+            cover = self._arm.covers.names.index(contact.cover)
+            foam = FoamCollision(self._arm, self._body, start, move).foam(random, cover, contact.position)
+        friction = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        contact = contact._replace(kind="foam", force=max(contact.force, 4.0), friction=friction)
+        steps = [
+            *_opening(),
+            ScenarioStep("move into foam", move.seconds, posture=move.posture),
+            ScenarioStep("press", 0.2),
+            ScenarioStep("back", move.seconds, posture=start),
+        ]
+        values = self._values(random, start, []) | foam_values(foam, contact.force, friction)
+        return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), (contact,))
+
+    def _resting(self, i: int, dither: Mapping[str, Any] | None) -> BenchmarkScenario:
+        random = self._random(1, i)
+        start = self._moves.pose(random)
+        (move,) = self._moves.moves(random, start, 1)
+        steps, planned = [*_opening(), ScenarioStep("move", move.seconds, posture=move.posture)], []
+        now = RELEASE + SETTLE + move.seconds
+        for number in range(2):
+            begin = now + 0.6
+            contact = self._contact(random, begin, begin + REST_HOLD)
+            planned.append(contact)
+            push = self._push(contact, now) if contact.kind == "push" else None
+            steps.append(ScenarioStep(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
+            now += steps[-1].seconds
+        still = dict.fromkeys(dither_values(self._configuration), 0)
+        values = self._values(random, start, planned) | (still if dither is None else dict(dither))
+        group = "rest" if dither is None else "dither"
+        return BenchmarkScenario(f"seed {self._seed} {group} {i}", group, values, tuple(steps), tuple(planned))
+
+    def _free(self, i: int) -> BenchmarkScenario:
+        random = self._random(2, i)
+        start = self._moves.pose(random)
+        steps, left = _opening(), FREE_SECONDS - RELEASE - SETTLE
+        here = start
+        while left > 0.0:
+            (move,) = self._moves.moves(random, here, 1, before=steps[-1].posture)
+            steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
+            stop = float(random.choice((0.0, 0.0, 0.1, 0.4)))
+            if stop:
+                steps.append(ScenarioStep("stop", stop))
+            left -= move.seconds + stop
+            here = move.posture
+        values = self._values(random, start, [])
+        if i % 2:  # no payload in the others, as in the scenarios with contact
+            values["driver:mismatch.payload"] = float(random.uniform(0.0, PAYLOAD))
+            values["contact_estimator:observer.payload"] = [0.0, PAYLOAD]
+        return BenchmarkScenario(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
+
+    def _contact(self, random: np.random.Generator, begin: float, end: float) -> PlannedContact:
+        covers = self._arm.covers
+        cover = _drawn_cover(random.random(), len(covers.names)) if len(covers.names) > 1 else 0
+        kind = str(random.choice(("push", "sphere", "flat"), p=(0.4, 0.3, 0.3)))
+        level = float(random.choice((*LEVELS, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
+        force = level * float(random.uniform(0.95, 1.05)) if level else float(random.uniform(WEAKEST, STRONGEST))
+        friction = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        return PlannedContact(
+            kind=kind,
+            cover=covers.names[cover],
+            position=float(random.uniform(MARGIN, covers.length[cover] - MARGIN)),
+            angle=float(random.uniform(-math.pi, math.pi)),
+            force=force,
+            begin=round(begin, 3),
+            end=round(end, 3),
+            friction=friction if kind != "push" else 0.0,
+        )
+
+    def _push(self, contact: PlannedContact, step_begins: float) -> Push:
+        cover, position = contact.cover, contact.position
+        force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
+        begin, end = contact.begin - step_begins, contact.end - step_begins
+        return Push(cover, position, force, begin, end, self._arm.covers.aside(cover, position))
+
+    def _values(
+        self, random: np.random.Generator, start: Sequence[float], planned: list[PlannedContact]
+    ) -> dict[str, Any]:
+        return {
+            **self._base,
+            "arm.joints.start": list(start),
+            **_mismatch(random, self._arm),
+            **_pushers(random, [contact for contact in planned if contact.kind in ("sphere", "flat")]),
+        }
+
+
+def _drawn_cover(share: float, covers: int) -> int:
+    """Index of the cover in contact for a number from 0 to 1: those behind the first one have `BEYOND_FIRST` of all."""
+    return 1 + int(share / BEYOND_FIRST * (covers - 1)) if share < BEYOND_FIRST else 0
+
+
+def _opening() -> list[ScenarioStep]:
+    return [ScenarioStep("release", RELEASE, request="enable"), ScenarioStep("settle", SETTLE)]
+
+
+def _mismatch(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
+    def factors(width: float, count: int) -> list[float]:
+        return (1.0 + width * random.uniform(-1.0, 1.0, count)).tolist()
+
+    motors, joints = len(arm.motors.names), len(arm.joints.names)
+    return {
+        "driver:mismatch.mass": factors(MASS, len(arm.links.names)),
+        "driver:mismatch.motor_friction": factors(FRICTION, motors),
+        "driver:mismatch.joint_friction": factors(FRICTION, joints),
+        "driver:mismatch.stiffness": factors(STIFFNESS, motors),
+    }
+
+
+def _pushers(random: np.random.Generator, contacts: list[PlannedContact]) -> dict[str, Any]:
+    if not contacts:
+        return {}
+    sliding = [float(random.choice((0.0, 1.0))) for _ in contacts]
+    columns: dict[str, list[Any]] = {
+        "names": [f"hand{i}" for i in range(len(contacts))],
+        "shapes": ["sphere" if contact.kind == "sphere" else "box" for contact in contacts],
+        "sizes": [size for contact in contacts for size in _size(random, contact.kind)],
+        "covers": [contact.cover for contact in contacts],
+        "positions": [contact.position for contact in contacts],
+        "angles": [contact.angle for contact in contacts],
+        "force": [contact.force for contact in contacts],
+        "begin": [contact.begin for contact in contacts],
+        "end": [contact.end for contact in contacts],
+        "rise": [float(random.uniform(0.01, 0.03)) for _ in contacts],
+        "clearance": [0.01 for _ in contacts],
+        "slide": [slides * float(random.uniform(-0.03, 0.03)) for slides in sliding],
+        "turn": [slides * float(random.uniform(-0.5, 0.5)) for slides in sliding],
+        "stiffness": [float(random.uniform(1000.0, 4000.0)) for _ in contacts],
+        "damping": [10.0 for _ in contacts],
+        "friction": [contact.friction for contact in contacts],
+    }
+    return {f"driver:world.pushers.{key}": column for key, column in columns.items()}
+
+
+def _size(random: np.random.Generator, kind: str) -> tuple[float, float, float]:
+    if kind == "sphere":
+        return float(random.uniform(0.02, 0.06)), 0.0, 0.0
+    return float(random.uniform(0.01, 0.03)), 0.04, 0.02

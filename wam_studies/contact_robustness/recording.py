@@ -1,0 +1,159 @@
+"""Play one drawn arm without ROS and keep the motors' signals and the true contacts."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.fit import identify
+from wam_analysis.identification.overlay import estimator_values, model_values
+from wam_control.task.scenario import ScenarioStep
+from wam_description.arm import seconds
+from wam_description.configuration import Configuration
+from wam_driver.safety import Mode
+from wam_sim.simulation import Simulation
+from wam_studies.contact_benchmark.moves import MoveGenerator
+from wam_studies.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
+from wam_studies.contact_robustness.degradations import Degradation, Values, drawn
+from wam_studies.contact_robustness.touches import (
+    KINDS,
+    LEVEL_KINDS,
+    MASS_KINDS,
+    SECOND_KINDS,
+    Touch,
+    axis_of,
+    touches,
+)
+from wam_studies.identification.evaluation import play
+
+Array = NDArray[np.float64]
+WARM_UP = 6.0  # s of free motion before the first contact
+SPACING, SPACING_OF_MASSES = 1.9, 6.0  # s from one contact to the next
+EXCITATION = 20.0  # s of motion for an identification
+DRIFT_STEPS = 20  # of friction, over a recording
+CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
+
+
+class Drive(NamedTuple):
+    """What is recorded.
+
+    Attributes
+    ----------
+    configuration, degradation, seed, seconds : the arm, the degradation by name, what is drawn, the length in s.
+    contacts : which of `CONTACTS` are drawn.
+    is_identified : whether the arm's model is identified before, from a motion of its own.
+    """
+
+    configuration: Configuration
+    degradation: str
+    seed: int
+    seconds: float
+    contacts: str = "wide"
+    is_identified: bool = False
+
+
+class DriveRecording(NamedTuple):
+    """Signals of the motors and truth, one row per inner period.
+
+    Attributes
+    ----------
+    degradation : as drawn.
+    theta, thetad, torque : (k, n), rad, rad/s, N m, as measured.
+    speed : (k,), rad/s, true, of the fastest joint.
+    touches : the contacts, with times counted from the first row.
+    failure : why the recording ended early, ''.
+    model : values of the configuration of the identified model.
+    """
+
+    degradation: Degradation
+    theta: Array
+    thetad: Array
+    torque: Array
+    speed: Array
+    touches: tuple[Touch, ...]
+    failure: str
+    model: Values = ()
+
+
+def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], list[float]]:
+    """Degradation, contacts, steps of the motion and start pose; each degradation has its own contacts."""
+    arm = drive.configuration.shared.arm
+    name = sum(map(ord, drive.degradation))
+    degradation = drawn(drive.degradation, arm, np.random.default_rng((drive.seed, 1, name)))
+    random = np.random.default_rng((drive.seed, 2, name))
+    moves = MoveGenerator(arm)
+    start = here = moves.pose(random)
+    steps = [ScenarioStep("release", RELEASE, request="enable"), ScenarioStep("settle", SETTLE)]
+    left = drive.seconds - RELEASE - SETTLE
+    while left > 0.0:
+        (move,) = moves.moves(random, here, 1, before=steps[-1].posture)
+        steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
+        stop = float(random.choice((0.0, 0.0, 0.0, 0.1, 0.4)))
+        if stop:
+            steps.append(ScenarioStep("stop", stop))
+        left -= move.seconds + stop
+        here = move.posture
+    spacing = SPACING_OF_MASSES if drive.contacts == "masses" else SPACING
+    times = np.arange(WARM_UP, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
+    return (
+        degradation,
+        touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
+        steps,
+        list(start),
+    )
+
+
+def record(drive: Drive) -> DriveRecording:
+    """Play and record a drive."""
+    degradation, contacts, steps, start = draw(drive)
+    values: dict[str, Any] = {
+        **base_values(drive.configuration, False),
+        "nodes": [name for name in drive.configuration.shared.nodes if name != "contact_estimator"],
+        **dict(degradation.plant),
+        "arm.joints.start": start,
+        "driver:seed": drive.seed,
+    }
+    configured = drive.configuration.with_values(values)
+    arm, period = configured.shared.arm, seconds(configured.shared.timing.period_ns)
+    run = Simulation(configured, steps)
+    rows: list[tuple[list[float], list[float], list[float], float]] = []
+    nominal = np.array(arm.joints.dynamic_friction)
+    drift_every = max(1, round(drive.seconds / period / DRIFT_STEPS))
+    done = False
+    while not done:
+        k = len(rows)
+        if degradation.drift and k % drift_every == 0:
+            run.driver.set_added_friction((degradation.drift * k * period / drive.seconds * nominal).tolist())
+        state = run.driver.motor_state
+        rows.append(
+            (list(state.position), list(state.velocity), list(state.effort), max(map(abs, run.driver.plant.qd)))
+        )
+        _push(run, arm, contacts, k * period)
+        done = run.step() or run.driver.safety.mode is Mode.FAULT
+    theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
+    failure = run.driver.safety.fault or run.scenario.failure
+    model = _identified(configured, degradation, drive.seed) if drive.is_identified else ()
+    return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure, model)
+
+
+def _identified(configured: Configuration, degradation: Degradation, seed: int) -> Values:
+    """Values of the model that `wam identify` finds for a plant from the signals that the estimator gets."""
+    samples, _ = play(configured, seed, EXCITATION, degradation.signals)
+    known = configured.with_values(dict(degradation.model)).shared
+    found = identify(known, samples)
+    values = model_values(known, found, "an exciting motion") | estimator_values(configured)
+    return tuple(values.items())
+
+
+def _push(run: Simulation, arm: Any, contacts: Sequence[Touch], time: float) -> None:
+    """Apply the contacts that act now, those that have just ended with no force; carry the masses."""
+    run.driver.plant.carry(sum(touch.mass for touch in contacts if touch.begin <= time < touch.end))
+    near = [touch for touch in contacts if not touch.mass and touch.begin - 0.01 <= time <= touch.end + 0.01]
+    for cover in {touch.cover for touch in near}:
+        force, moment = np.zeros(3), np.zeros(3)
+        for touch in near:
+            if touch.cover == cover:
+                f, m = touch.wrench(time, axis_of(arm, cover, touch.place_at(time)))
+                force, moment = force + f, moment + m
+        run.driver.push(cover, force.tolist(), moment.tolist())

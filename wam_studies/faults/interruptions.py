@@ -1,0 +1,92 @@
+"""Ctrl-C at random moments of the demonstration: nothing is left, no traceback, the bag is whole."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from wam_bag.bag import BagError
+from wam_bag.contents import contents
+from wam_studies.faults.soak import lost_in
+from wam_studies.faults.trials import FaultTrial
+
+MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
+PYTHON: Final = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own
+STARTING, PLAYING = 4.0, 12.0  # s; one half of the moments is before the first, the other before the second
+LONGEST_END: Final = 30.0  # s, on a busy machine
+
+
+def play(seed: int, first: int, count: int) -> Iterator[FaultTrial]:
+    """Trials `first` to `first + count`, a demonstration each."""
+    for index in range(first, first + count):
+        chance = Random(f"interruptions {seed} {index}")
+        moment = chance.uniform(PYTHON, STARTING if index % 2 else PLAYING)
+        with TemporaryDirectory(prefix="wam_faults_") as folder:
+            escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{index}"))
+        yield FaultTrial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
+
+
+def _interrupted(folder: Path, moment: float, mark: str) -> Iterator[str]:
+    """What is wrong after one interrupted demonstration."""
+    with (folder / "output.txt").open("w+", encoding="utf-8") as output:
+        demo = subprocess.Popen(
+            [sys.executable, "-P", "-m", "wam_cli.program", "demo", "--name", "interrupted"],
+            cwd=folder,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env={**os.environ, MARK: mark},
+        )
+        time.sleep(moment)
+        with suppress(ProcessLookupError):
+            os.killpg(demo.pid, signal.SIGINT)  # as a terminal does
+        try:
+            code = demo.wait(LONGEST_END)
+        except subprocess.TimeoutExpired:
+            yield f"not ended after {LONGEST_END:g} s"
+            code = None
+        left = _marked(mark)
+        for process in left:
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        demo.wait()
+        output.seek(0)
+        text = output.read()
+    if left and code is not None:
+        yield f"{len(left)} processes are left"
+    if code not in (None, 0, -signal.SIGINT, 128 + signal.SIGINT):
+        yield f"exit code {code}: {text[-200:]}"
+    if "Traceback" in text:
+        yield f"a traceback: {text[-300:]}"
+    yield from _bag(folder / "bags" / "interrupted")
+
+
+def _bag(bag: Path) -> Iterator[str]:
+    """What is wrong with a bag; one without any file has not been begun."""
+    if not list(bag.glob("*.mcap")):
+        return
+    try:
+        found = contents(bag)
+    except BagError as error:
+        yield f"bag: {error}"
+        return
+    yield from lost_in(found)
+    if not (bag / "metadata.yaml").is_file():
+        yield "bag: no metadata.yaml"
+
+
+def _marked(mark: str) -> list[int]:
+    """Processes that a trial has started and that still run."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if f"{MARK}={mark}".encode() in (process / "environ").read_bytes().split(b"\0"):
+                found.append(int(process.name))
+    return found

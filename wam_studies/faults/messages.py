@@ -1,0 +1,73 @@
+"""Broken messages on every topic that a node takes, from the topic's own publisher and from a second one."""
+
+from collections.abc import Iterator
+from functools import partial
+from random import Random
+from typing import Final, NamedTuple
+
+from rclpy.publisher import Publisher
+
+from wam_description.configuration import Configuration
+from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
+from wam_studies.faults.trials import HELD_MOTION, MOTION, FaultTrial
+from wam_studies.faults.watched_stack import StackSource, WatchedStack
+
+MESSAGES: Final = 20  # of one trial
+BETWEEN: Final = 0.001  # s of the arm's time between two of them
+PUSH: Final = "sim/disturbance"
+AFTER: Final = 0.03  # s of the arm's time after the last
+
+
+class MessagePlan(NamedTuple):
+    """What one trial does."""
+
+    topic: str
+    is_foreign: bool
+    fault: MessageFault
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{self.topic}, {'second' if self.is_foreign else 'own'} publisher, {self.fault.name}"
+
+
+def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
+    """Topic, publisher and fault of a trial: all combinations, in an order drawn from the seed, then again."""
+    every = [
+        MessagePlan(topic, foreign, fault) for topic in topics for foreign in (False, True) for fault in MESSAGE_FAULTS
+    ]
+    Random(f"messages {seed}").shuffle(every)
+    return every[index % len(every)]
+
+
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
+    """Trials `first` to `first + count` of a seed, `MESSAGES` messages each, in a mode of `timing.mode`."""
+    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
+        for index in range(first, first + count):
+            todo = plan(source.ready().taken_topics(), seed, index)
+            yield source.trial(index, todo.name, partial(_send, todo, Random(f"messages {seed} {index}")))
+
+
+def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
+    """Publish the broken messages; returns how many there were."""
+    publisher: Publisher | None
+    publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
+    sent = 0
+    stack.allowed_motion = MOTION if todo.is_foreign else HELD_MOTION
+    if publisher is None:
+        return 1
+    if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
+        stack.allowed_force = stack.configuration.shared.disturbance_force_limit
+    for _ in range(MESSAGES):
+        message = stack.newest(todo.topic)
+        if todo.fault.moves:
+            made_effective(todo.topic, message, stack.cover)
+        data = broken(message, todo.fault, chance, stack.stamp(), stack.serialize)
+        if data is not None:
+            stack.inject(publisher, data)
+            sent += 1
+        stack.run(BETWEEN)
+    if todo.is_foreign:
+        stack.remove(publisher)
+    stack.run(AFTER)
+    return max(sent, 1)

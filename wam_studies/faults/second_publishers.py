@@ -1,0 +1,113 @@
+"""Second publishers: false commands and feedback with right stamps, another type, and old bags replayed."""
+
+import struct
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Final
+
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.publisher import Publisher
+from std_msgs.msg import Int64, String
+
+from wam_bag.bag import raw
+from wam_description.configuration import Configuration
+from wam_ros.run import NAMESPACE
+from wam_ros.wire import LITTLE_ENDIAN, stamp_of
+from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
+from wam_studies.faults.trials import FaultTrial
+from wam_studies.faults.watched_stack import StackSource, WatchedStack
+
+STREAMED: Final = 0.15  # s of the arm's time with two publishers
+AFTER: Final = 0.05  # s of the arm's time that is watched afterwards
+REPLAYED: Final = 300  # messages of each topic of a bag
+WALL_CLOCK: Final = 1_790_000_000 * SECOND
+STAMPS: Final = ("as recorded", "from now on", "of the wall clock")
+GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != "sim/disturbance")  # a second publisher is a fault
+
+
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
+    """Trials with a second publisher: every topic that a node takes, in turn, with messages of its type or another."""
+    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
+        for index in range(first, first + count):
+            stack = source.ready()
+            topics = stack.taken_topics()
+            topic, is_other_type = topics[index % len(topics)], index // len(topics) % 3 == 2
+            name = f"{topic}, {'another type' if is_other_type else 'second publisher'}, {mode}"
+            work = _other_type if is_other_type else _stream
+            yield source.trial(index, name, partial(work, topic))
+
+
+def replay(bag: Path, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
+    """Trials with a bag replayed onto the topics of an enabled arm: one topic, or all commands, or all feedback."""
+    mode = "realtime"
+    recorded = {name.removeprefix(f"/{NAMESPACE}/"): found for name, found in raw(bag).items()}
+    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
+        for index in range(first, first + count):
+            stack = source.ready()
+            chance = Random(f"replays {seed} {index}")
+            known = [topic for topic in stack.taken_topics() if topic in recorded and recorded[topic].data]
+            commands = [topic for topic in known if "command" in topic]
+            feedback = [topic for topic in known if topic in ("motor_states", "joint_states", "joint_sensors")]
+            chosen = [commands, feedback, known][index % 3] if index % 2 else [chance.choice(known)]
+            stamps = STAMPS[index // 2 % len(STAMPS)]
+            what = chosen[0] if len(chosen) == 1 else f"{len(chosen)} topics"
+            work = partial(_replay, {topic: recorded[topic].data for topic in chosen}, stamps)
+            yield source.trial(index, f"{what} replayed, stamps {stamps}", work)
+
+
+def _stream(topic: str, stack: WatchedStack) -> int:
+    """Answer every period with a false message that has the right stamp."""
+    publisher = stack.foreign_publisher(topic)
+    try:
+        end = stack.stamp() + int(STREAMED * SECOND)
+        while stack.stamp() < end and not stack.driver.safety.fault:
+            message = stack.newest(topic)
+            made_effective(topic, message, stack.cover)
+            set_stamp(message, stack.stamp())
+            stack.inject(publisher, stack.serialize(message))
+            stack.run(0.001)
+        stack.run(AFTER)
+        if topic in GUARDED and topic not in stack.driver.safety.fault:
+            stack.escapes.append(f"no fault names {topic}: '{stack.driver.safety.fault}'")
+    finally:
+        stack.remove(publisher)
+    return 1
+
+
+def _other_type(topic: str, stack: WatchedStack) -> int:
+    """Publish messages of another type under the topic's name."""
+    kind = Int64 if stack.type_of(topic) is String else String
+    try:
+        publisher = stack.node.create_publisher(kind, topic, stack.qos_of(topic))
+    except RCLError:  # the middleware allows one type for each name among the nodes of one process
+        return 1
+    for _ in range(20):
+        publisher.publish(kind())
+        stack.run(0.002)
+    stack.remove(publisher)
+    return 1
+
+
+def _replay(messages: dict[str, list[bytes]], stamps: str, stack: WatchedStack) -> int:
+    publishers: dict[str, Publisher] = {topic: stack.foreign_publisher(topic) for topic in messages}
+    begin = stack.stamp()
+    first = min(stamp_of(data[0]) for data in messages.values())
+    for i in range(REPLAYED):
+        for topic, data in messages.items():
+            if i < len(data):
+                stack.inject(publishers[topic], _stamped(data[i], stamps, begin - first))
+        stack.run(0.001)
+    for publisher in publishers.values():
+        stack.remove(publisher)
+    stack.run(AFTER)
+    return 1
+
+
+def _stamped(data: bytes, stamps: str, offset: int) -> bytes:
+    """A recorded message with other stamps."""
+    if stamps == "as recorded" or data[:4] != LITTLE_ENDIAN or len(data) < 12:
+        return data
+    stamp = stamp_of(data) + (offset if stamps == "from now on" else WALL_CLOCK)
+    return data[:4] + struct.pack("<iI", *divmod(stamp, SECOND)) + data[12:]

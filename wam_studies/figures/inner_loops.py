@@ -1,0 +1,155 @@
+"""Numbers of figure 2.1.2: what an inner loop on torque, velocity or position leaves of a disturbance at the motor.
+
+Every loop is sampled at 1 kHz.  A velocity loop with an integral is a position loop whose reference is the integral
+of the commanded velocity, so that both are one curve.  The loops as nodes: `wam_control.velocity.torque_loop`,
+`wam_control.velocity.position_loop`; measured by the experiment `inner-loops`.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_description.arm import Arm, Servo
+from wam_description.configuration import Configuration, packaged
+from wam_driver.plant import Plant
+from wam_studies.figures.panels import Panels, ThesisPanel
+from wam_studies.figures.series import Numbers, Series
+from wam_studies.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
+from wam_theory.velocity_servo import is_stable, largest_scale
+from wam_theory.zero_order_hold import zero_order_hold
+
+PERIOD, SUBSTEPS = 1e-3, 500  # the plant gives a torque half a substep early, which counts near the largest gain
+CONTACT = 1464.28  # N m/rad
+HALF = 0.5  # of the largest stable gain
+TOP = 1e3  # scale at which the search of the largest gain begins
+
+
+class InnerLoop(NamedTuple):
+    """A loop that answers the state theta, q, theta', q' with a motor torque, -gain x state."""
+
+    name: str
+    gain: Callable[[Arm], Numbers]  # (4,), at scale 1
+
+
+def on_torque(arm: Arm) -> Numbers:
+    """1 N m of the motor per N m, at the motor, of a strain gauge at the root of the link."""
+    (circuit,) = arm.circuits
+    along = np.array([1.0, -RATIO])
+    row = np.concatenate([circuit.stiffness * along, circuit.damping * along])
+    row[3] -= arm.joints.viscous_friction[0] / RATIO
+    return row
+
+
+def on_position(servo: Servo) -> Numbers:
+    """Gains of the velocity loop, or of a position loop with the same stiffness and damping."""
+    return np.array([servo.integral_gain[0], 0.0, servo.proportional_gain[0], 0.0])
+
+
+def _configured(_: Arm) -> Numbers:
+    return on_position(Configuration.load(packaged("testbed")).shared.servo)
+
+
+LOOPS = (InnerLoop("torque, sensor at the link", on_torque), InnerLoop("velocity or position", _configured))
+
+
+def damped_testbed(stiffness: float = 1.0) -> Arm:
+    """The testbed without gravity and dry friction, with its damping; stiffness of the cable over that configured."""
+    arm, configured = ideal_testbed(), Configuration.load(packaged("testbed")).shared.arm
+    cables = replace(configured.cables, stage_ea=tuple(stiffness * ea for ea in configured.cables.stage_ea))
+    return replace(
+        arm,
+        cables=cables,
+        motors=replace(arm.motors, viscous_friction=configured.motors.viscous_friction),
+        joints=replace(arm.joints, viscous_friction=configured.joints.viscous_friction),
+    )
+
+
+def period_map(arm: Arm, contact: float = CONTACT) -> tuple[Numbers, Numbers]:
+    """State after a period from the state, (4, 4), and from a held motor torque, (4, 1), by theory.
+
+    Parameters
+    ----------
+    contact : its stiffness at the joint, N m/rad.
+    """
+    (circuit,), inertia = arm.circuits, np.array([arm.motors.inertia[0], link_inertia(arm)])
+    along = np.array([1.0, -RATIO])
+    k = circuit.stiffness * np.outer(along, along) + np.diag([0.0, contact])
+    d = circuit.damping * np.outer(along, along)
+    d += np.diag([arm.motors.viscous_friction[0], arm.joints.viscous_friction[0]])
+    rate = np.block([[np.zeros((2, 2)), np.eye(2)], [-k / inertia[:, None], -d / inertia[:, None]]])
+    return zero_order_hold(rate, np.array([[0.0], [0.0], [1.0 / inertia[0]], [0.0]]), PERIOD)
+
+
+def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
+    """The same by stepping the plant from each unit state and under a unit torque."""
+    plant = released_plant(arm, against_spring(CONTACT), PERIOD / SUBSTEPS)
+    small, torque = 1e-6 * np.eye(4), 1e-3
+    columns = [_after(plant, state, 0.0) / 1e-6 for state in small]
+    return np.array(columns).T, _after(plant, np.zeros(4), torque)[:, None] / torque
+
+
+def _after(plant: Plant, state: Numbers, torque: float) -> Numbers:
+    plant.data.qpos[:], plant.data.qvel[:] = state[:2], state[2:]
+    for _ in range(SUBSTEPS):
+        plant.step([torque])
+    found: Numbers = np.concatenate([plant.data.qpos, plant.data.qvel])
+    return found
+
+
+def largest_gain(maps: tuple[Numbers, Numbers], gain: Numbers) -> float:
+    """Largest scale of the gain at which the sampled loop is stable."""
+    state, inlet = maps
+    return largest_scale(lambda scale: is_stable(state - scale * inlet * gain), TOP)
+
+
+def left_of_disturbance(maps: tuple[Numbers, Numbers], gain: Numbers, frequency: Numbers) -> Numbers:
+    """Amplitude of F_c over that of a torque at the motor, held over each period, frequency in Hz."""
+    state, inlet = maps
+    closed = state - inlet * gain
+    z = np.exp(2j * np.pi * frequency * PERIOD)
+    found: Numbers = CONTACT * np.abs([np.linalg.solve(v * np.eye(4) - closed, inlet[:, 0])[1] for v in z])
+    return found
+
+
+def inner_loops() -> Panels:
+    """Disturbance that is left over frequency, and the largest gain over the stiffness between motor and sensor."""
+    return _attenuation(), _largest_gains()
+
+
+def _attenuation() -> ThesisPanel:
+    arm = damped_testbed()
+    theory, plant = period_map(arm), plant_period_map(arm)
+    frequency, some = np.geomspace(0.3, 100.0, 400), np.array([0.5, 2.0, 5.0, 20.0, 50.0])
+    gains = {"none": np.zeros(4)}
+    for loop in LOOPS:
+        gains[loop.name] = HALF * largest_gain(theory, loop.gain(arm)) * loop.gain(arm)
+    lines = [
+        (
+            name,
+            Series(
+                frequency,
+                left_of_disturbance(theory, gain, frequency) / RATIO,
+                some,
+                left_of_disturbance(plant, gain, some) / RATIO,
+            ),
+        )
+        for name, gain in gains.items()
+    ]
+    title = "a) disturbance at the motor, half of the largest gain"
+    return ThesisPanel(title, "frequency [Hz]", "part that reaches the contact", tuple(lines), "xy")
+
+
+def _largest_gains() -> ThesisPanel:
+    stiffness, some = np.geomspace(0.5, 3.0, 60), np.array([0.6, 1.0, 1.5, 2.5])
+    lines = []
+    for loop in LOOPS:
+        line, points = (
+            np.array([largest_gain(maps(damped_testbed(s)), loop.gain(damped_testbed(s))) for s in values.tolist()])
+            for maps, values in ((period_map, stiffness), (plant_period_map, some))
+        )
+        reference = float(np.interp(1.0, stiffness, line))
+        lines.append((loop.name, Series(stiffness, line / reference, some, points / reference)))
+    title = "b) largest stable gain, over that of the testbed"
+    return ThesisPanel(title, "stiffness of the cable, over that of the testbed", "", tuple(lines), "xy")

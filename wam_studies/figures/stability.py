@@ -1,0 +1,150 @@
+"""Numbers of figures 5.7 and 5.8: describing function and stability map, theory and plant.
+
+Dimensionless: frequency in sqrt((k_tr + k_c)/J_l), G times b, so that the figures hold for every node with
+their zeta and k_tr = k_c; the plant is the testbed with a contact and a damping for this zeta.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_studies.figures.series import Numbers, Series
+from wam_studies.plant.force_response import force_step, loop_arm, loop_node, loop_plant
+from wam_studies.plant.ideal_testbed import RATIO
+from wam_theory.describing_function import friction_to_velocity
+from wam_theory.friction_model import FrictionNode
+from wam_theory.linear_loop import routh_gain
+from wam_theory.regimes import gamma_3, point_b
+from wam_theory.stability_map import largest_stable_steps
+
+ZETA = 0.25  # J = b = K = 1 and k_tr = k_c, figure 5.7's "unity parameters"
+GAMMAS = (0.6, 1.5)  # of figure 5.7: linearly stable, linearly unstable
+STICTION = 1.3  # F_static/F_dynamic of the second bound of figure 5.8
+PLANT_GAMMAS = (1.2, 1.5, 1.75, 2.0, 2.1)
+FINE = 2e-5  # s, so that the plant's loop is continuous to 0.2 % of a radian
+
+
+class DescribingFunction(NamedTuple):
+    """Figure 5.7: b G(j omega) in the complex plane, one for each gamma.
+
+    -1/N(A) is the negative real axis, b/N(A) = pi/4 b A/F_friction. `crossing` is the intersection of the
+    second curve with it; `frequency` has omega of the lines, `plant_frequency` that of the points.
+    """
+
+    gammas: tuple[float, ...]
+    curves: tuple[Series, ...]
+    crossing: float
+
+
+class StabilityBound(NamedTuple):
+    """Figure 5.8: F_friction/F_error of the bound over gamma, Coulomb and with stiction; points of the plant.
+
+    `predicted` is the bound by (5.16): F_error is that of the unstable cycle; `gamma_3` is the start of
+    domain III, `point_b` its ordinate.
+    """
+
+    zeta: float
+    bound: Series
+    with_stiction: tuple[Numbers, Numbers]
+    gamma_3: float
+    point_b: float
+    others: tuple[tuple[float, Numbers, Numbers], ...]  # zeta, gamma, F_friction/F_error
+
+
+def _testbed(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> FrictionNode:
+    """Node of the testbed with k_c = k_tr and this zeta."""
+    stiffness = loop_node(loop_arm(0.0, friction), 1.0).transmission_stiffness
+    bare = loop_node(loop_arm(0.0, friction), stiffness)
+    return loop_node(loop_arm(2.0 * zeta * float(np.sqrt(2.0 * stiffness * bare.inertia)), friction), stiffness)
+
+
+def describing_function() -> DescribingFunction:
+    """Theory, and the plant's frequency response from its one-step map."""
+    node = _testbed(ZETA)
+    natural = float(np.sqrt(2.0 * node.contact_stiffness / node.inertia))
+    omega, points = np.geomspace(0.05, 30.0, 4000), np.array([0.3, 0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0])
+    curves = []
+    for gamma in GAMMAS:
+        ktr, kc = node.transmission_stiffness, node.contact_stiffness
+        gain = gamma * float(routh_gain(node.inertia, node.damping, ktr, kc))
+        line = node.damping * friction_to_velocity(1j * natural * omega, gain, node.inertia, node.damping, ktr, kc)
+        plant = node.damping * _measured_response(node, gain, natural * points)
+        curves.append(Series(line.real, line.imag, plant.real, plant.imag))
+    return DescribingFunction(GAMMAS, tuple(curves), -1.0 / (GAMMAS[1] - 1.0))
+
+
+def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
+    """Velocity over a torque on the link with the loop closed, (frequencies,), from single steps of the plant."""
+    step, small = FINE, 1e-6
+    plant = loop_plant(loop_arm(node.damping, (0.0, 0.0)), node.contact_stiffness, step=step)
+
+    def after(state: Numbers, torque: float) -> Numbers:
+        plant.data.qpos[:] = RATIO * state[0], state[1]
+        plant.data.qvel[:] = -RATIO * gain * node.contact_stiffness * state[1], state[2]
+        plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.step([0.0])
+        return np.array([plant.theta[0] / RATIO, plant.q[0], plant.qd[0]])
+
+    matrix = np.transpose([after(small * unit, 0.0) / small for unit in np.eye(3)])
+    inlet = after(np.zeros(3), small) / small
+    z = np.exp(1j * omega * step)
+    # for a torque held over a step, at the middle of the step
+    responses = [np.linalg.solve(value * np.eye(3) - matrix, inlet)[2] * np.sqrt(value) for value in z]
+    return np.array(responses)
+
+
+def stability_bound() -> StabilityBound:
+    """The bound by exact events, and by bisection on the simulated plant."""
+    last = float(gamma_3(ZETA))
+    gamma = 1.0 + np.geomspace(1e-3, last * (1.0 - 1e-6) - 1.0, 300)
+    stiction_gamma = np.linspace(1.0005, last, 300)
+    steps = largest_stable_steps(stiction_gamma, ZETA, 1.0, STICTION)
+    held = steps > 0.0
+    plant = np.array([1.0 / plant_largest_step(value) for value in PLANT_GAMMAS])
+    others = []
+    for zeta in (0.15, 0.5, 1.0):
+        end = float(gamma_3(zeta))
+        along = 1.0 + np.geomspace(1e-3, end * (1.0 - 1e-6) - 1.0, 200)
+        others.append((zeta, along, 1.0 / largest_stable_steps(along, zeta)))
+    return StabilityBound(
+        ZETA,
+        Series(gamma, 1.0 / largest_stable_steps(gamma, ZETA), np.array(PLANT_GAMMAS), plant),
+        (stiction_gamma[held], 1.0 / steps[held]),
+        last,
+        float(point_b(ZETA)),
+        tuple(others),
+    )
+
+
+def plant_largest_step(gamma: float, zeta: float = ZETA, step: float = 6e-5) -> float:
+    """F_error/F_friction of the largest step with a bounded response of the simulated plant; to 0.5 %.
+
+    A response grows if its error in the third quarter of a second exceeds that in the second; at 13 Hz this
+    decides all but the border itself.
+
+    Parameters
+    ----------
+    gamma, zeta : of the loop.
+    step : of the plant, s.
+    """
+    node = _testbed(zeta, (1.0, 1.0))
+    gain = gamma * float(routh_gain(node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness))
+
+    def grows(desired: float) -> bool:
+        found = force_step(desired, node.contact_stiffness, gain, node.damping, (1.0, 1.0), 0.75, step=step)
+        error = np.abs(desired - found.force)
+        third = len(error) // 3
+        return float(error[2 * third :].max()) > float(error[third : 2 * third].max())
+
+    low, high = 1.0, 2.0
+    while grows(low):
+        low, high = low / 2.0, low
+    while not grows(high):
+        low, high = high, high * 2.0
+    while high > low * 1.01:
+        middle = float(np.sqrt(low * high))
+        if grows(middle):
+            high = middle
+        else:
+            low = middle
+    return float(np.sqrt(low * high))

@@ -1,0 +1,262 @@
+"""Numbers of figure 1.1 and of its table: the testbed with cables, with a shaft and gears, and with direct drive."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import yaml
+
+from wam_analysis.table import markdown
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration, packaged
+from wam_description.effects import Effects, no_effects
+from wam_description.world import World
+from wam_driver.driver import DriverParameters
+from wam_driver.friction import FrictionParameters
+from wam_driver.plant import Plant
+from wam_studies.figures.panels import Panels, ThesisPanel
+from wam_studies.figures.series import Series
+from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, against_spring, link_inertia, one_step_map
+from wam_theory.cable import efficiency, stage_loss
+from wam_theory.resonance import force_resonances
+
+HZ = 0.5 / math.pi
+KINDS = {"cables": "", "shaft and gears": "shaft_and_gear", "direct drive": "direct_drive"}
+SHAFT = 79.3e9, 5.5682e-3, 0.920992366  # G, Pa; thickness and length, m
+MESHES, LOSS = 4, 0.015  # as set for the gears
+COUPLING = 163_300.0  # N m/rad, of the direct drive in the plant
+STEP, SHORT = 2.5e-4, 5e-5  # s
+SPEED = 0.3  # rad/s of the joint under load
+
+
+class Driven(NamedTuple):
+    """One transmission: arm, effects, friction, and the step that the plant needs, s."""
+
+    arm: Arm
+    effects: Effects
+    friction: FrictionParameters
+    step: float
+
+    @property
+    def ratio(self) -> float:
+        """N."""
+        return 1.0 / self.arm.joint_from_motor[0]
+
+    @property
+    def stiffness(self) -> float:
+        """At the joint, N m/rad, as configured."""
+        return self.ratio**2 * self.arm.circuits[0].stiffness
+
+    def plant(self, rotor: float | None = None, world: World = EMPTY, dry: bool = False, play: bool = True) -> Plant:
+        """A plant without gravity, released.
+
+        Parameters
+        ----------
+        rotor : its inertia, kg m^2; None for that of the motor.
+        world : around it.
+        dry : whether rotor and joint have their static friction, also in motion; that by load is there in any case.
+        play : whether there is backlash.
+        """
+        motors, joints, none = self.arm.motors, self.arm.joints, (0.0,)
+        at_motor, at_joint = (part.static_friction if dry else none for part in (motors, joints))
+        inertia = (rotor or motors.inertia[0],)
+        arm = replace(
+            self.arm,
+            motors=replace(
+                motors, inertia=inertia, viscous_friction=none, static_friction=at_motor, dynamic_friction=at_motor
+            ),
+            joints=replace(
+                joints,
+                lower=(-1e3,),
+                upper=(1e3,),
+                viscous_friction=none,
+                static_friction=at_joint,
+                dynamic_friction=at_joint,
+            ),
+            cables=replace(self.arm.cables, damping=none),
+            gravity=(0.0, 0.0, 0.0),
+        )
+        backlash = self.effects.backlash if play else none
+        effects = replace(no_effects(arm), creep=self.effects.creep, backlash=backlash)
+        plant = Plant(arm, world, effects, self.step, self.friction)
+        plant.brake(False)
+        return plant
+
+
+def driven(kind: str) -> Driven:
+    """The transmission of a name in `KINDS`."""
+    configuration = Configuration.load(packaged("testbed"))
+    if KINDS[kind]:
+        given = yaml.safe_load(packaged(f"experiments/sets/{KINDS[kind]}").read_text(encoding="utf-8"))
+        configuration = configuration.with_values(given)
+    driver = configuration.node("driver", DriverParameters)
+    step = SHORT if kind == "direct drive" else STEP
+    return Driven(configuration.shared.arm, driver.effects, driver.friction, step)
+
+
+class TransmissionMeasures(NamedTuple):
+    """What is compared: at the joint, SI; the last two of the motor, over those with cables."""
+
+    stiffness: float
+    play: float  # rad
+    bandwidth: float  # Hz, at the spring of 10 lb/in
+    efficiency: float  # at peak torque
+    inertia: float  # backdriven, kg m^2
+    friction: float  # torque that backdrives it, N m
+    mass: float
+    heat: float
+
+
+ROWS = (
+    ("stiffness [N m/rad]", "{:.4g}"),
+    ("play [mrad]", "{:.3g}"),
+    ("force bandwidth on 10 lb/in [Hz]", "{:.4g}"),
+    ("efficiency at peak torque", "{:.3f}"),
+    ("backdriven inertia [kg m²]", "{:.4f}"),
+    ("torque that backdrives it [N m]", "{:.3f}"),
+    ("mass of the motor, over that with cables", "{:.3g}"),
+    ("heat at one torque, over that with cables", "{:.3g}"),
+)
+CONTACT = 1464.28  # N m/rad
+NEAR, FAR_OFF = 20.0, 40.0  # N m, two loads for stiffness and play
+
+
+def predicted(kind: str) -> TransmissionMeasures:
+    """By formulas of shaft, cable and gears."""
+    it = driven(kind)
+    motors, joints, cables = it.arm.motors, it.arm.joints, it.arm.cables
+    rotor = motors.inertia[0]
+    modulus, thickness, length = SHAFT
+    rigid = {
+        "cables": 14.0**2 * 2.0 * cables.stage_ea[0] / cables.stage_length[0] * cables.stage_radius[0] ** 2,
+        "shaft and gears": 14.0**2 * modulus * math.pi * thickness**4 / 32.0 / length,
+        "direct drive": COUPLING,
+    }[kind]
+    lower = float(force_resonances(rotor, link_inertia(it.arm), rigid / it.ratio**2, CONTACT, it.ratio).lower)
+    losses = {
+        "cables": stage_loss(
+            motors.peak_torque[0], cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio
+        ),
+        "shaft and gears": np.array([MESHES * LOSS]),
+        "direct drive": np.zeros(1),
+    }[kind]
+    factor = it.friction.joint_load_factor[0]
+    return TransmissionMeasures(
+        rigid,
+        0.1e-3 / 36.83e-3 if kind == "shaft and gears" else 0.0,
+        HZ * lower,
+        efficiency(losses),
+        link_inertia(it.arm) + it.ratio**2 * rotor,
+        joints.static_friction[0] + (1.0 + factor) * it.ratio * motors.static_friction[0],
+        rotor / driven("cables").arm.motors.inertia[0],
+        rotor / driven("cables").arm.motors.inertia[0],
+    )
+
+
+@cache
+def measured(kind: str) -> TransmissionMeasures:
+    """On the plant; mass and heat of the motor are not measured."""
+    it = driven(kind)
+    near, far = (_deflection(it, torque) for torque in (NEAR, FAR_OFF))
+    stiffness = (FAR_OFF - NEAR) / (far - near)
+    return TransmissionMeasures(
+        stiffness,
+        2.0 * (near - NEAR / stiffness),
+        HZ * bandwidth(it, CONTACT),
+        _efficiency(it),
+        _inertia(it),
+        _breakaway(it),
+        math.nan,
+        math.nan,
+    )
+
+
+def _deflection(it: Driven, torque: float) -> float:
+    """Of the link under a torque, rad, the motor held: the mean over a period of its undamped oscillation."""
+    plant = it._replace(friction=driven("cables").friction).plant(rotor=IMMOVABLE)
+    plant.data.qpos[1] = 0.5 * it.effects.play(0) / it.ratio  # the gap is closed at the start
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    period = 2.0 * math.pi * math.sqrt(link_inertia(it.arm) / it.stiffness)
+    angles = []
+    for _ in range(round(period / it.step)):
+        plant.step([0.0])
+        angles.append(plant.q[0])
+    return 0.5 * (max(angles) + min(angles))
+
+
+def bandwidth(it: Driven, contact: float) -> float:
+    """Lower frequency of the plant without play, rad/s, on a spring at the joint, N m/rad."""
+    smooth = it._replace(friction=driven("cables").friction)
+    angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(smooth.plant(world=against_spring(contact), play=False)))))
+    return float(np.sort(angles)[0]) / it.step
+
+
+def _efficiency(it: Driven) -> float:
+    """Work on the load over work of the motor at its peak torque, in slow motion."""
+    load = 14.0 * driven("cables").arm.motors.peak_torque[0]
+    plant = it.plant(rotor=IMMOVABLE)
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
+    carried = load / (1.0 - it.friction.joint_load_factor[0])
+    plant.data.qpos[1] = -(carried / it.stiffness + 0.5 * it.effects.play(0) / it.ratio)
+    plant.data.qvel[:] = (it.ratio * SPEED, SPEED)
+    count = round(1.0 / it.step)
+    for _ in range(count // 2):
+        plant.step([0.0])
+    begin, work = plant.q[0], 0.0
+    for _ in range(count):
+        before = plant.theta[0]
+        plant.step([0.0])
+        work += plant.circuit_torque[0] * (plant.theta[0] - before)
+    return load * (plant.q[0] - begin) / work
+
+
+def _inertia(it: Driven, torque: float = 5.0, seconds: float = 2.0) -> float:
+    """Torque on the link over its acceleration, kg m^2, without friction and play."""
+    plant = it._replace(friction=driven("cables").friction).plant(play=False)
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    for _ in range(round(seconds / it.step)):
+        plant.step([0.0])
+    return torque * seconds / (plant.thetad[0] / it.ratio)
+
+
+def _breakaway(it: Driven, rate: float = 0.2) -> float:
+    """Torque on the link at which the rotor begins to turn, N m, slowly increased."""
+    plant, torque = it.plant(dry=True, play=False), 0.0
+    while abs(plant.thetad[0]) < 1e-4 * it.ratio:
+        torque += rate * it.step
+        plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.step([0.0])
+    return torque
+
+
+def transmissions() -> Panels:
+    """Bandwidth over contact stiffness, and torque over deflection."""
+    contacts, some = np.geomspace(1e2, 1e6, 200), np.geomspace(2e2, 3e5, 6)
+    lines, springs = [], []
+    for kind in KINDS:
+        it, by = driven(kind), predicted(kind)
+        rotor = it.arm.motors.inertia[0]
+        lower = force_resonances(rotor, link_inertia(it.arm), by.stiffness / it.ratio**2, contacts, it.ratio).lower
+        points = np.array([bandwidth(it, k) for k in some])
+        lines.append((kind, Series(contacts, HZ * lower, some, HZ * points)))
+        torque, steps = np.linspace(0.0, 60.0, 100), np.array([10.0, 25.0, 40.0, 55.0])
+        angle = 1e3 * (torque / by.stiffness + 0.5 * by.play)
+        springs.append((kind, Series(torque, angle, steps, 1e3 * np.array([_deflection(it, t) for t in steps]))))
+    return (
+        ThesisPanel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "[Hz]", tuple(lines), "xy"),
+        ThesisPanel("b) motor held", "torque on the link [N m]", "deflection [mrad]", tuple(springs)),
+    )
+
+
+def table() -> str:
+    """Predicted and measured quantities of each transmission as Markdown."""
+    found = [(kind, predicted(kind), measured(kind)) for kind in KINDS]
+    head = ("at the joint", *(text for kind in KINDS for text in (f"{kind}, predicted", "plant")))
+    rows = []
+    for i, (name, form) in enumerate(ROWS):
+        scale = 1e3 if "mrad" in name else 1.0
+        values = [scale * value[i] for _, *pair in found for value in pair]
+        rows.append((name, *("" if math.isnan(value) else form.format(round(value, 6) + 0.0) for value in values)))
+    return markdown(head, rows)

@@ -1,0 +1,339 @@
+"""The tasks of the benchmark, each drawn from the seed and its number alone, and as configurations of the stack.
+
+Wider than the design: singular poses, surfaces a hundred times stiffer than the foam that the defaults are for,
+contacts anywhere on both links, and a true arm that differs from the configured one.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
+from wam_control.task.scenario import ScenarioStep
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import ForceCommand
+from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
+
+# model mismatch, uniform in +- this
+MASS, FRICTION, CABLES, TORQUE = 0.03, 0.2, 0.1, 0.03
+DOUBLED, APART, TRIES = 0.1, 0.1, 100  # share of tasks with a second force; m between them on a link; draws of it
+FORCES, STIFFNESSES = (1.0, 40.0), (400.0, 4e5)  # N and N/m, uniform in the logarithm
+FRICTIONS, STEEPEST = (0.0, 0.8), math.radians(75.0)  # of the surface; lean of a plane from the side of the link
+MARGIN = 0.1  # rad, of a start from the ends of the joints
+NEAR = 0.3  # rad, of a singular pose
+RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
+POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
+ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
+LOADED, PAYLOADS = 0.05, (0.05, 2.0)  # share of arms with a payload that is not declared, kg, uniform in the logarithm
+OTHERWISE, ASYMMETRY = 0.05, 0.15  # share of arms with another law of friction, and with more of it in one direction
+MOVING, ALONG = 0.15, 0.5  # share of surfaces that move, and of these along the force, else across it
+SPEEDS, FREQUENCIES, FARTHEST = (0.002, 0.05), (0.1, 1.0), 0.02  # m/s and Hz, uniform in the logarithm; m
+LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
+RAMP_STEP = 0.02  # s
+DITHER_CYCLE = 40  # inner periods: 25 Hz
+RELEASE = 0.5  # s, until the force is commanded
+SECONDS = 4.0  # s of the whole force
+FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
+AT_REST = 1.5  # s of the whole force, until a surface moves
+STEPPED, DOWN, CHANGES, FIRST_HELD = 0.1, 0.7, (2.0, 4.0), 2.5  # share; of these down; factor; s of the first force
+LONG, LONGER, SMALL_FORCES, SOFT = 0.1, 5.0, (1.0, 3.0), 4e3  # share; of `SECONDS`; N; N/m, of the surface at most
+
+
+class TaskConditions(NamedTuple):
+    """How the force is measured and commanded, and how the true arm differs from the configured one.
+
+    Attributes
+    ----------
+    is_dithered : feedback from the motors with dither, else from the joint sensors.
+    is_pinned : whether the contact position is configured, else estimated.
+    is_tared : whether the external torques are tared before the force is commanded.
+    ramp : time in which the commanded force rises, s.
+    mass, motor_friction, joint_friction, cables, torque_constant : factors of the true arm; () for none.
+    payload : mass at the tool that nobody declares, kg.
+    asymmetry : of all friction, which then falls with the speed as Stribeck's, too; 0 for friction as configured.
+    """
+
+    is_dithered: bool
+    is_pinned: bool
+    is_tared: bool
+    ramp: float
+    mass: tuple[float, ...] = ()
+    motor_friction: tuple[float, ...] = ()
+    joint_friction: tuple[float, ...] = ()
+    cables: tuple[float, ...] = ()
+    torque_constant: tuple[float, ...] = ()
+    payload: float = 0.0
+    asymmetry: float = 0.0
+
+
+NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp=0.0)
+
+
+class Task(NamedTuple):
+    """A force on a surface, and perhaps another one at the same time.
+
+    Attributes
+    ----------
+    q : joint angles at the start (n,), rad.
+    surface, force : what is pressed, and with how many N.
+    conditions : see there.
+    pose : its class.
+    second : another surface and its force, N.
+    before : force that is commanded at first, N; 0 for none, and then the command does not step.
+    longer : factor of the time for which the force is held.
+    """
+
+    q: tuple[float, ...]
+    surface: Surface
+    force: float
+    conditions: TaskConditions = NOMINAL
+    pose: str = "any"
+    second: tuple[Surface, float] | None = None
+    before: float = 0.0
+    longer: float = 1.0
+
+    @property
+    def forces(self) -> list[tuple[Surface, float]]:
+        """Each surface with its force, N."""
+        return [(self.surface, self.force), *([self.second] if self.second else [])]
+
+
+class ElbowJoint(NamedTuple):
+    """The joint between the first two covers: its index, and the angle at which they are in line, rad."""
+
+    joint: int
+    straight: float
+
+    @classmethod
+    def of(cls, body: RigidBody) -> "ElbowJoint":
+        """That of an arm, which has two covers or more."""
+        arm = body.arm
+        inner, outer = arm.covers.names[:2]
+        joint, zero = arm.links.names.index(arm.covers.links[1]), [0.0] * len(arm.joints.names)
+        pose = body.cover_pose(zero, outer)
+        axis = pose.rotation @ body.cover_jacobian(zero, outer)[3:, joint]
+        here, there = pose.rotation[:, 0], body.cover_pose(zero, inner).rotation[:, 0]
+        straight = math.atan2(float(axis @ np.cross(here, there)), float(here @ there))
+        exact = round(straight / RIGHT) * RIGHT
+        return cls(joint, exact if abs(exact - straight) < ROUNDING else straight)
+
+    def pose(self, q: Sequence[float]) -> str:
+        """The class of a pose, one of `POSES`; the shoulder's second joint is two before the elbow."""
+        bend = abs(q[self.joint] - self.straight)
+        if bend < NEAR:
+            return "elbow nearly straight"
+        if abs(q[self.joint - 2]) < NEAR:
+            return "theta2 near 0"
+        return "elbow near 90 deg" if abs(bend - RIGHT) < NEAR else "any"
+
+
+def draw(arm: Arm, seed: int, number: int) -> Task:
+    """The task of a number: it depends on the seed and the number alone."""
+    random = np.random.Generator(np.random.PCG64((seed, number)))
+    body = RigidBody(arm)
+    conditions = _with_unknowns(_conditions(arm, random), np.random.Generator(np.random.PCG64((seed, number, 2))))
+    force = _log_uniform(random, *FORCES)
+    elbow = ElbowJoint.of(body)
+    q = _pose(arm, elbow, random)
+    surface = _surface(body, q, random)
+    while not is_clear(body, q, surface):
+        q = _pose(arm, elbow, random)
+        surface = _surface(body, q, random)
+    task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
+    if random.random() < DOUBLED:
+        return _doubled(body, task, random)
+    return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
+
+
+def _in_time(task: Task, random: np.random.Generator) -> Task:
+    """The task as it is, with a step of the command, or with a small force that is held for long.
+
+    From the motors most small forces on hard surfaces or at estimated positions are refused.
+    """
+    share = random.random()
+    if share < STEPPED:
+        change = _log_uniform(random, *CHANGES)
+        first = task.force * (change if random.random() < DOWN else 1.0 / change)
+        return task._replace(before=min(max(first, FORCES[0]), FORCES[1]))
+    if share < STEPPED + LONG:
+        surface = task.surface._replace(stiffness=_log_uniform(random, STIFFNESSES[0], SOFT))
+        conditions = task.conditions._replace(is_pinned=True)
+        small = _log_uniform(random, *SMALL_FORCES)
+        return task._replace(surface=surface, force=small, conditions=conditions, longer=LONGER)
+    return task
+
+
+def _with_unknowns(conditions: TaskConditions, random: np.random.Generator) -> TaskConditions:
+    """The conditions, with a payload or a law of friction of which the controllers know nothing in some of them."""
+    share = random.random()
+    if share < LOADED:
+        return conditions._replace(payload=_log_uniform(random, *PAYLOADS))
+    if share < LOADED + OTHERWISE:
+        return conditions._replace(asymmetry=float(random.uniform(-ASYMMETRY, ASYMMETRY)))
+    return conditions
+
+
+def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
+    def factors(width: float, count: int) -> tuple[float, ...]:
+        return tuple((1.0 + width * random.uniform(-1.0, 1.0, count)).tolist())
+
+    motors, joints = len(arm.motors.names), len(arm.joints.names)
+    return TaskConditions(
+        is_dithered=bool(random.random() < DITHERED) or not arm.joint_sensors,
+        is_pinned=bool(random.random() < PINNED),
+        is_tared=bool(random.random() < TARED),
+        ramp=float(random.uniform(0.0, LONGEST_RAMP)) if random.random() < RAMPED else 0.0,
+        mass=factors(MASS, len(arm.links.names)),
+        motor_friction=factors(FRICTION, motors),
+        joint_friction=factors(FRICTION, joints),
+        cables=factors(CABLES, motors),
+        torque_constant=factors(TORQUE, motors),
+    )
+
+
+def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[float, ...]:
+    joints = arm.joints
+    ends = zip(joints.lower, joints.upper, strict=True)
+    q = [float(random.uniform(low + MARGIN, high - MARGIN)) for low, high in ends]
+    kind, near = random.choice(list(POSES), p=list(POSES.values())), float(random.uniform(-NEAR, NEAR))
+    if kind == "elbow nearly straight":
+        q[elbow.joint] = elbow.straight + near
+    elif kind == "theta2 near 0":
+        q[elbow.joint - 2] = near
+    elif kind == "elbow near 90 deg":
+        right = (elbow.straight - RIGHT, elbow.straight + RIGHT)
+        middle = 0.5 * (joints.lower[elbow.joint] + joints.upper[elbow.joint])
+        q[elbow.joint] = min(right, key=lambda angle: abs(angle - middle)) + near
+    return tuple(q)
+
+
+def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -> Surface:
+    covers = body.arm.covers
+    share = random.random()
+    cover = covers.names[1 + int(share / ON_OUTER * (len(covers.names) - 1)) if share < ON_OUTER else 0]
+    length = covers.length_of(cover)
+    is_plane = cover == covers.names[-1] and bool(random.random() < AT_A_PLANE)
+    lean = float(random.uniform(0.0, STEEPEST)) if is_plane else 0.0
+    place = length if is_plane else float(random.uniform(0.1 * length, 0.97 * length))
+    about = float(random.uniform(-math.pi, math.pi))
+    local = np.array([math.sin(lean), math.cos(lean) * math.cos(about), math.cos(lean) * math.sin(about)])
+    stiffness = _log_uniform(random, *STIFFNESSES)
+    direction = triple(body.cover_pose(q, cover).rotation @ local)
+    return Surface(cover, place, direction, stiffness, float(random.uniform(*FRICTIONS)), is_plane)
+
+
+def _moving(surface: Surface, conditions: TaskConditions, random: np.random.Generator) -> Surface:
+    """The surface at rest, or with a motion along the force or across it."""
+    if random.random() >= MOVING:
+        return surface
+    along, about = np.array(surface.direction), random.normal(size=3)
+    if random.random() >= ALONG:
+        along = np.cross(along, about) / np.linalg.norm(np.cross(along, about))
+    speed, frequency = _log_uniform(random, *SPEEDS), _log_uniform(random, *FREQUENCIES)
+    amplitude = min(speed / (2.0 * math.pi * frequency), FARTHEST)
+    begin = RELEASE + conditions.ramp + AT_REST
+    return surface._replace(motion=triple(amplitude * along), frequency=frequency, begin=begin)
+
+
+def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
+    """The task with a second force elsewhere on a surface of its own, both at known positions, where it fits."""
+    conditions = task.conditions._replace(is_pinned=True)
+    for _ in range(TRIES):
+        found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
+        is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > APART
+        if is_apart and is_clear(body, task.q, found):
+            return task._replace(second=(found, _log_uniform(random, *FORCES)), conditions=conditions)
+    return task
+
+
+def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    return math.exp(random.uniform(math.log(low), math.log(high)))
+
+
+def configured(base: Configuration, task: Task) -> Configuration:
+    """The configuration of a task: its surface in the world, what a user declares of it, the true arm."""
+    return base.with_values(task_values(base, task))
+
+
+def task_values(base: Configuration, task: Task) -> dict[str, Any]:
+    """What `configured` sets, by parameter."""
+    surface, conditions = task.surface, task.conditions
+    n = len(task.q)
+    values: dict[str, Any] = {
+        "arm.joints.start": list(task.q),
+        "force_loop:guard.contact_stiffness": surface.stiffness,
+        "force_loop:guard.posture": list(task.q),
+        "force_loop:contact_source": "pinned" if conditions.is_pinned else "estimated",
+        "contact_estimator:observer.mass_scale": [1.0] * n,
+        "contact_estimator:observer.friction_scale": 1.0,
+        **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
+        **{f"driver:mismatch.{name}": list(factors) for name, factors in _mismatch(conditions).items() if factors},
+    }
+    if conditions.payload:
+        values["driver:mismatch.payload"] = conditions.payload
+    if conditions.asymmetry:
+        values |= {f"driver:friction.{one}_asymmetry": [conditions.asymmetry] for one in ("motor", "joint")}
+        values["driver:friction.law"] = "stribeck"
+    if conditions.is_pinned:
+        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.position}
+    if surface.frequency:
+        along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
+        values |= {
+            "force_loop:sensing.friction": FULL_FRICTION,
+            "force_loop:limits.surface_speed": surface.speed,
+            "force_loop:limits.slide_speed": surface.slide_speed,
+            "force_loop:contact_position_sd": surface.slide(along),
+        }
+    if conditions.is_dithered:
+        values |= {
+            "arm.joint_sensors": False,
+            "contact_estimator:use_joint_sensors": False,
+            "force_loop:feedback": "contact_estimate",
+            "timing.dither_cycle": DITHER_CYCLE,
+        }
+    return values
+
+
+def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
+    return {
+        "mass": conditions.mass,
+        "motor_friction": conditions.motor_friction,
+        "joint_friction": conditions.joint_friction,
+        "stiffness": conditions.cables,
+        "torque_constant": conditions.torque_constant,
+    }
+
+
+def steps(task: Task, seconds: float) -> list[ScenarioStep]:
+    """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
+    count = round(task.conditions.ramp / RAMP_STEP)
+    rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
+    before = task.before / task.force if task.before else 1.0
+    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, before * fraction)) for fraction in rising]
+    return [
+        ScenarioStep("release", RELEASE, request="enable"),
+        *ramp,
+        *([ScenarioStep("press first", FIRST_HELD, **_command(task, before))] if task.before else []),
+        ScenarioStep("press", task.longer * seconds, **_command(task, 1.0)),
+    ]
+
+
+def _command(task: Task, fraction: float) -> dict[str, Any]:
+    """What a step of the scenario commands: one force, or a task of two."""
+    if not task.second:
+        return {"force": ForceCommand("base", triple(fraction * task.force * np.array(task.surface.direction)))}
+    axes = [
+        TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.position, surface.direction, fraction * force)
+        for surface, force in task.forces
+    ]
+    return {"task": TaskCommand("base", tuple(axes))}
+
+
+def triple(values: Any) -> Triple:
+    """Three numbers of an array (3,)."""
+    x, y, z = values.tolist()
+    return x, y, z

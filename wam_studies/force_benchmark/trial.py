@@ -1,0 +1,169 @@
+"""One task in simulation, without ROS."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.force_loop import ForceLoop
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.mismatch import true_arm
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import DriverParameters
+from wam_sim.simulation import Simulation
+from wam_studies.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
+from wam_studies.force_benchmark.surfaces import NAMES
+from wam_studies.force_benchmark.tasks import RELEASE, SECONDS, Task, configured, steps
+
+Array = NDArray[np.float64]
+STOPPED = 1.0  # s, after which a task that is held or in fault is over
+
+
+class _Standing(NamedTuple):
+    """What driver and loop report in a period: as in `TaskTrace`."""
+
+    reason: str
+    is_stopped: bool
+    is_fault: bool
+    predicted_cycle: float
+
+
+def perform(
+    base: Configuration, task: Task, seconds: float = SECONDS, changes: Mapping[str, Any] | None = None
+) -> TaskResult:
+    """Do a task in simulation and evaluate it by the simulator's force.
+
+    Parameters
+    ----------
+    base : configuration under test.
+    task : what to do.
+    seconds : of the whole force.
+    changes : values that override the configuration of the task.
+    """
+    try:
+        configuration = with_accepted_gain(configured(base, task).with_values(changes or {}))
+        run = Simulation(configuration, steps(task, seconds))
+    except ValueError as error:
+        return refused(task, str(error))
+    traces = TaskWatch(configuration, task, run).traces()
+    return worst(
+        [evaluated(task._replace(force=force), trace) for (_, force), trace in zip(task.forces, traces, strict=True)]
+    )
+
+
+def with_accepted_gain(configuration: Configuration) -> Configuration:
+    """With the largest force gain that the guard accepts, at most the configured one: what its refusal advises."""
+    shared = configuration.shared
+    warned = configuration.with_values({"force_loop:guard.mode": "warn"})
+    own = warned.node("force_loop", ForceLoopParameters)
+    found = ForceLoop(shared.arm, shared.servo, own, shared.timing).assessment
+    if found is None or not found.reason:
+        return configuration
+    fraction = 0.99 * found.scale * own.guard.stability_fraction
+    return configuration.with_values({"force_loop:force_gain": [fraction * gain for gain in own.force_gain]})
+
+
+class TaskWatch:
+    """Plays a task and watches the true arm.
+
+    Parameters
+    ----------
+    configuration : of the task.
+    task : what is done.
+    run : its simulation, at the start.
+    """
+
+    def __init__(self, configuration: Configuration, task: Task, run: Simulation) -> None:
+        self._task, self._run = task, run
+        self._timing = configuration.shared.timing
+        driver = configuration.node("driver", DriverParameters)
+        self._arm = true_arm(configuration.shared.arm, driver.mismatch)
+        self._body = RigidBody(self._arm)
+        self._directions = [np.array(surface.direction) for surface, _ in task.forces]
+        self._surfaces = {run.driver.plant.model.geom(name).id: i for i, name in enumerate(NAMES[: len(task.forces)])}
+        self._node = run.nodes["force_loop"]
+        self._wrench = np.zeros(6)
+        self._gain = configuration.node("force_loop", ForceLoopParameters).force_gain[0]
+
+    def traces(self) -> list[TaskTrace]:
+        """Play the task to its end, or until it has been stopped for `STOPPED`; what was seen of each force."""
+        run, plant, period = self._run, self._run.driver.plant, self._timing.period
+        for _ in range(round(RELEASE / period)):
+            run.step()
+        if self._task.conditions.is_tared:
+            self._node.tare()
+        start, travel = self._along(plant.q), np.zeros(len(self._directions))
+        forces, impact, stopped, velocity = [], 0.0, 0.0, plant.qd
+        standing = self._standing  # with the scenario the command ends, and what was reported of it
+        while stopped < STOPPED and not run.step():
+            force = self._force()
+            if any(force) and not impact:
+                impact = self._impact(plant.q, velocity)
+            velocity = plant.qd
+            if run.driver.is_outer:
+                travel = np.maximum(travel, np.abs(self._along(plant.q) - start))
+            forces.append(force)
+            standing = self._standing
+            stopped = stopped + period if standing.is_stopped else 0.0
+        return [
+            TaskTrace(
+                forces=np.array(column),
+                period=period,
+                travel=float(way),
+                impact=impact,
+                reason=standing.reason,
+                is_stopped=standing.is_stopped,
+                is_fault=standing.is_fault,
+                predicted_cycle=standing.predicted_cycle,
+                gain=self._gain,
+            )
+            for column, way in zip(zip(*forces, strict=True), travel, strict=True)
+        ]
+
+    @property
+    def _standing(self) -> _Standing:
+        fault, node = self._run.driver.safety.fault, self._node
+        return _Standing(
+            fault or node.refusals.get("force_command", "") or node.refusals.get("task_command", "") or node.reason,
+            bool(fault) or node.force_reaction.holds,
+            bool(fault),
+            float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
+        )
+
+    def _along(self, q: list[float]) -> Array:
+        """Position of each touched point along its force, m."""
+        found = []
+        for (surface, _), direction in zip(self._task.forces, self._directions, strict=True):
+            point = (surface.position, *self._arm.covers.aside(surface.cover, surface.position))
+            found.append(float(direction @ self._body.point(q, surface.cover, point)))
+        return np.array(found)
+
+    def _force(self) -> list[float]:
+        """Force of the arm on each surface along the commanded direction, N, over all covers."""
+        model, data = self._run.driver.plant.model, self._run.driver.plant.data
+        total = [0.0] * len(self._directions)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, self._wrench)
+            first, second = data.contact.geom[i].tolist()
+            k = self._surfaces[first if first in self._surfaces else second]
+            on_second = float(self._directions[k] @ data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3])
+            total[k] += -on_second if first in self._surfaces else on_second
+        return total
+
+    def _impact(self, q: list[float], qd: list[float]) -> float:
+        """Largest force of the first touch by (3.1), N: all kinetic energy goes into the surface."""
+        speed = np.array(qd)
+        energy = float(speed @ inertia(self._arm, self._body, q) @ speed)
+        return math.sqrt(energy * self._task.surface.stiffness)
+
+
+def inertia(arm: Arm, body: RigidBody, q: list[float]) -> Array:
+    """Inertia at the joints, (n, n), kg m^2: links, pulleys, and rotors as if the cables were stiff."""
+    rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
+    return body.mass_matrix(q) + np.diag(arm.joints.armature) + rotors

@@ -1,0 +1,150 @@
+"""Plants that differ from the model, and what an identification has to find of them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.parameters import shared_joints
+from wam_description.configuration import Configuration
+from wam_description.mismatch import true_arm
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import DriverParameters
+from wam_studies.identification.signals import EXACT, MeasuredSignals
+
+Array = NDArray[np.float64]
+
+KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors", "all, real signals")
+FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
+STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
+ASYMMETRY = 0.15
+LOAD = 0.06
+MASS = 0.03
+PRESLIDING = (4.0, 500.0)  # N m/rad, of motors and joints: a shape that the regression does not have
+COUNTS = 16384  # of the encoder per turn
+CURRENT_NOISE = 0.02  # A
+OFFSET = 0.004  # N m, largest of a motor's torque
+TORQUE_CONSTANT = 0.02
+COGGING, RIPPLE = 0.003, 0.02  # N m; per torque
+CENTRE = 0.003  # m, of the model's centres of mass
+SIGNALS = MeasuredSignals(noise=0.005, delay=1, dropped=0.02)
+
+
+class TrueFriction(NamedTuple):
+    """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
+
+    coulomb: Array  # without link load; less the torque offset of the motor in positive motion, N m
+    at_joint: Array  # friction of the joints among it, which the cables transmit, N m
+    drop: Array  # F_s - F_c, N m
+    load: Array
+    viscous: Array  # N m s/rad
+    stribeck_velocity: Array  # rad/s
+
+    def level(self, way: int, speed: float, load: Array, moves: NDArray[np.bool_]) -> Array:
+        """Mean friction of each motor, (n,), N m, in a direction at a speed, rad/s.
+
+        Parameters
+        ----------
+        way : 0 positive, 1 negative.
+        load : (k, n), transmitted torque apart from the friction of own joints, N m.
+        moves : (k, n), where a motor moves in this direction.
+        """
+        sign = 1.0 - 2.0 * way
+        transmitted = np.abs(load + sign * self.at_joint[way]) - self.at_joint[way]
+        mean = (transmitted * moves).sum(0) / moves.sum(0)
+        slow = np.exp(-((speed / self.stribeck_velocity) ** 2))
+        found: Array = self.coulomb[way] + self.drop[way] * slow + self.load[way] * mean + self.viscous * speed
+        return found
+
+
+def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
+    """A plant of a kind, drawn from a seed; the controllers' model stays as it is."""
+    n = len(configuration.shared.arm.motors.names)
+    random = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
+    values: dict[str, Any] = {
+        "arm.joint_sensors": False,  # not used here
+        "driver:mismatch.motor_friction": random.uniform(*FACTOR, n).tolist(),
+        "driver:mismatch.joint_friction": random.uniform(*FACTOR, n).tolist(),
+    }
+    every = kind.startswith("all")
+    if every or kind == "Stribeck":
+        values["driver:friction.law"] = "stribeck"
+        values["driver:friction.motor_stribeck_velocity"] = random.uniform(*STRIBECK, n).tolist()
+    if every or kind == "asymmetry":
+        values["driver:friction.motor_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
+        values["driver:friction.joint_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
+    if every or kind == "load":
+        values["driver:friction.motor_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
+        values["driver:friction.joint_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
+    if every:
+        values["driver:mismatch.mass"] = random.uniform(1.0 - MASS, 1.0 + MASS, n).tolist()
+    if kind == "all, presliding":
+        stiffness = zip(("motor", "joint"), PRESLIDING, strict=True)
+        values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
+    if kind in ("all, real sensors", "all, real signals"):
+        values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
+        values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
+        values["driver:amplifier.torque_offset"] = random.uniform(-OFFSET, OFFSET, n).tolist()
+    if kind == "all, real signals":
+        centre = np.array(configuration.shared.model.links.centre)
+        values |= {
+            "driver:mismatch.torque_constant": random.uniform(1.0 - TORQUE_CONSTANT, 1.0 + TORQUE_CONSTANT, n).tolist(),
+            "driver:amplifier.torque_ripple": [RIPPLE] * n,
+            "driver:effects.ripples.amplitude": [COGGING] * n,
+            "driver:effects.ripples.phase": random.uniform(-np.pi, np.pi, n).tolist(),
+            "model.links.centre": (centre + random.uniform(-CENTRE, CENTRE, len(centre))).tolist(),
+        }
+    return configuration.with_values(values)
+
+
+def measured_signals(kind: str) -> MeasuredSignals:
+    """How the torques of a kind of plant are measured."""
+    return SIGNALS if kind == "all, real signals" else EXACT
+
+
+def true_friction(configuration: Configuration) -> TrueFriction:
+    """What the motors of a plant resist with, as far as their reported torques show it."""
+    driver = configuration.node("driver", DriverParameters)
+    shared, law = configuration.shared, driver.friction
+    arm = true_arm(shared.arm, driver.mismatch)
+    matrix = TransmissionMap.of(arm).joint_from_motor
+    n = len(matrix)
+    own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
+    lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
+    load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
+    motors, offset = driver.effects.dry(arm), np.array(driver.amplifier.torque_offset)
+    coulomb, joint_coulomb = np.array(motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
+    drop = np.subtract(motors.static_friction, coulomb) * (law.law == "stribeck")
+    # alike in both directions; ripples average out in motion
+    by_tension = np.subtract(driver.effects.smooth(arm).dynamic_friction, coulomb)
+    signs = np.array([1.0, -1.0])[:, None]
+    # of an asymmetric joint: a torque that does not change with its direction, in each direction of the motor
+    constant = matrix.T @ (joint_lean * joint_coulomb)
+    at_joint = own.T @ joint_coulomb + signs * ((own.T * np.sign(matrix.T)) @ (joint_lean * joint_coulomb))
+    factor = load * (1.0 + signs * lean) + (own.T > 0.0) @ joint_load
+    factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
+    # torques are reported with the torque constants as configured
+    scale = 1.0 / np.array(driver.mismatch.torque_constant)
+    found = TrueFriction(
+        # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
+        coulomb * (1.0 + signs * lean)
+        + by_tension
+        + own.T @ joint_coulomb
+        + signs * (constant - offset)
+        + factor * at_joint,
+        at_joint,
+        drop * (1.0 + signs * lean),
+        factor,
+        np.array(arm.motors.viscous_friction) + (own**2).T @ arm.joints.viscous_friction,
+        _each(law.motor_stribeck_velocity, n),
+    )
+    return found._replace(
+        coulomb=scale * found.coulomb,
+        at_joint=scale * found.at_joint,
+        drop=scale * found.drop,
+        viscous=scale * found.viscous,
+    )
+
+
+def _each(values: tuple[float, ...], n: int) -> Array:
+    return np.array(values * n if len(values) == 1 else values)

@@ -1,0 +1,419 @@
+"""Curves of the plant's effects, measured on the simulated plant and computed from theory.
+
+One link on one motor, the testbed of section 5.6 with one effect at a time.  A motor that must turn at a given speed
+has a rotor of practically infinite inertia.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.measures.limit_cycle import mean_cycle
+from wam_description.effects import Ripples
+from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_driver.plant import Plant
+from wam_studies.plant.force_response import force_step
+from wam_studies.plant.ideal_testbed import (
+    IMMOVABLE,
+    LEVER,
+    NOTHING,
+    STEP,
+    against_spring,
+    ideal_testbed,
+    link_inertia,
+    one_step_map,
+    released_plant,
+)
+from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
+from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
+from wam_theory.resonance import force_resonances
+from wam_theory.stick_slip import IntegralLoop, simulate
+from wam_theory.tension_element import coulomb_like_torque
+
+Numbers = NDArray[np.float64]
+CRITICAL = 0.8  # part of the stiffness at which the torque loop is marginal
+TURNS, FINE = 40, 1000  # cycles of the torque loop, and steps of each, so that it has practically no delay
+
+
+class PlantCurve(NamedTuple):
+    """Plant and theory over x."""
+
+    x: Numbers
+    plant: Numbers
+    theory: Numbers
+
+    @property
+    def error(self) -> float:
+        """Greatest difference over the greatest theoretical value."""
+        return float(np.abs(self.plant - self.theory).max() / np.abs(self.theory).max())
+
+
+class Resonance(NamedTuple):
+    """Both resonances over contact stiffness, for one transmission ratio, rad/s."""
+
+    ratio: float
+    lower: PlantCurve
+    upper: PlantCurve
+
+
+def _run(plant: Plant, seconds: float) -> None:
+    for _ in range(round(seconds / STEP)):
+        plant.step([0.0])
+
+
+def slack() -> PlantCurve:
+    """Torque of a circuit over its stretch, beyond the slack of the loose strand."""
+    arm = ideal_testbed()
+    plant = released_plant(arm, slack=True)
+    (circuit,) = arm.circuits
+    stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
+    torques = []
+    for value in stretch:
+        plant.data.qpos[:] = (value, 0.0)
+        mujoco.mj_forward(plant.model, plant.data)
+        torques.append(plant.circuit_torque[0])
+    theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
+    return PlantCurve(stretch, np.array(torques), theory)
+
+
+def backlash(play: float = 0.04) -> PlantCurve:
+    """Torque of a circuit with backlash over its stretch, rad and N m."""
+    arm = ideal_testbed()
+    plant = released_plant(arm, backlash=(play,))
+    stretch = np.linspace(-2.5, 2.5, 101) * play
+    torques = []
+    for value in stretch:
+        plant.data.qpos[:] = (value, 0.0)
+        mujoco.mj_forward(plant.model, plant.data)
+        torques.append(plant.circuit_torque[0])
+    return PlantCurve(stretch, np.array(torques), play_torque(stretch, arm.circuits[0].stiffness, play))
+
+
+def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> PlantCurve:
+    """Creep of the link while the motor turns out and back under a constant load.
+
+    Parameters
+    ----------
+    torque : load at the joint, N m.
+    speed : of the motor, rad/s.
+    seconds : in each direction.
+
+    Returns
+    -------
+    PlantCurve
+        over the motor's absolute travel, rad; angles at the joint, rad.
+    """
+    plant = _loaded(torque)
+    arm = ideal_testbed()
+    rest = plant.q[0] - plant.theta[0] / 14.0
+    travel, crept = [], []
+    done = 0.0
+    for direction in (1.0, -1.0):
+        plant.data.qvel[:] = (direction * speed, direction * speed / 14.0)
+        for _ in range(round(seconds / STEP / 40)):
+            before = plant.theta[0]
+            _run(plant, 40 * STEP)
+            done += abs(plant.theta[0] - before)
+            travel.append(done)
+            crept.append(plant.q[0] - plant.theta[0] / 14.0 - rest)
+    at_motor = torque / 14.0
+    stages = zip(arm.cables.stage_ratio, arm.cables.stage_radius, arm.cables.stage_ea, strict=True)
+    expected = sum(n * creep(np.array(travel) / n, n * at_motor, r, ea) for n, r, ea in stages)
+    return PlantCurve(np.array(travel), np.array(crept), np.asarray(expected) / 14.0)
+
+
+def _loaded(torque: float) -> Plant:
+    """The testbed at rest under a load at the joint, N m, with creep, its rotor immovable."""
+    arm = ideal_testbed(rotor=IMMOVABLE, damping=0.02)
+    plant = released_plant(arm, creep=True)
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.data.qpos[0] = -torque / 14.0 / arm.circuits[0].stiffness
+    _run(plant, 0.1)
+    return plant
+
+
+def efficiency_under_load() -> PlantCurve:
+    """Power out over power in of slow turning under load, over the motor's torque, N m."""
+    torques = np.linspace(1.0, 6.779, 6)
+    efficiencies = []
+    for torque in torques:
+        plant = _loaded(-14.0 * torque)
+        plant.data.qvel[:] = (5.0, 5.0 / 14.0)
+        _run(plant, 1.5)
+        q, work = plant.q[0], 0.0
+        for _ in range(round(1.0 / STEP)):
+            before = plant.theta[0]
+            plant.step([0.0])
+            work += plant.circuit_torque[0] * (plant.theta[0] - before)
+        efficiencies.append(14.0 * torque * (plant.q[0] - q) / work)
+    cables = ideal_testbed().cables
+    theory = [
+        efficiency(stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
+        for torque in torques
+    ]
+    return PlantCurve(torques, np.array(efficiencies), np.array(theory))
+
+
+def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
+    """Torque of the cables on a link that turns at a speed, and power lost over the speed of the motor, N m.
+
+    Parameters
+    ----------
+    torque : of the motor, N m, against the link's motion for a positive speed.
+    speed : of the link, rad/s, which its inertia keeps.
+    """
+    arm = ideal_testbed(damping=0.02)
+    arm = replace(arm, joints=replace(arm.joints, armature=(IMMOVABLE,)))
+    plant = released_plant(arm, creep=True)
+    plant.data.qpos[0] = torque / arm.circuits[0].stiffness
+    plant.data.qvel[:] = (14.0 * speed, speed)
+    for _ in range(round(0.3 / STEP)):
+        plant.step([torque])
+    theta, q, count = plant.theta[0], plant.q[0], round(0.5 / STEP)
+    for _ in range(count):
+        plant.step([torque])
+    travel = plant.theta[0] - theta
+    return plant.cable_torque[0], torque * (travel - 14.0 * (plant.q[0] - q)) / abs(travel)
+
+
+def coulomb_like() -> PlantCurve:
+    """Loss under torque control as a friction torque at the motor, over its torque, N m: (6.22) of all pulleys."""
+    torques = np.linspace(1.0, 6.0, 6)
+    found = [torque_controlled(torque, 0.5)[1] for torque in torques.tolist()]
+    cables = ideal_testbed().cables
+    stages = list(zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, strict=True))
+    theory = sum(2.0 * coulomb_like_torque(n * torques, r, ea) / n for n, r, ea in stages)
+    return PlantCurve(torques, np.array(found), np.asarray(theory))
+
+
+def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
+    """Torque of an eccentric pulley at a third of the motor's speed, over the motor's angle, rad."""
+    arm = ideal_testbed(rotor=IMMOVABLE)
+    (circuit,) = arm.circuits
+    amplitude = 2.0 * eccentricity * circuit.pretension
+    ripples = Ripples(("motor1",), (1.0 / 3.0,), (amplitude,), (1,), (0.5,))
+    plant = released_plant(arm, ripples=ripples)
+    angles, torques = [], []
+    plant.data.qvel[:] = (20.0, 20.0 / 14.0)
+    for _ in range(round(2.0 / STEP)):
+        angles.append(plant.theta[0])
+        plant.step([0.0])
+        torques.append(3.0 * plant.data.qfrc_actuator[0])
+    angle = np.array(angles)
+    return PlantCurve(angle, np.array(torques), eccentric_ripple(eccentricity, circuit.pretension, angle / 3.0 + 0.5))
+
+
+def resonances(ratio: float, stiffness: Numbers) -> Resonance:
+    """Both resonances of (4.4) from the plant's own one-step map, over k_c at the joint, N m/rad."""
+    arm = ideal_testbed(ratio)
+    (circuit,) = arm.circuits
+    found = []
+    for k in stiffness:
+        angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, against_spring(k))))))
+        found.append(np.sort(angles)[[0, 2]] / STEP)
+    inertia = float(arm.motors.inertia[0]), link_inertia(arm)
+    theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)
+    lower, upper = np.array(found).T
+    return Resonance(ratio, PlantCurve(stiffness, lower, theory.lower), PlantCurve(stiffness, upper, theory.upper))
+
+
+def surface(hardening: float) -> PlantCurve:
+    """Force of a surface of 4000 N/m over the depth of the tip in it, m, force in N."""
+    depths = np.linspace(1e-4, 0.01, 25)
+    below = 0.01  # m below the link, which then touches with its tip only
+    position = (0.0, 0.0, -0.0254 - below)
+    floor = Obstacles(
+        ("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,)
+    )
+    plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS))
+    forces = []
+    for depth in depths:
+        q = -np.arcsin((depth + below) / LEVER)
+        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), 0.0
+        plant.step([0.0])
+        (load,) = plant.loads()
+        forces.append(float(np.linalg.norm(load.force)))
+    return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+
+
+class ResponseComparison(NamedTuple):
+    """Step response of integral force control over time: force F_c and motor position, plant and exact."""
+
+    force: PlantCurve
+    motor: PlantCurve
+
+
+def step_response(friction: tuple[float, float], damping: float, gain: float, seconds: float) -> ResponseComparison:
+    """Response of the testbed to a step of 20 N m, and the exact motion.
+
+    The motor is an ideal velocity source, the loop is closed in every step.
+
+    Parameters
+    ----------
+    friction : static and dynamic, at the joint, N m.
+    damping : b at the joint, N m s/rad.
+    gain : G_I, rad/s/(N m).
+    seconds : duration.
+    """
+    found = force_step(20.0, 1464.28, gain, damping, friction, seconds)
+    exact = simulate(found.node, IntegralLoop(gain=gain), 20.0, seconds).at(found.time)
+    return ResponseComparison(
+        PlantCurve(found.time, found.force, exact.contact_force), PlantCurve(found.time, found.motor, exact.x_m)
+    )
+
+
+def stiction_cycle() -> PlantCurve:
+    """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
+    return step_response((6.0, 4.0), damping=12.0, gain=2e-2, seconds=8.0).force
+
+
+def actuator_cycle() -> PlantCurve:
+    """Motor position of a force loop with Coulomb friction, (5.20), rad over s; domain I, above gamma_b."""
+    return step_response((6.0, 6.0), damping=18.7, gain=4.3e-2, seconds=6.0).motor
+
+
+def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
+    """Actuator cycle, peak to peak, over the play, both at the joint, rad: 2 F/k_tr of (5.20) and the play (2.2).
+
+    A desired force below the friction, so that the gear changes its flank; above it the play is without effect.
+
+    Parameters
+    ----------
+    desired : F_des, N m.
+    """
+    friction, play = 6.0, np.array([0.0, 2.5e-3, 5e-3, 1e-2])
+    found = [
+        force_step(desired, 1464.28, 4.3e-2, 18.7, (friction, friction), 4.0, backlash=value) for value in play.tolist()
+    ]
+    travel = np.array([np.ptp(response.motor[response.time > 0.15]) for response in found])
+    crossed = play if desired < friction else 0.0 * play
+    return PlantCurve(play, travel, 2.0 * friction / found[0].node.transmission_stiffness + crossed)
+
+
+def torque_loop(hertz: float, damping: float = 0.0) -> GearedTorqueLoop:
+    """A torque loop on the testbed's motor and shaft whose cycle by backlash has about this frequency (2.2).
+
+    The critical gain is 0.8, the integral a third of the frequency.
+
+    Parameters
+    ----------
+    hertz : of the cycle by the describing function.
+    damping : of a velocity feedback, part of that which ends the cycle.
+    """
+    arm = ideal_testbed()
+    stiffness, inertia, omega = arm.circuits[0].stiffness, arm.motors.inertia[0], 2.0 * np.pi * hertz
+    proportional = omega**2 * inertia / (CRITICAL * stiffness) - 1.0
+    needed = inertia * omega / 3.0
+    integral, derivative = omega / 3.0 * (1.0 + proportional), needed / (CRITICAL * stiffness)
+    return GearedTorqueLoop(stiffness, 0.01, inertia, damping * needed, proportional, integral, derivative)
+
+
+def torque_loop_response(hertz: float, damping: float = 0.0) -> tuple[Numbers, Numbers]:
+    """Times, s, and torque, N m, of the testbed's motor that runs into a flank, its link at rest.
+
+    Parameters
+    ----------
+    hertz, damping : of the loop as in `torque_loop`.
+    """
+    arm, loop, step = ideal_testbed(), torque_loop(hertz, damping), 1.0 / (FINE * hertz)
+    arm = replace(
+        arm,
+        motors=replace(arm.motors, viscous_friction=(loop.damping,)),
+        joints=replace(arm.joints, armature=(IMMOVABLE,)),
+    )
+    plant, torques, wound = released_plant(arm, step=step, backlash=(loop.play,)), [], 0.0
+    plant.data.qvel[0] = 2.0 * np.pi * hertz * loop.play
+    theta, rate = plant.data.qpos, plant.data.qvel  # the sensor reads the present torque, not that of the last step
+    for _ in range(TURNS * FINE):
+        angle = theta[0] - 14.0 * theta[1]
+        torque = loop.stiffness * float(np.sign(angle)) * max(abs(angle) - 0.5 * loop.play, 0.0)
+        wound += loop.integral * torque * step
+        slope = loop.stiffness * (rate[0] - 14.0 * rate[1]) if torque else 0.0
+        plant.step([-float(loop.proportional * torque + wound + loop.derivative * slope)])
+        torques.append(torque)
+    return step * np.arange(len(torques), dtype=np.float64), np.array(torques, dtype=np.float64)
+
+
+def backlash_in_a_torque_loop() -> PlantCurve:
+    """Frequency of the cycle that backlash causes in a torque loop, over that of the describing function, Hz (2.2).
+
+    The last two are those of Luh, Fisher and Paul on the first two joints of the Stanford arm.
+    """
+    wanted = np.array([60.0, 150.0, 334.0, 477.0])
+    found = [1.0 / mean_cycle(*torque_loop_response(hertz)).period for hertz in wanted.tolist()]
+    exact = [exact_cycle(torque_loop(hertz)).frequency / (2.0 * np.pi) for hertz in wanted.tolist()]
+    return PlantCurve(wanted, np.array(found), np.array(exact))
+
+
+def impact() -> PlantCurve:
+    """Greatest force of a link that runs into a spring at 0.5 rad/s, over its stiffness at the tip, N/m; (3.1).
+
+    F = v sqrt(J k); the cable is so long that the rotor has no effect.
+    """
+    stiffness = np.linspace(200.0, 2e4, 25)
+    arm = ideal_testbed()
+    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    inertia = link_inertia(arm)
+    found = []
+    for k in stiffness:
+        world = World(NOTHING, Springs(("joint1",), (float(k),), (LEVER,), (0.0,), (False,)))
+        plant = released_plant(arm, world)
+        plant.data.qvel[:] = (-7.0, -0.5)
+        greatest = 0.0
+        for _ in range(round(np.pi * np.sqrt(inertia / k) / LEVER / STEP)):
+            plant.step([0.0])
+            greatest = max(greatest, -float(k) * LEVER * plant.q[0])
+        found.append(greatest)
+    return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
+
+
+def pretension(coefficient: float = 1e-4) -> PlantCurve:
+    """Breakaway torque of the motor over the pretension, N m over N: what active pretension would lower, (6.5)."""
+    arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
+    tension = np.linspace(0.2, 1.0, 5) * arm.cables.pretension[0]
+    found = []
+    for value in tension.tolist():
+        less = replace(arm, cables=replace(arm.cables, pretension=(value,)))
+        plant = released_plant(less, tension_friction=(coefficient,))
+        found.append(breakaway(plant, False, 0.9 * coefficient * 2.0 * value))
+    return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)
+
+
+def breakaway(plant: Plant, at_joint: bool, start: float) -> float:
+    """Torque, N m, at which a shaft at rest starts to turn, increased by 1e-5 of itself in each step.
+
+    Parameters
+    ----------
+    plant : at rest.
+    at_joint : whether the joint is pushed, otherwise the motor gives the torque.
+    start : torque at the start, N m.
+    """
+    torque = start
+    while abs(plant.qd[0] if at_joint else plant.thetad[0]) < 1e-5:
+        torque *= 1.00001
+        if at_joint:
+            plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.step([0.0 if at_joint else torque])
+    return torque
+
+
+STUDIES: dict[str, Callable[[], PlantCurve]] = {
+    "slack": slack,
+    "backlash": backlash,
+    "creep": creep_out_and_back,
+    "efficiency": efficiency_under_load,
+    "torque control": coulomb_like,
+    "pretension": pretension,
+    "ripple": ripple,
+    "linear surface": lambda: surface(0.0),
+    "hardening surface": lambda: surface(50.0),
+    "impact": impact,
+    "actuator cycle": actuator_cycle,
+    "backlash in the loop": actuator_cycle_with_backlash,
+    "backlash in a torque loop": backlash_in_a_torque_loop,
+    "stiction cycle": stiction_cycle,
+}

@@ -1,0 +1,234 @@
+"""Each task's numbers: what was commanded or follows by hand, against the truth of the simulator."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from wam_studies.tasks.object_traces import ObjectTrace, object_traces, world_of
+from wam_studies.thesis.recording import Forces, Recording, Step
+from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+
+NO_CLAIM = math.nan
+STEADY = 0.8  # s at the end of a step, taken as its steady state
+FORCE = 0.1  # of the commanded force
+SLIPPED = 0.15  # the same where friction along the link moves the estimated position
+STILL = 1e-3  # m, that a body moves at rest
+MOVING = 1e-3  # m/s above which a body slides
+MOVED = 0.05  # m, of a body that was swept along
+TOGETHER = 0.5  # of the angle before
+CLOSED_FORM = 0.03  # of the torque on the door
+
+Runs = Mapping[str, Recording]
+
+
+def pushing(runs: Runs) -> Result:
+    """The task `push-box`: a force below the friction, then a push that moves the box."""
+    (run,) = runs.values()
+    box, bodies = object_traces(run)["box"], world_of(run).bodies
+    friction, weight = bodies.ground_friction[0], bodies.mass[0] * _gravity(run)
+    press, push = run.step("press 4 N"), run.step("push the box")
+    pressed, pushed = box.late(press, STEADY), box.during(push.begin, push.end)
+    slides = pushed.during(*_sliding(pushed))
+    along, lift = float(slides.arm_force[:, 0].mean()), float(slides.arm_force[:, 2].mean())
+    rows = [
+        Comparison("press 4 N, true force across", 4.0, _across(run, press), "N", SLIPPED, "commanded"),
+        Comparison("press 4 N, the box moves", 0.0, _moved(pressed), "m", STILL, "friction holds", True),
+        Comparison("horizontal force while it slides, mean", friction * (weight - lift), along, "N", FORCE, "mu N"),
+        Comparison("weight carried by the table", weight - lift, _mean_size(slides, 2), "N", 0.02, "m g - lift"),
+        Comparison("distance pushed", NO_CLAIM, _moved(pushed), "m", NO_CLAIM),
+        Comparison("aside of the push", 0.0, float(np.ptp(pushed.position[:, 1])), "m", 0.01, "straight", True),
+        *_estimate(run, push),
+    ]
+    return Result(rows, [_forces(run, press.begin, push.end), _path({"box": pushed}, 0)])
+
+
+def sweeping(runs: Runs) -> Result:
+    """The task `sweep-objects`: how close together the objects are, and what it takes."""
+    (run,) = runs.values()
+    objects, sweep, rest = object_traces(run), run.step("sweep"), run.step("rest")
+    swept = {name: trace.during(sweep.begin, rest.end) for name, trace in objects.items()}
+    before, after = (float(np.ptp(_angles(swept, at))) for at in (0, -1))
+    moved = sum(_moved(trace) > MOVED for trace in swept.values())
+    calm = max(float(np.linalg.norm(trace.velocity[-1])) for trace in swept.values())
+    rows = [
+        Comparison("objects that the link takes along", float(len(objects)), float(moved), "", 0.0, "all"),
+        Comparison("angle about the base over all objects, before", NO_CLAIM, before, "rad", NO_CLAIM),
+        Comparison("the same, after, of that before", 0.0, after / before, "", TOGETHER, "together", True),
+        Comparison("speed of the fastest, after", 0.0, calm, "m/s", 0.01, "at rest", True),
+        Comparison("largest true force of the arm", NO_CLAIM, _largest(swept), "N", NO_CLAIM),
+        *_estimate(run, sweep),
+    ]
+    return Result(rows, [_forces(run, sweep.begin, rest.end), _path(swept, 1)])
+
+
+def holding(runs: Runs) -> Result:
+    """The task `hold-tube`: the shelf is lowered, and friction carries the tube."""
+    (run,) = runs.values()
+    objects, bodies = object_traces(run), world_of(run).bodies
+    press = run.step("press 15 N")
+    tube, shelf = objects["tube"], objects["shelf"].late(press, STEADY)
+    held = tube.late(press, STEADY)
+    weight = bodies.mass[0] * _gravity(run)
+    squeeze, lift = -float(held.arm_force[:, 0].mean()), float(held.arm_force[:, 2].mean())
+    carried = float((held.arm_force + held.other_force)[:, 2].mean())
+    start, lowered = (objects[name].during(press.begin + 1.0, press.end) for name in ("tube", "shelf"))
+    capacity = squeeze * (bodies.friction[0] + bodies.ground_friction[0])
+    rows = [
+        Comparison("true force across the tube", 15.0, squeeze, "N", FORCE, "commanded"),
+        Comparison("weight carried by friction", weight, carried, "N", 0.02, "m g"),
+        Comparison("of it by the link", NO_CLAIM, lift, "N", NO_CLAIM),
+        Comparison("friction that is needed", NO_CLAIM, weight / capacity, "of what 15 N give", NO_CLAIM),
+        Comparison("shelf lowered by", NO_CLAIM, float(np.ptp(objects["shelf"].position[:, 2])), "m", NO_CLAIM),
+        Comparison("force of the shelf, after", 0.0, float(np.abs(shelf.other_force).max()), "N", 1e-6, "", True),
+        Comparison("the tube sinks", 0.0, float(np.ptp(start.position[:, 2])), "m", 2 * STILL, "friction holds", True),
+        *_estimate(run, press),
+    ]
+    return Result(rows, [_forces(run, press.begin, press.end), _path({"tube": start, "shelf": lowered}, 2)])
+
+
+def opening(runs: Runs) -> Result:
+    """The task `open-door`: torque of the arm on the door against the door's equation of motion."""
+    (run,) = runs.values()
+    door, step, hold = object_traces(run)["door"], run.step("open the door"), run.step("hold it open")
+    open_ = door.during(step.begin, step.end)
+    predicted, torque = _hinge_torque(run, open_), open_.arm_torque[:, 2]
+    turning = np.gradient(open_.angle, open_.time) > 0.02
+    mean = float(predicted[turning].mean())
+    error = float(np.sqrt(np.mean((torque - predicted)[turning] ** 2)))
+    held = door.late(hold, STEADY)
+    rows = [
+        Comparison("torque on the hinge while it turns, mean", mean, float(torque[turning].mean()), "N m", CLOSED_FORM,
+                   "I a + d w + k phi + friction"),
+        Comparison("the same, rms difference", 0.0, error, "N m", 0.05, "", True),
+        Comparison("angle of the door, held", NO_CLAIM, float(held.angle.mean()), "rad", NO_CLAIM),
+        Comparison("angle of the door, changes while held", 0.0, float(np.ptp(held.angle)), "rad", 0.01, "", True),
+        Comparison("largest true force of the arm", NO_CLAIM, _largest({"door": open_}), "N", NO_CLAIM),
+        *_estimate(run, step),
+    ]  # fmt: skip
+    curves = [
+        Curve("measured", "true", open_.time, torque),
+        Curve("predicted", "equation of motion", open_.time, predicted),
+    ]
+    panel = Panel("torque of the arm on the hinge", "time [s]", "torque [N m]", curves)
+    angle = Panel("door", "time [s]", "angle [rad]", [Curve("measured", "", door.time, door.angle)])
+    return Result(rows, [panel, angle])
+
+
+def following(runs: Runs) -> Result:
+    """The task `follow-surface`: 10 N on a surface that moves up and down."""
+    (run,) = runs.values()
+    press, follow = run.step("press 10 N"), run.step("follow the surface")
+    surface = object_traces(run)["foam_box"].during(follow.begin + 1.0, follow.end)
+    force = _along(run.forces("sim/contact/wrench"), follow.begin + 1.0, follow.end)
+    speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
+    rows = [
+        Comparison("at rest, true force across", 10.0, _across(run, press), "N", FORCE, "commanded"),
+        Comparison("moving, mean", 10.0, float(force.mean()), "N", FORCE, "commanded"),
+        Comparison("moving, rms error", 0.0, float(np.sqrt(np.mean((force - 10.0) ** 2))), "N", 1.0, "", True),
+        Comparison("moving, largest error", 0.0, float(np.abs(force - 10.0).max()), "N", 2.0, "", True),
+        Comparison("time without contact", 0.0, float(np.mean(force == 0.0)), "of the time", 0.0, "never", True),
+        Comparison("motion of the surface", NO_CLAIM, float(np.ptp(surface.position[:, 2])), "m", NO_CLAIM),
+        Comparison("largest speed of the surface", NO_CLAIM, speed, "m/s", NO_CLAIM),
+        *_estimate(run, follow),
+    ]
+    return Result(rows, [_forces(run, press.begin, follow.end), _path({"surface": surface}, 2)])
+
+
+def _gravity(run: Recording) -> float:
+    return -float(run.shared.arm.gravity[2])
+
+
+def _sliding(trace: ObjectTrace) -> tuple[float, float]:
+    """The middle half of the time in which a body slides along x, s."""
+    moving = trace.time[np.abs(trace.velocity[:, 0]) > MOVING]
+    if not len(moving):
+        return math.nan, math.nan
+    begin, end = float(moving[0]), float(moving[-1])
+    return begin + 0.25 * (end - begin), end - 0.25 * (end - begin)
+
+
+def _moved(trace: ObjectTrace) -> float:
+    """Distance between both ends of the motion, m."""
+    return float(np.linalg.norm(trace.position[-1, :2] - trace.position[0, :2]))
+
+
+def _mean_size(trace: ObjectTrace, axis: int) -> float:
+    return float(np.abs(trace.other_force[:, axis]).mean())
+
+
+def _largest(traces: Mapping[str, ObjectTrace]) -> float:
+    """Largest force of the arm on an object, N."""
+    return max(float(np.linalg.norm(trace.arm_force, axis=1).max()) for trace in traces.values())
+
+
+def _angles(traces: Mapping[str, ObjectTrace], at: int) -> Numbers:
+    return np.array([math.atan2(trace.position[at, 1], trace.position[at, 0]) for trace in traces.values()])
+
+
+def _hinge_torque(run: Recording, door: ObjectTrace) -> Numbers:
+    """Torque that turns the door as it was turned: I phi'' + d phi' + k (phi - phi_0) + friction, N m."""
+    doors = world_of(run).doors
+    length, thickness = doors.sizes[0], doors.sizes[1]
+    inertia = doors.mass[0] * (4.0 * length**2 + thickness**2) / 3.0  # about the hinge
+    rate = np.gradient(door.angle, door.time)
+    torque: Numbers = (
+        inertia * np.gradient(rate, door.time)
+        + doors.hinge_damping[0] * rate
+        + doors.spring[0] * (door.angle - doors.rest[0])
+        + doors.hinge_friction[0] * np.sign(rate)
+    )
+    return torque
+
+
+def _along(forces: Forces, begin: float, end: float) -> Numbers:
+    """Force across the link, N, between two times."""
+    there = (forces.time >= begin) & (forces.time < end)
+    across: Numbers = np.hypot(forces.force[there, 1], forces.force[there, 2])
+    return across
+
+
+def _across(run: Recording, step: Step) -> float:
+    return float(_along(run.forces("sim/contact/wrench"), step.end - STEADY, step.end).mean())
+
+
+def _estimate(run: Recording, step: Step) -> list[Comparison]:
+    """The estimate over a step next to the truth: the force across, and the time with the right link."""
+    truth, estimate = run.forces("sim/contact/wrench"), run.forces("contact/wrench")
+    there = (truth.time >= step.begin) & (truth.time < step.end)
+    at = np.searchsorted(estimate.time, truth.time[there]).clip(0, len(estimate.time) - 1)
+    force, frames = truth.force[there], np.array(truth.frames)[there]
+    touched = frames != "base"
+    if not np.any(touched):
+        return [Comparison(f"{step.name}, contact", "yes", "no")]
+    guess, found = estimate.force[at][touched], np.array(estimate.frames)[at][touched]
+    right = found == frames[touched]
+    true = float(np.hypot(force[touched][:, 1], force[touched][:, 2]).mean())
+    estimated = float(np.hypot(guess[:, 1], guess[:, 2]).mean())
+    return [
+        Comparison(f"{step.name}, estimated force across, mean", true, estimated, "N", NO_CLAIM, "true"),
+        Comparison(f"{step.name}, time with the right link", 1.0, float(np.mean(right)), "of the contact", NO_CLAIM),
+    ]
+
+
+def _forces(run: Recording, begin: float, end: float) -> Panel:
+    curves = []
+    for topic, label in (("contact/wrench", "estimated"), ("sim/contact/wrench", "true")):
+        forces = run.forces(topic)
+        there = (forces.time >= begin) & (forces.time < end)
+        curves.append(Curve("measured", label, forces.time[there], _along(forces, begin, end)))
+    commanded = run.forces("force_command")
+    there = (commanded.time >= begin) & (commanded.time < end)
+    size = np.linalg.norm(commanded.force[there], axis=1)
+    if np.any(size):
+        curves.append(Curve("predicted", "commanded", commanded.time[there], size))
+    return Panel("force across the link", "time [s]", "force [N]", curves)
+
+
+def _path(traces: Mapping[str, ObjectTrace], axis: int) -> Panel:
+    curves = [
+        Curve("measured", name, trace.time, trace.position[:, axis] - trace.position[0, axis])
+        for name, trace in traces.items()
+        if len(trace.time)
+    ]
+    return Panel(f"motion along {'xyz'[axis]}", "time [s]", "distance [m]", curves)

@@ -1,0 +1,220 @@
+"""The arm on foam: commanded, true, measured and estimated force; pressing, sliding, and a push."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_bag.bag import BagError, PointColumns
+from wam_studies.thesis.recording import Forces, Recording, Step
+from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+
+STEADY = 0.8  # s at the end of a press
+START = 0.5  # s of a slide before its evaluation
+FORCE = 0.05  # of the commanded force, at rest
+MOVING = 0.2  # of the commanded force, while sliding: friction reverses with the motion
+ESTIMATE = 0.05  # of the true force
+SMALLEST_ERROR = 0.4  # N of an estimate; a third of the standard deviation that the estimator states at 5 N
+POSITION = 0.04  # m
+NO_CONTACT = "base"  # frame of a contact wrench without contact
+LATENCY = 0.1  # s until a push is detected
+WRONG_LINK = 0.05  # of the time of a push, with another link or no detection
+PUSH = 0.15  # of the force of a push while the arm moves
+FORCE_ALONG = 0.1  # of the commanded force, at either end of the link
+CYCLE = 0.02  # of the force, peak to peak of a limit cycle
+SLIP = 0.2  # N; a joint that still slips once, by stiction, is no cycle
+
+
+class Along(NamedTuple):
+    """Components of the arm's forces on the world along the commanded force, N, at the times of the true one, s."""
+
+    time: Numbers
+    commanded: Numbers
+    true: Numbers
+    measured: Numbers
+    estimated: Numbers
+
+
+def pressing(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `wam-press`."""
+    run = runs["press"]
+    found = along(run)
+    rows: list[Comparison] = []
+    for step in _named(run, "press"):
+        late = (found.time > step.end - STEADY) & (found.time < step.end)
+        force = float(found.commanded[late].mean())
+        true = float(found.true[late].mean())
+        estimated = float(found.estimated[late].mean())
+        # the last half of that time: before it the joints may still stick and slip
+        rest = (found.time > step.end - 0.5 * STEADY) & (found.time < step.end)
+        rows += [
+            Comparison(f"{step.name}, true", force, true, "N", FORCE, "no error, 5.1.2"),
+            Comparison(
+                f"{step.name}, estimated", true, estimated, "N", max(ESTIMATE, SMALLEST_ERROR / force), "chapter 2"
+            ),
+            Comparison(
+                f"{step.name}, peak to peak",
+                0.0,
+                float(np.ptp(found.true[rest])),
+                "N",
+                max(CYCLE * force, SLIP),
+                "no cycle",
+                True,
+            ),
+        ]
+    rows.append(_position(run, _named(run, "press")))
+    return Result(rows, [_panel(found, _named(run, "press"))], _remarks(run))
+
+
+def sliding(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `wam-slide`."""
+    run = runs["slide"]
+    found = along(run)
+    steps = _named(run, "slide")
+    rows: list[Comparison] = []
+    for step in steps:
+        during = (found.time > step.begin + START) & (found.time < step.end)
+        force = float(found.commanded[during].mean())
+        true = found.true[during]
+        error = float(np.sqrt(np.mean((found.estimated[during] - true) ** 2)))
+        rows += [
+            Comparison(f"{step.name}, true, mean", force, float(true.mean()), "N", FORCE, "no error, 5.1.2"),
+            Comparison(
+                f"{step.name}, largest error",
+                0.0,
+                float(np.abs(true - force).max()),
+                "N",
+                MOVING * force,
+                "",
+                True,
+            ),
+            Comparison(
+                f"{step.name}, error of the estimate, rms", 0.0, error, "N", ESTIMATE * force, "chapter 2", True
+            ),
+        ]
+    rows.append(_position(run, steps))
+    every = [*_named(run, "press"), *steps, *_named(run, "rest")]
+    return Result(rows, [_panel(found, every)], _remarks(run))
+
+
+def along_the_link(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `wam-along-link`: a large force near the base of a link, small ones near its tip."""
+    rows: list[Comparison] = []
+    panels = []
+    for name, run in runs.items():
+        found, place = along(run), float(run.parameters.node("force_loop")["contact_position"])
+        for step in _named(run, "press"):
+            late = (found.time > step.end - STEADY) & (found.time < step.end)
+            force, true = float(found.commanded[late].mean()), found.true[late]
+            label = f"{name}, {step.name} at {place:.2f} m"
+            rows += [
+                Comparison(f"{label}, true", force, float(true.mean()), "N", FORCE_ALONG, "7.3"),
+                Comparison(f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", FORCE_ALONG * force, "", True),
+            ]
+        panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
+    return Result(rows, panels)
+
+
+def along(run: Recording) -> Along:
+    """Components along the commanded force, in the frame of the command."""
+    command, truth = run.forces("force_command"), run.forces("sim/contact/wrench")
+    measured, estimated = run.forces("force_measured"), run.forces("contact/wrench")
+    pressed = np.linalg.norm(command.force, axis=1) > 0.0
+    axis = command.force[pressed][0] / np.linalg.norm(command.force[pressed][0])
+    frame = command.frames[int(np.flatnonzero(pressed)[0])]
+
+    def at_truth(forces: Forces, sign: float) -> Numbers:
+        in_frame = np.array([name == frame for name in forces.frames])
+        values = np.where(in_frame, sign * (forces.force @ axis), 0.0)
+        return np.interp(truth.time, forces.time, values)
+
+    return Along(
+        truth.time,
+        at_truth(command, 1.0),
+        at_truth(truth, -1.0),
+        at_truth(measured, 1.0),
+        at_truth(estimated, -1.0),
+    )
+
+
+def _named(run: Recording, word: str) -> Sequence[Step]:
+    return [step for step in run.steps if step.name.startswith(word)]
+
+
+def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
+    """Greatest error of the estimated position, of the means of each step."""
+    true, estimated = _positions(run, "sim/contact/point"), _positions(run, "contact/point")
+    errors = []
+    for step in steps:
+        means = []
+        for time, position in (true, estimated):
+            late = (time > step.end - STEADY) & (time < step.end)
+            means.append(float(np.nanmean(position[late])))
+        errors.append(abs(means[1] - means[0]))
+    return Comparison("position error, worst step", 0.0, max(errors), "m", POSITION, "chapter 2", True)
+
+
+def _positions(run: Recording, topic: str) -> tuple[Numbers, Numbers]:
+    columns = run.bag.topics.get(f"{run.namespace}/{topic}")
+    if not isinstance(columns, PointColumns):
+        raise BagError(f"{run.bag.path} has no topic '{topic}'; record it")
+    return columns.stamp_ns / 1e9, columns.point[:, 0]
+
+
+def _panel(found: Along, steps: Sequence[Step]) -> Panel:
+    shown = (found.time >= steps[0].begin) & (found.time < steps[-1].end)
+    time = found.time[shown]
+    curves = [
+        Curve("measured", "true", time, found.true[shown]),
+        Curve("measured", "estimated", time, found.estimated[shown]),
+        Curve("predicted", "commanded", time, found.commanded[shown]),
+    ]
+    return Panel("force along the commanded one", "time [s]", "force [N]", curves)
+
+
+def _remarks(run: Recording) -> tuple[str, ...]:
+    friction = run.parameters.node("driver")["world.obstacles.friction"]
+    return (f"the foam has a friction coefficient of {friction[0]:g}: while it sticks, it also pulls along the tube",)
+
+
+def pushed(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `wam-touch`: one push, evaluated during its true contact."""
+    (run,) = runs.values()
+    truth, estimate = run.forces("sim/contact/wrench"), run.forces("contact/wrench")
+    in_contact = np.linalg.norm(truth.force, axis=1) > 0.0
+    pushing, link = truth.time[in_contact], truth.frames[int(np.flatnonzero(in_contact)[0])]
+    begin, end = float(pushing[0]), float(pushing[-1])
+    right = np.array([frame == link for frame in estimate.frames])
+    first = estimate.time[right & (estimate.time >= begin)]
+    during = (estimate.time > begin + LATENCY) & (estimate.time <= end)
+    correct = float(np.mean(right[during]))
+    true = float(np.linalg.norm(truth.force[in_contact], axis=1).mean())
+    estimated = float(np.linalg.norm(estimate.force[during & right], axis=1).mean())
+    positions = [
+        float(np.nanmedian(position[(time > begin + LATENCY) & (time <= end)]))
+        for time, position in (_positions(run, "sim/contact/point"), _positions(run, "contact/point"))
+    ]
+    quiet = estimate.time < begin
+    before = float(np.mean([bool(frame) and frame != NO_CONTACT for frame in np.array(estimate.frames)[quiet]]))
+    rows = [
+        Comparison("detections before the push, fraction of the time", 0.0, before, "", WRONG_LINK, "chapter 2", True),
+        Comparison(
+            "detection latency",
+            0.0,
+            float(first[0]) - begin if len(first) else math.nan,
+            "s",
+            LATENCY,
+            "chapter 2",
+            True,
+        ),
+        Comparison(f"detection on {link}, fraction of the time after that", 1.0, correct, "", WRONG_LINK, "chapter 2"),
+        Comparison("force, mean", true, estimated, "N", PUSH, "chapter 2"),
+        Comparison("position, median", positions[0], positions[1], "m", POSITION, "chapter 2", True),
+    ]
+    force = [np.linalg.norm(each.force, axis=1) for each in (truth, estimate)]
+    curves = [
+        Curve("measured", "estimated", estimate.time, force[1]),
+        Curve("predicted", "true", truth.time, force[0]),
+    ]
+    return Result(rows, [Panel("force on the arm", "time [s]", "force [N]", curves)])

@@ -1,0 +1,123 @@
+"""Inner loops on torque and on position, 2.1.2: largest gains, and what they leave of friction at the motor."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from wam_control.velocity.torque_loop import TorqueLoopParameters
+from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque, period_map
+from wam_studies.thesis.one_link import OneLink, growth, joint_stiffness, one_link, response
+from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+
+WITHIN = 0.02
+TRANSIENT = 0.1  # s of a response until one mode is left
+FRICTION = ("torque_fed_forward", "torque_loop", "position_loop")  # runs with friction at the motor
+
+Runs = Mapping[str, Recording]
+
+
+def compared(runs: Runs) -> Result:
+    """The experiment `inner-loops`."""
+    left = friction_left({name: runs[name] for name in FRICTION})
+    rows, speeds = list(left.rows), []
+    for below in runs:
+        loop, found, cable = below.partition("_below")
+        if found:
+            above = f"{loop}_above{cable}"
+            rows.append(_largest(f"{loop} loop{cable.replace('_', ' ')}, largest gain", runs[below], runs[above]))
+            motors = runs[above].joints("motor_states")
+            speeds.append(Curve("measured", above.replace("_", " "), motors.time, motors.velocity[:, 0]))
+    return Result(rows, [*left.panels, Panel("above the largest gain", "time [s]", "motor [rad/s]", speeds)])
+
+
+def friction_left(runs: Runs) -> Result:
+    """Half of the distance between the force on the way out and on the way back, where the command is the same."""
+    rows, curves = [], []
+    for name, run in runs.items():
+        link, label = one_link(run), name.replace("_", " ")
+        friction = run.shared.arm.motors.dynamic_friction[0] * link.ratio / link.lever
+        command, shown = _command(run, link), response(run, link)
+        there, again = (
+            (shown.time >= step.begin) & (shown.time <= step.end) for step in (run.step("out"), run.step("back"))
+        )
+        middle = 0.5 * float(command.max())
+        rising = np.interp(middle, command[there], shown.force[there], math.nan, math.nan)
+        falling = np.interp(middle, command[again][::-1], shown.force[again][::-1], math.nan, math.nan)
+        expected = friction * _part_left(run, link)
+        rows.append(
+            Comparison(f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", WITHIN, "2.1.2")
+        )  # fmt: skip
+        curves.append(Curve("measured", label, command[::20], shown.force[::20]))
+    panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
+    return Result(rows, [panel])
+
+
+def torque_sample(runs: Runs) -> Result:
+    """One run of the torque loop: growth or decay by its largest gain."""
+    ((name, run),) = runs.items()
+    fraction, words = _gain(run) / _expected(run), ("decays", "grows")
+    label = f"torque loop at {fraction:.2f} of its largest gain"
+    row = Comparison(label, words[fraction > 1.0], words[_growth(run) > 0.0], equation="sampled loop")
+    motors = run.joints("motor_states")
+    curve = Curve("measured", name.replace("_", " "), motors.time, motors.velocity[:, 0])
+    return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
+
+
+def _command(run: Recording, link: OneLink) -> Numbers:
+    """Force, N, at the times of the sensors, of the commanded torque; of a position, that without friction."""
+    time = run.joints("joint_sensors").time
+    if not _has(run, "position_loop"):
+        command = run.joints("motor_effort_command")
+        return -np.interp(time, command.time, command.effort[:, 0]) * link.ratio / link.lever
+    command = run.joints("motor_velocity_command")
+    turned = -np.cumsum(command.velocity[:, 0]) * run.shared.timing.period
+    node, k = link.node, run.shared.servo.integral_gain[0] * link.ratio**2
+    series = 1.0 / (1.0 / k + 1.0 / node.transmission_stiffness + 1.0 / node.contact_stiffness)
+    return np.interp(time, command.time, turned) / link.ratio * series / link.lever
+
+
+def _part_left(run: Recording, link: OneLink) -> float:
+    """Part of the friction at the motor that reaches the contact: 1/(1 + g), or that of springs against springs."""
+    if _has(run, "torque_loop"):
+        return 1.0 / (1.0 + run.node("torque_loop", TorqueLoopParameters).gain[0])
+    if not _has(run, "position_loop"):
+        return 1.0
+    node = link.node
+    beyond = 1.0 / (1.0 / node.transmission_stiffness + 1.0 / node.contact_stiffness)
+    return beyond / (beyond + run.shared.servo.integral_gain[0] * link.ratio**2)
+
+
+def _largest(label: str, below: Recording, above: Recording) -> Comparison:
+    """Gain at which an oscillation of the motor neither grows nor decays, from runs on both sides of it."""
+    (first, gain), (second, other) = ((_growth(run), _gain(run)) for run in (below, above))
+    measured = gain + (other - gain) * first / (first - second) if first < second else math.nan
+    unit = "" if _has(below, "torque_loop") else "N m/rad"
+    return Comparison(label, _expected(below), measured, unit, WITHIN, "sampled loop")
+
+
+def _expected(run: Recording) -> float:
+    """The largest gain in theory, of a position loop as its stiffness with this ratio of stiffness and damping."""
+    shared = run.shared
+    is_torque = _has(run, "torque_loop")
+    row = on_torque(shared.arm) if is_torque else on_position(shared.servo) / shared.servo.integral_gain[0]
+    return largest_gain(period_map(shared.arm, joint_stiffness(run)), row)
+
+
+def _has(run: Recording, name: str) -> bool:
+    """Whether a node of this module ran."""
+    return any(f".{name}:" in entry for entry in run.shared.nodes)
+
+
+def _gain(run: Recording) -> float:
+    if _has(run, "torque_loop"):
+        return run.node("torque_loop", TorqueLoopParameters).gain[0]
+    return run.shared.servo.integral_gain[0]
+
+
+def _growth(run: Recording) -> float:
+    """Rate at which the jerk of the motor grows, 1/s; slow motions are without effect on it."""
+    motors = run.joints("motor_states")
+    late = motors.time > TRANSIENT
+    return growth(motors.time[late][2:], np.diff(motors.velocity[late, 0], 2)).rate

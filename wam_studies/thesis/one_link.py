@@ -1,0 +1,204 @@
+"""The one-link testbed in the model of chapter 5, from the parameters of a recording."""
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.force_law import ForceLaw
+from wam_control.force.force_loop_parameters import AXES
+from wam_description.arm import Arm, seconds
+from wam_description.world import Springs
+from wam_studies.thesis.recording import Recording, Step
+from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Outcome, Verdict, assess
+
+Numbers = NDArray[np.float64]
+LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
+ACROSS = 1  # y of the link's frame, along which the testbed presses
+SETTLED = 0.02  # of the step, remaining span of a settled response
+STUCK = 1e-5  # rad/s of the joint, below which it sticks: far below any motion, far above the noise of a stuck one
+STEADY = 0.1  # relative change of the span between two windows, below which a cycle is steady
+
+
+class OneLink(NamedTuple):
+    """Node, loop and lever of a testbed with one joint and one motor."""
+
+    node: FrictionNode
+    loop: IntegralLoop
+    lever: float  # m, of the force
+    ratio: float  # motor turns per joint turn
+
+    @property
+    def margin(self) -> SampledMargin:
+        """Marginal gain of the sampled loop at the joint, without friction."""
+        n, loop = self.node, self.loop
+        return sampled_margin(
+            n.inertia, n.damping, n.transmission_stiffness, n.contact_stiffness, loop.sample_period, loop.delay_samples
+        )
+
+    @property
+    def gamma(self) -> float:
+        """(5.15) of the continuous loop."""
+        n = self.node
+        stiffness = n.transmission_stiffness, n.contact_stiffness
+        return float(gain_ratio(self.loop.gain, n.inertia, n.damping, *stiffness))
+
+    @property
+    def zeta(self) -> float:
+        """(5.12)."""
+        n = self.node
+        return float(damping_ratio(n.inertia, n.damping, n.transmission_stiffness, n.contact_stiffness))
+
+    def state(self, shown: "MeasuredResponse") -> tuple[float, float, float]:
+        """x, v and x_m at the start of a response."""
+        x = float(shown.force[0]) * self.lever / self.node.contact_stiffness
+        return x, float(shown.speed[0]), float(shown.motor[0])
+
+    def tip_gain(self, gain: float) -> float:
+        """G_I at the tip, (m/s)/N, from that at the joint, (rad/s)/(N m)."""
+        return gain * self.lever**2
+
+
+def link_inertia(arm: Arm) -> float:
+    """J_l about the joint, kg m^2."""
+    x = arm.links.centre[0]
+    return float(arm.links.inertia[1] + arm.links.mass[0] * x * x + arm.joints.armature[0])
+
+
+def joint_stiffness(recording: Recording) -> float:
+    """k_c of the spring at the joint, N m/rad."""
+    springs = recording.part("driver", "world.springs", Springs)
+    return float(springs.stiffness[0] * springs.lever[0] ** 2)
+
+
+def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) -> OneLink:
+    """Node and loop from a recording.
+
+    Parameters
+    ----------
+    settings : live parameters set since the start, ``{'driver:effects.added_coulomb_friction': [0.9]}``.
+
+    Raises
+    ------
+    ValueError
+        if the arm has more than one joint, or the loop has a G_P.
+    """
+    recording = recording._replace(parameters=recording.parameters.with_values(settings or {}))
+    arm, timing = recording.shared.arm, recording.shared.timing
+    if len(arm.joints.names) != 1:
+        raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
+    control = recording.parameters.node("force_loop")
+    law = ForceLaw("force", AXES, *(tuple(control[f"force_{name}"]) for name in LAW))
+    if law.proportional_gain[ACROSS]:
+        raise ValueError(
+            f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P"
+        )
+    ratio, lever = 1.0 / arm.joint_from_motor[0], float(control["contact_position"])
+    added = float(recording.parameters.node("driver")["effects.added_coulomb_friction"][0])
+    node = FrictionNode(
+        inertia=link_inertia(arm),
+        damping=arm.joints.viscous_friction[0],
+        transmission_stiffness=ratio**2 * arm.circuits[0].stiffness,
+        contact_stiffness=joint_stiffness(recording),
+        dynamic_friction=arm.joints.dynamic_friction[0] + added,
+        static_friction=arm.joints.static_friction[0] + added,
+    )
+    loop = IntegralLoop(
+        gain=law.gain[ACROSS] / lever**2,
+        error_limit=law.error_limit[ACROSS] * lever,
+        deadband=law.deadband[ACROSS] * lever,
+        sample_period=seconds(timing.outer_period_ns),
+        delay_samples=int(control["delay_samples"]),
+    )
+    return OneLink(node, loop, lever, ratio)
+
+
+def set_until(recording: Recording, step: Step) -> dict[str, Any]:
+    """Live parameters set before and by a step."""
+    found: dict[str, Any] = {}
+    for played in recording.steps:
+        found.update(played.settings)
+        if played == step:
+            break
+    return found
+
+
+class MeasuredResponse(NamedTuple):
+    """Contact force at the tip and motor at the joint over the time of a step."""
+
+    time: Numbers  # s
+    force: Numbers  # N, of the arm on the spring
+    motor: Numbers  # rad at the joint, positive as it presses
+    speed: Numbers  # rad/s of the joint, positive as it presses
+
+
+def response(recording: Recording, link: OneLink, step: Step | None = None) -> MeasuredResponse:
+    """Response in a step, or in the whole run."""
+    sensors, motors = recording.joints("joint_sensors"), recording.joints("motor_states")
+    begin, end = (step.begin, step.end) if step else (0.0, math.inf)
+    if not math.isnan(recording.fault_time):
+        end = min(end, recording.fault_time)
+    chosen = (sensors.time >= begin - 1e-9) & (sensors.time <= end + 1e-9)
+    force = -link.node.contact_stiffness * sensors.position[chosen, 0] / link.lever
+    motor = -np.interp(sensors.time[chosen], motors.time, motors.position[:, 0]) / link.ratio
+    return MeasuredResponse(sensors.time[chosen], force, motor, -sensors.velocity[chosen, 0])
+
+
+def desired_force(recording: Recording, time: float) -> float:
+    """Commanded force at a time, N."""
+    command = recording.forces("force_command")
+    return float(np.linalg.norm(command.force[np.searchsorted(command.time, time - 1e-9)]))
+
+
+def measured_verdict(recording: Recording, step: Step, shown: MeasuredResponse) -> str:
+    """Verdict on a recorded step, settled, limit cycle or diverged, from the spans of its last two quarters.
+
+    It is diverged if the driver stopped the arm, or if the span still grows.
+    """
+    if step.begin <= recording.fault_time <= step.end:
+        return str(Verdict.DIVERGED)
+    quarter = len(shown.force) // 4
+    before, late = (float(np.ptp(part)) for part in (shown.force[-2 * quarter : -quarter], shown.force[-quarter:]))
+    size = max(float(np.ptp(shown.force)), 1e-9)
+    if late < SETTLED * size or late < (1.0 - STEADY) * before:
+        return str(Verdict.SETTLED)
+    return str(Verdict.DIVERGED if late > (1.0 + STEADY) * before else Verdict.LIMIT_CYCLE)
+
+
+def predicted_outcome(link: OneLink, shown: MeasuredResponse, force: float) -> Outcome:
+    """Verdict of the exact integrator from the initial state of a response, for a desired force, N."""
+    return assess(link.node, link.loop, force * link.lever, start=link.state(shown))
+
+
+class Growth(NamedTuple):
+    """Growth rate of an oscillation, 1/s, negative for decay, and its frequency, rad/s."""
+
+    rate: float
+    frequency: float
+
+
+def growth(time: Numbers, values: Numbers) -> Growth:
+    """Growth of an oscillation about its mean, from the extremes between its zero crossings.
+
+    Raises
+    ------
+    ValueError
+        if there are fewer than five half cycles.
+    """
+    level = values - values.mean()
+    crossings = np.flatnonzero(level[:-1] * level[1:] < 0.0)
+    if len(crossings) < 6:
+        raise ValueError(f"{len(crossings)} zero crossings are too few to measure growth; record a longer run")
+    fractions = level[crossings] / (level[crossings] - level[crossings + 1])
+    times = time[crossings] + fractions * np.diff(time)[crossings]
+    parts = [level[a : b + 1] for a, b in pairwise(crossings)]
+    peaks = np.array([np.abs(part).max() for part in parts])
+    at = 0.5 * (times[:-1] + times[1:])
+    # sums of two neighbours, so that an error of the mean cancels
+    pairs, between = peaks[:-1] + peaks[1:], 0.5 * (at[:-1] + at[1:])
+    rate = float(np.polyfit(between, np.log(pairs), 1)[0])
+    return Growth(rate, math.pi * (len(times) - 1) / float(times[-1] - times[0]))

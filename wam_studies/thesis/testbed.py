@@ -1,0 +1,226 @@
+"""Section 5.6: effect of friction, step size, saturation and delay on the stable gain."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wam_analysis.measures.limit_cycle import last_cycle
+from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of
+from wam_control.force.stability_guard import StabilityGuard
+from wam_description.arm import Servo
+from wam_studies.thesis.one_link import (
+    ACROSS,
+    Growth,
+    OneLink,
+    desired_force,
+    growth,
+    measured_verdict,
+    one_link,
+    predicted_outcome,
+    response,
+    set_until,
+)
+from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.rows import Comparison, Curve, Panel, Result
+from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
+from wam_theory.stick_slip import Verdict, simulate
+
+TRANSIENT = 0.4  # s after a step, before the growing mode dominates
+WITHIN = 0.02
+SMALL = 0.3  # N, a step at the margin with the rod
+CYCLE = 0.05  # of a cycle with a long transient
+PLAIN = 2  # steps of a run, up to which the last one is drawn with its prediction
+ROUNDING = 1e-9  # s
+
+
+def section_5_6(runs: Mapping[str, Recording]) -> Result:
+    """Every run of the experiment `testbed-5.6`."""
+    rows = margin(runs["below_the_margin"], runs["above_the_margin"], "without delay")
+    for name in ("rod", "large_step", "large_step_saturated"):
+        rows += verdicts(runs[name], name.replace("_", " "))
+    rows += margin(runs["delayed_below_the_margin"], runs["delayed_above_the_margin"], "one sample of delay")
+    for name in ("delayed_with_rod_at_0.8", "delayed_with_rod_at_0.9"):
+        rows += verdicts(runs[name], name.replace("_", " "))
+    panels = [
+        _panel(runs, ("below_the_margin", "above_the_margin"), "0.95 and 1.05 of the margin"),
+        _panel(runs, ("rod",), "1.5 of the margin, with rod, removed at the end"),
+        _panel(runs, ("large_step", "large_step_saturated"), "10 lb, with rod, 1.5 of the margin"),
+        _panel(runs, ("delayed_with_rod_at_0.8", "delayed_with_rod_at_0.9"), "one sample of delay, with rod"),
+    ]
+    return Result(rows, panels)
+
+
+def as_described(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `testbed-5.6-as-described`: verdict on every step and push, and the margin with the rod."""
+    rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
+    below, above = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
+    link, gains = below[0], [one.loop.gain for one, _ in (below, above)]
+    gain = gains[0] + (gains[1] - gains[0]) * (1.0 - below[1]) / (above[1] - below[1])
+    expected = friction_margin(link, SMALL)
+    rows += [
+        Comparison(
+            "marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", WITHIN, "integrator"
+        ),
+        Comparison("over that without", expected / link.margin.gain, gain / link.margin.gain, "", WITHIN, "5.6"),
+    ]
+    panels = [_panel(runs, (name,), name.replace("_", " ")) for name in runs]
+    return Result(rows, panels)
+
+
+def _ratio_at_rest(run: Recording) -> tuple[OneLink, float]:
+    """The loop of the last step, and the median ratio of the errors at successive standstills in it, Psi."""
+    step = run.steps[-1]
+    link = one_link(run, set_until(run, step))
+    errors = np.abs(errors_at_rest(response(run, link, step), desired_force(run, step.begin)))
+    return link, float(np.median(errors[1:] / errors[:-1]))
+
+
+def friction_margin(link: OneLink, step: float) -> float:
+    """G_I at the joint at which the errors of a small step, N, neither grow nor shrink with friction, within 0.1 %."""
+    low, high = link.margin.gain, 10.0 * link.margin.gain
+    while high > 1.001 * low:
+        middle = math.sqrt(low * high)
+        grows = abs(exact_ratio(link._replace(loop=replace(link.loop, gain=middle)), step)) > 1.0
+        low, high = (low, middle) if grows else (middle, high)
+    return low
+
+
+def large_step(runs: Mapping[str, Recording]) -> Result:
+    """The run with a large step only: its verdict."""
+    rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
+    return Result(rows, [_panel(runs, tuple(runs), "large step")])
+
+
+def own_servo(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `testbed-own-servo`: the margin with the testbed's velocity loop instead of an ideal source."""
+    below, above = runs["below_the_margin"], runs["above_the_margin"]
+    ideal = margin(below, above, "")[0]
+    with_servo = margin_with_servo(below)
+    rows = [
+        ideal._replace(quantity="marginal gain, compared with that of an ideal velocity source", bound=math.nan),
+        ideal._replace(
+            quantity="marginal gain, with the velocity loop",
+            predicted=with_servo,
+            equation="wam_control.force.sampled_loop",
+        ),
+    ]
+    panel = Panel(
+        "either side of the margin",
+        "time [s]",
+        "force by deflection [N]",
+        [_last_step(name.replace("_", " "), run) for name, run in runs.items()],
+    )
+    return Result(rows, [panel])
+
+
+def own_servo_sample(runs: Mapping[str, Recording]) -> Result:
+    """One run of `testbed-own-servo`: growth or decay by the margin with the velocity loop."""
+    ((name, run),) = runs.items()
+    link, oscillation = _oscillation(run)
+    fraction = link.tip_gain(link.loop.gain) / margin_with_servo(run)
+    row = _growth_row(fraction, oscillation, "with the velocity loop", "wam_control.force.sampled_loop")
+    shown = _last_step(name.replace("_", " "), run)
+    return Result([row], [Panel("above the margin", "time [s]", "force by deflection [N]", [shown])])
+
+
+def _growth_row(fraction: float, oscillation: Growth, how: str, law: str) -> Comparison:
+    """Growth or decay of an oscillation at this fraction of the marginal gain."""
+    expected = "decays" if fraction < 1.0 else "grows"
+    return Comparison(
+        f"at {fraction:.2f} of the margin, {how}",
+        expected,
+        "grows" if oscillation.rate > 0.0 else "decays",
+        "",
+        0.0,
+        law,
+    )
+
+
+def _last_step(label: str, run: Recording) -> Curve:
+    shown = response(run, one_link(run), run.steps[-1])
+    return Curve("measured", label, shown.time, shown.force)
+
+
+def margin_with_servo(run: Recording) -> float:
+    """Marginal G_I at the tip, m/s/N, of the sampled loop with the velocity loop and the damping of the cable."""
+    parameters = run.node("force_loop", ForceLoopParameters)
+    servo = run.part("velocity_loop", "servo", Servo)
+    guard = replace(parameters.guard, extra_delay=0)
+    found = StabilityGuard(run.shared.arm, servo, run.shared.timing, guard, parameters.sensing)
+    touches = found.contacts(guard.posture, parameters.contact_cover, parameters.contact_position, 0.0)
+    law = force_law(parameters)
+    return law.gain[ACROSS] * found.assess(task_of(parameters, law), touches).scale
+
+
+def margin(below: Recording, above: Recording, how: str) -> list[Comparison]:
+    """Marginal gain and frequency, between a run whose last step decays and one whose grows."""
+    (link, first), (other, second) = (_oscillation(run) for run in (below, above))
+    predicted = link.margin
+    fraction = -first.rate / (second.rate - first.rate)
+    gain = link.loop.gain + fraction * (other.loop.gain - link.loop.gain)
+    frequency = first.frequency + fraction * (second.frequency - first.frequency)
+    of, law = f"marginal gain, {how}", "(5.15) sampled"
+    rows = [
+        Comparison(of, link.tip_gain(predicted.gain), link.tip_gain(gain), "m/s/N", WITHIN, law),
+        Comparison(f"frequency at the margin, {how}", predicted.frequency, frequency, "rad/s", WITHIN, law),
+    ]
+    for one, oscillation in ((link, first), (other, second)):
+        rows.append(_growth_row(one.loop.gain / one.margin.gain, oscillation, how, law))
+    return rows
+
+
+def _oscillation(run: Recording) -> tuple[OneLink, Growth]:
+    """The loop in the last step, and the growth of its oscillation after the transient."""
+    link = one_link(run, set_until(run, run.steps[-1]))
+    shown = response(run, link, run.steps[-1])
+    late = shown.time > shown.time[0] + TRANSIENT
+    return link, growth(shown.time[late], shown.force[late])
+
+
+def verdicts(run: Recording, name: str) -> list[Comparison]:
+    """Verdict on each step of a run, predicted from its initial state by the exact integrator."""
+    rows: list[Comparison] = []
+    for step in run.steps:
+        if _is_pushed(run, step):
+            continue
+        link = one_link(run, set_until(run, step))
+        shown = response(run, link, step)
+        outcome = predicted_outcome(link, shown, desired_force(run, step.begin))
+        label, law = f"{name}, {step.name}", "(5.14)-(5.17)"
+        rows.append(Comparison(label, str(outcome.verdict), measured_verdict(run, step, shown), equation=law))
+        if outcome.verdict is Verdict.LIMIT_CYCLE:
+            found = last_cycle(shown.time, shown.force)
+            rows.append(
+                Comparison(f"{label}, peak to peak", outcome.peak_to_peak / link.lever, found.peak_to_peak, "N", CYCLE)
+            )
+            rows.append(Comparison(f"{label}, period", outcome.period, found.period, "s", CYCLE))
+    return rows
+
+
+def _is_pushed(run: Recording, step: Step) -> bool:
+    push = run.forces("sim/disturbance")
+    during = (push.time >= step.begin) & (push.time < step.end - ROUNDING)
+    return bool(push.force[during].any())
+
+
+def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> Panel:
+    """Forces over time, with the exact response of the last step if it starts at rest."""
+    curves = []
+    for name in names:
+        run = runs[name]
+        step = run.steps[-1]
+        link = one_link(run, set_until(run, step))
+        is_plain = len(run.steps) <= PLAIN
+        last = response(run, link, step)
+        shown = last if is_plain else response(run, link)
+        curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
+        if is_plain:
+            exact = simulate(
+                link.node, link.loop, desired_force(run, step.begin) * link.lever, np.ptp(last.time), link.state(last)
+            )
+            curves.append(
+                Curve("predicted", "", last.time, exact.at(last.time - last.time[0]).contact_force / link.lever)
+            )
+    return Panel(title, "time [s]", "force by deflection [N]", curves)

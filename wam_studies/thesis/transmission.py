@@ -1,0 +1,211 @@
+"""Chapter 4: the force response of a transmission by chirp, and the position of its reducer."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_studies.thesis.one_link import joint_stiffness, link_inertia
+from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_theory.cable import stiffness_with_reducer
+from wam_theory.resonance import Resonances, force_resonances
+
+Complex = NDArray[np.complex128]
+WITHIN = 0.02
+SMOOTH = 5  # neighbouring frequencies over which spectra are averaged
+NEAR = 0.06  # relative to a frequency, range of the linear fit around it
+ROUNDING = 1e-6  # s
+HZ = 1.0 / (2.0 * np.pi)
+
+
+class Transfer(NamedTuple):
+    """Joint angle over motor torque: frequency, Hz, inverse response, N m/rad, and coherence."""
+
+    frequency: Numbers
+    inverse: Complex
+    coherence: Numbers
+
+
+def frequency_response(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `frequency-response`."""
+    run = runs["chirp"]
+    found, low, high = transfer(run), *swept(run)
+    gain = 1.0 / np.abs(found.inverse)
+    inside = (found.frequency > low) & (found.frequency < high)
+    lowest = inside & (found.frequency < 2.0 * low)
+    predicted = np.abs(response_of(run, found.frequency))
+    rows = [
+        *_resonance_rows(run, found),
+        Comparison(
+            f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
+            float(np.median(predicted[lowest])),
+            float(np.median(gain[lowest])),
+            "rad/(N m)",
+            WITHIN,
+            "(4.3)",
+        ),
+        Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
+    ]
+    curves = [
+        Curve("measured", "measured", found.frequency[inside], gain[inside]),
+        Curve("predicted", "(4.3) with damping", found.frequency[inside], predicted[inside]),
+    ]
+    coherence = [Curve("measured", "", found.frequency[inside], found.coherence[inside])]
+    panels = [
+        Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy"),
+        Panel("coherence", "frequency [Hz]", "", coherence, "x"),
+    ]
+    remark = f"low coherence: the response changes within the {SMOOTH} averaged neighbouring frequencies"
+    return Result(rows, panels, (remark,))
+
+
+def resonances_sample(runs: Mapping[str, Recording]) -> Result:
+    """The sweep of `frequency-response` from motor and joint only."""
+    (run,) = runs.values()
+    found = transfer(run)
+    rows = _resonance_rows(run, found)
+    inside = (found.frequency > 0.5 * float(rows[0].predicted)) & (found.frequency < 1.5 * float(rows[1].predicted))
+    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
+    return Result(rows, [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+
+
+def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
+    theory = resonances(run)
+    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
+    return [
+        Comparison(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()
+    ]
+
+
+def allocation(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `stiffness-allocation`."""
+    rows, curves = [], []
+    for name, run in runs.items():
+        found = transfer(run)
+        label = name.replace("_", " ")
+        rows.append(_lower_resonance(run, found, label))
+        low, high = swept(run)
+        inside = (found.frequency > low) & (found.frequency < high)
+        curves.append(Curve("measured", label, found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
+        predicted = np.abs(response_of(run, found.frequency[inside]))
+        curves.append(Curve("predicted", "", found.frequency[inside], predicted))
+    for ratio in (14, 30):
+        at_joint, at_motor = (runs[f"reducer_at_{where}_N_{ratio}"] for where in ("joint", "motor"))
+        predicted_ratio = stiffness_gain(at_joint)
+        stiffness = at_joint.shared.arm.circuits[0].stiffness / at_motor.shared.arm.circuits[0].stiffness
+        rows.append(
+            Comparison(
+                f"stiffness with reducer at joint over at motor, N {ratio}",
+                predicted_ratio,
+                stiffness,
+                "",
+                1e-3,
+                "(4.1)",
+            )
+        )
+    panel = Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy")
+    return Result(rows, [panel])
+
+
+def allocation_sample(runs: Mapping[str, Recording]) -> Result:
+    """One of the sweeps of `stiffness-allocation`, from motor and joint only."""
+    ((name, run),) = runs.items()
+    found = transfer(run)
+    row = _lower_resonance(run, found, name.replace("_", " "))
+    inside = (found.frequency > 0.5 * float(row.predicted)) & (found.frequency < 3.0 * float(row.predicted))
+    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
+    return Result([row], [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+
+
+def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
+    at = float(resonances(run).lower) * HZ
+    return Comparison(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)")
+
+
+def stiffness_gain(run: Recording) -> float:
+    """Stiffness of the line with the reducer at the joint over that with the reducer at the motor, (4.1)."""
+    cables, ratio = run.shared.arm.cables, 1.0 / run.shared.arm.joint_from_motor[0]
+    ea, length = cables.stage_ea[0], cables.stage_length[0]
+    ends = [float(stiffness_with_reducer(ea, length, ratio, distance)) for distance in (length, 0.0)]
+    return ends[0] / ends[1]
+
+
+def resonances(run: Recording) -> Resonances:
+    """(4.4) from the recorded parameters, rad/s."""
+    arm = run.shared.arm
+    motor, ratio = arm.motors.inertia[0], 1.0 / arm.joint_from_motor[0]
+    return force_resonances(motor, link_inertia(arm), arm.circuits[0].stiffness, joint_stiffness(run), ratio)
+
+
+def response_of(run: Recording, frequency: Numbers) -> Complex:
+    """Joint angle over motor torque of motor, cable, link and spring, with their damping; frequency in Hz."""
+    arm = run.shared.arm
+    s = 2j * np.pi * frequency
+    ratio, circuit = 1.0 / arm.joint_from_motor[0], arm.circuits[0]
+    cable = circuit.stiffness + circuit.damping * s
+    motor = arm.motors.inertia[0] * s**2 + arm.motors.viscous_friction[0] * s + cable
+    link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + joint_stiffness(run)
+    found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
+    return found
+
+
+def _lead(run: Recording) -> float:
+    (circuit,) = run.shared.arm.circuits
+    return circuit.damping / circuit.stiffness
+
+
+def swept(run: Recording) -> tuple[float, float]:
+    """Lowest and highest frequency of the chirp, Hz, from the crossings of its force with the steady force."""
+    command, sweep = run.forces("force_command"), run.step("sweep")
+    during = (command.time >= sweep.begin) & (command.time < sweep.end)
+    after = command.force[int(np.searchsorted(command.time, sweep.end + ROUNDING))]
+    force = np.linalg.norm(command.force[during], axis=1) - np.linalg.norm(after)
+    crossings = command.time[during][np.flatnonzero(force[:-1] * force[1:] < 0.0)]
+    lengths = np.diff(crossings)
+    return 0.5 / float(lengths[:2].mean()), 0.5 / float(lengths[-10:].mean())
+
+
+def transfer(run: Recording) -> Transfer:
+    """Inverse response from the sweep and the rest after it, which start and end in the same state.
+
+    A motor's torque is held for the period before the state that reports it: its spectrum is that of the samples
+    times that of the hold, sin(w T/2)/(w T/2) with a lead of half a period.
+    """
+    motors, sensors = run.joints("motor_states"), run.joints("joint_sensors")
+    begin, end = run.step("sweep").begin, run.step("ring down").end
+    part = slice(*np.searchsorted(motors.time, [begin - ROUNDING, end - ROUNDING]).tolist())
+    period = float(motors.time[1] - motors.time[0])
+    torque, angle = motors.effort[part, 0], sensors.position[part, 0]
+    frequency: Numbers = np.fft.rfftfreq(len(torque), period).astype(np.float64)
+    held = np.sinc(frequency * period) * np.exp(1j * np.pi * frequency * period)
+    u = np.fft.rfft(torque - torque[-1]) * held
+    y = np.fft.rfft(angle - angle[-1])
+    return spectra(frequency[1:], u[1:], y[1:])
+
+
+def spectra(frequency: Numbers, u: Complex, y: Complex) -> Transfer:
+    """Inverse response and coherence of an input and an output spectrum, averaged over neighbouring frequencies."""
+    window = np.ones(SMOOTH) / SMOOTH
+
+    def mean(values: Complex) -> Complex:
+        found: Complex = np.convolve(values, window, mode="same")
+        return found
+
+    both, inputs, outputs = mean(u * y.conj()), mean(np.abs(u) ** 2 + 0j).real, mean(np.abs(y) ** 2 + 0j).real
+    return Transfer(frequency, both / outputs, np.abs(both) ** 2 / (inputs * outputs))
+
+
+def zero_of(found: Transfer, near: float, lead: float) -> float:
+    """Frequency, Hz, at which the real part of the inverse response is zero: the undamped resonance.
+
+    Parameters
+    ----------
+    near : expected frequency, Hz.
+    lead : damping over stiffness of the cable, s; its zero in the response is removed first.
+    """
+    chosen = np.abs(found.frequency / near - 1.0) < NEAR
+    zero = 1.0 + 2j * np.pi * found.frequency[chosen] * lead
+    slope, offset = np.polyfit(found.frequency[chosen] ** 2, (found.inverse[chosen] * zero).real, 1)
+    return float(np.sqrt(-offset / slope))
