@@ -20,7 +20,6 @@ PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 # The substeps of the plant are C then, too: wam_driver/fast_steps.c.  WAM_COMPILE=auto: only where that is possible.
 COMPILED = (
     "wam_control/force/arm_push.py",
-    "wam_control/force/bumpless_transfer.py",
     "wam_control/contact/contact_estimator.py",
     "wam_control/contact/contact_fit.py",
     "wam_control/contact/contact_fusion.py",

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
-from wam_control.force.bumpless_transfer import BumplessTransfer
-from wam_control.force.force_law import ForceLaw
+from wam_control.force.force_law import BumplessTransfer, ForceLaw
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, State

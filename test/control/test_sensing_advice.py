@@ -9,9 +9,8 @@ import pytest
 from test_force_hold import PINNED, QUIET, bent, press, radial
 from test_force_loop import ARM, BODY, DRIVEN, DT, STILL, force_loop
 
-from wam_control.force.contact_position import ForcePoint
+from wam_control.force.contact_position import ForceCase, ForcePoint
 from wam_control.force.force_axis import ForceAxes
-from wam_control.force.force_case import ForceCase
 from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.sensing_advice import EACH, Advice, OtherForces, Turnable

@@ -13,7 +13,7 @@ from arms import LEVER, changed, one_joint
 from wam_control.force.contact_position import anywhere_sd, position_is_certain
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
-from wam_control.force.guard_watch import Watch
+from wam_control.force.guard import Watch
 from wam_control.force.stability_guard import GuardedContact, GuardedTask, StabilityGuard
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Servo, Timing

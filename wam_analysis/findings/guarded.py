@@ -12,7 +12,7 @@ from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
 from wam_control.force.force_loop_parameters import force_law, task_of
 from wam_control.force.friction_verdict import Domain
-from wam_control.force.guard_supervision import Supervision
+from wam_control.force.guard import Supervision
 from wam_control.force.stability_guard import (
     LARGEST,
     GuardAssessment,

@@ -21,7 +21,7 @@ from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.second_contact import SecondContact
-from wam_control.force.pressed_pose import has_left
+from wam_control.force.given_way import has_left
 from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.contact_position import ForcePoint
+from wam_control.force.contact_position import ForceCase, ForcePoint
 from wam_control.force.force_axis import ForceAxis
-from wam_control.force.force_case import ForceCase
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import STEADY, LowPass
 from wam_control.force.force_swing import Reversals, Shake

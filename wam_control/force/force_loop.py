@@ -15,26 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.arm_push import CERTAIN, ArmPush
-from wam_control.force.bumpless_transfer import BumplessTransfer
-from wam_control.force.contact_position import ContactPosition, ForcePoint
+from wam_control.force.contact_position import ContactPosition, ForceCase, ForcePoint
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
-from wam_control.force.force_case import ForceCase
 from wam_control.force.force_command import CommandAdmission, Commands
 from wam_control.force.force_hold import UNEXPLAINED, ForceHold, ForceReaction, Found, by_seriousness
-from wam_control.force.force_law import DelayLine
+from wam_control.force.force_law import BumplessTransfer, DelayLine
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import REST, STEADY, ForceMeasurement, LowPass
-from wam_control.force.given_way import GivenWay
-from wam_control.force.guard_report import Report
-from wam_control.force.guard_supervision import Supervision
-from wam_control.force.guard_watch import Watch
+from wam_control.force.given_way import GivenWay, has_left
+from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.held_arm import HeldArm, RetreatForce
 from wam_control.force.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, BEGIN, MotionLimits, WholeForce
 from wam_control.force.motion_watch import MotionWatch
 from wam_control.force.posture_watch import BEHIND, PostureWatch, ShortfallWatch
-from wam_control.force.pressed_pose import has_left
 from wam_control.force.sensing_advice import OtherForces, Turnable
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.force.task import AxisKind, TaskCommand

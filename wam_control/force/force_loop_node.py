@@ -6,7 +6,7 @@ from typing import Any
 from wam_control.contact.contact_table import contact_of
 from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
-from wam_control.force.guard_report import Report
+from wam_control.force.guard import Report
 from wam_control.force.reaction_status import facts_of
 from wam_control.force.task import TaskCommand, task_of
 from wam_control.task.trajectory_player import TrajectoryPlayer

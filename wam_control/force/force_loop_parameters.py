@@ -8,7 +8,7 @@ from wam_control.force.force_law import ForceLaw
 from wam_control.force.motion_limits import LimitParameters
 from wam_control.force.sampled_loop import Feedback
 from wam_control.force.stability_guard import GuardedTask, GuardParameters
-from wam_control.force.task_parameters import TaskParameters
+from wam_control.force.task import TaskParameters
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter, require, tunable
 

@@ -10,6 +10,7 @@ from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
 LASTING: Final = 0.2  # s, for which a push counts after the last time: a swing is one, and the arm runs on
+LEFT: Final = 0.05  # rad, motion of a joint by which it has left what it pressed on
 
 
 class GivenWay:
@@ -71,3 +72,8 @@ class GivenWay:
         """Ends of the covers, and the tool (m, 3), m: no point of the arm moves further than the fastest of them."""
         ends = [self._body.point(q, name, end) for name, end in self._ends]
         return np.array([*ends, self._body.tool_pose(q).position])
+
+
+def has_left(pressed_at: Sequence[float], q: Sequence[float]) -> bool:
+    """Whether a joint has moved by `LEFT` from the pose (n,), rad, in which the arm pressed last."""
+    return any(abs(a - b) > LEFT for a, b in zip(pressed_at, q, strict=True))

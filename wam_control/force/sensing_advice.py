@@ -7,7 +7,7 @@ few are tried in each period of the force loop.
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import NamedTuple
 
-from wam_control.force.force_case import ForceCase
+from wam_control.force.contact_position import ForceCase
 
 MORE = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
 TURNS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned, to both sides

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.arm_push import ArmPush
-from wam_control.force.contact_position import ForcePoint, position_is_certain, slid_position
+from wam_control.force.contact_position import ForceCase, ForcePoint, position_is_certain, slid_position
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
-from wam_control.force.force_case import ForceCase
 from wam_control.force.force_hold import ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.given_way import GivenWay
-from wam_control.force.guard_supervision import Supervision
+from wam_control.force.guard import Supervision
 from wam_control.force.held_arm import HeldArm, RetreatForce
 from wam_control.force.hybrid_velocity import followed, posture_velocity
 from wam_control.force.motion_watch import MotionWatch

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from wam_control.force.contact_position import ForcePoint
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
-from wam_control.force.task_parameters import TaskParameters
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, TaskParameters
 from wam_description.arm import Arm
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody

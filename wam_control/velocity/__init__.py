@@ -5,7 +5,6 @@
 ``gravity_node``        the node
 ``position_loop``       in its place, on position: law and node, 2.1.2
 ``servo_guard``         which gains of the velocity loop are stable on the arm
-``servo_reaction``      inputs and output of both
 ``torque_loop``         in its place, on torque: law and node, 2.1.2
 ``transform``           motor states to joint states, joint commands to motor commands, (A.5)
 ``transform_node``      the node

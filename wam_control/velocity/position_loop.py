@@ -7,7 +7,7 @@ loop.  The gains are `wam_description.arm.Servo`: integral_gain is the stiffness
 from collections.abc import Sequence
 
 from wam_control.velocity.servo_guard import DEAD, ServoGuard, ServoGuardParameters
-from wam_control.velocity.servo_reaction import SERVO_REACTION
+from wam_control.velocity.velocity_loop import SERVO_REACTION
 from wam_description.arm import Servo, Shared
 from wam_description.parts import Motors
 from wam_description.signals import State

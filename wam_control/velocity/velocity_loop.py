@@ -3,12 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from wam_control.velocity.dither import DitherParameters
 from wam_control.velocity.servo_guard import DEAD, ServoGuardParameters
 from wam_description.arm import Servo
 from wam_description.parameters import lengths, parameter
 from wam_description.parts import Motors
+from wam_description.wiring import Input, reaction
 
 
 @dataclass(frozen=True)
@@ -110,3 +112,11 @@ class VelocityLoop:
 def _toward(wanted: float, present: float, most: float) -> float:
     """As near to the wanted value as a change of at most `most`, which is less than it takes, allows."""
     return present + math.copysign(most, wanted - present)
+
+
+SERVO_REACTION: Final = reaction(
+    Input("motor_states"),
+    Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
+    Input("motor_effort_command", "effort", delayed=True, absent="brake"),
+    outputs=("motor_current_command",),
+)

@@ -4,8 +4,7 @@ from operator import gt
 
 from wam_control.velocity.dither import Dither
 from wam_control.velocity.servo_guard import ServoGuard
-from wam_control.velocity.servo_reaction import SERVO_REACTION
-from wam_control.velocity.velocity_loop import VelocityLoop, VelocityLoopParameters
+from wam_control.velocity.velocity_loop import SERVO_REACTION, VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Servo, Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs

@@ -1,0 +1,282 @@
+"""The guard's part of the force loop: it admits a parameter set, and scales its gains while the arm moves.
+
+An assessment takes milliseconds, so it is distributed: a part of it in each outer period, and a new
+one only after the arm has moved.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from wam_control.force.contact_position import ForcePoint
+from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
+from wam_control.force.stability_guard import (
+    LARGEST,
+    GuardAssessment,
+    Guarded,
+    GuardedContact,
+    GuardedTask,
+    StabilityGuard,
+    posture_of,
+)
+from wam_description.arm import Arm, Servo, Timing
+from wam_description.parameters import require
+
+TURN = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
+SHIFT = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
+GROWTH = 1.5  # of the commanded force, after which it is assessed again
+PARTS = (0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0)  # of the required scale, all of which have to be stable
+POSITIONS = (0.25, 0.5, 0.75, 1.0)  # of a cover's length, at which an uncertain contact may be
+UNKNOWN: Final = "not assessed yet: it is while a force is commanded; the margin is that of guard.posture"
+Triple = tuple[float, float, float]
+
+
+class Supervision:
+    """A parameter set that the guard has let pass; another set needs another object.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    servo : gains of the velocity loop.
+    timing : periods of the loops.
+    parameters : of the force loop.
+    q : present joint angles (n,), rad; empty before the first state.
+
+    Attributes
+    ----------
+    force_law, torque_law : laws in force; with guard.mode `limit` their saturation may be lower than configured.
+    assessment : what the guard finds; None where it is off or nothing is fed back.
+    watch : what the guard does while the arm moves; None with the assessment.
+    report : the guard's report; a new object where it has changed.
+
+    Raises
+    ------
+    ParameterError
+        where the guard does not accept the set.
+    """
+
+    def __init__(
+        self, arm: Arm, servo: Servo, timing: Timing, parameters: ForceLoopParameters, q: tuple[float, ...]
+    ) -> None:
+        self._covers, self._parameters = arm.covers, parameters
+        self.force_law, self.torque_law = force_law(parameters), torque_law(parameters, arm.joints.names)
+        self.assessment: GuardAssessment | None = None
+        self.watch: Watch | None = None
+        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, sensing_of(parameters))
+        if parameters.guard.mode != "off" and parameters.mode != "open_loop":
+            self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
+        self._report()
+
+    def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
+        guard, parameters = self._guard, self._parameters
+        is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
+        task = task_of(parameters, self.torque_law if is_joints else self.force_law)
+        is_pinned = parameters.contact_source == "pinned"
+        position_sd = parameters.contact_position_sd if is_pinned else parameters.position_uncertainty_limit
+        contacts = [
+            contact
+            for q in postures
+            for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position, position_sd)
+        ]
+        found = guard.assess(task, contacts if is_joints else guard.sensed(contacts))
+        if found.reason and found.stable_error and mode == "limit":
+            limits = tuple(min(limit, found.stable_error) for limit in task.law.error_limit)
+            task = task._replace(law=replace(task.law, error_limit=limits))
+            found = found._replace(reason="")
+        require(not found.reason or mode == "warn", found.reason)
+        if is_joints:
+            self.torque_law = task.law
+        else:
+            self.force_law = task.law
+        self.assessment, self.watch = found, Watch(guard, task, found, parameters.schedule == "position")
+
+    def _report(self) -> None:
+        parameters = self._parameters
+        self.report = report(self.assessment, self.watch, parameters.guard.mode, parameters.mode == "joint_torque")
+
+    def step(
+        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float, dt: float
+    ) -> tuple[float, bool]:
+        """Factor of the gains in this period, and whether it has changed.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        point : of action.
+        direction : of the force in the base frame (3,); None for both directions across the cover.
+        force : commanded, N.
+        dt : outer period, s.
+        """
+        return self.factor(lambda: self._contacts(q, point, direction, force), dt)
+
+    def factor(self, where: Callable[[], Sequence[Guarded]], dt: float) -> tuple[float, bool]:
+        """Factor of the gains in this period, and whether it has changed.
+
+        Parameters
+        ----------
+        where : gives the contacts that are controlled now.
+        dt : outer period, s.
+        """
+        watch = self.watch
+        if watch is None:
+            return 1.0, False
+        before = watch.assessed
+        has_changed = watch.step(where, dt)
+        if watch.assessed is not before:
+            self._report()
+        return self.present, has_changed
+
+    @property
+    def present(self) -> float:
+        """Factor of the gains in force."""
+        return 1.0 if self.watch is None or self._parameters.guard.mode == "warn" else self.watch.factor
+
+    def _contacts(
+        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float
+    ) -> list[GuardedContact]:
+        guard, covers = self._guard, self._covers
+        if self._parameters.schedule == "position" and not point.is_certain:
+            return possible_contacts(guard, q, point.cover, covers.length_of(point.cover))
+        if direction is None:
+            return guard.contacts(q, point.cover, point.position, point.position_sd)
+        contact = GuardedContact(q, point.cover, point.position, point.position_sd, direction, force)
+        return guard.sensed(guard.with_lever(contact))
+
+
+class Watch:
+    """Follows the arm and gives the factor of the gains in force.
+
+    Without scheduling the factor is 1, or less where the parameters would leave their domain.  With it
+    the margin stays the one where they were tuned; no factor takes them above `stability_fraction` of it.
+
+    Parameters
+    ----------
+    guard : computes the margins.
+    task : what is controlled, with the gains in force.
+    found : assessment of these gains when they were tuned.
+    is_scheduled : whether the gains follow the contact position.
+
+    Attributes
+    ----------
+    factor : of the gains.
+    scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
+    assessed : contacts of the last assessment, none before the first; another list after each.
+    """
+
+    def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment, is_scheduled: bool) -> None:
+        self._guard, self._task, self._is_scheduled = guard, task, is_scheduled
+        demanded = 1.0 / guard.parameters.stability_fraction
+        # gains without any margin are only taken where the guard warns: there is none to keep
+        self._tuned = found.scale or demanded
+        # in domain II the margin is less than the fraction demands, and may stay so
+        self._needed = min(self._tuned, demanded)
+        self.assessed: list[GuardedContact] = []
+        self._pending: list[GuardedContact] = []
+        self._work: Iterator[float] | None = None
+        self._least = math.inf
+        self._since = math.inf
+        self.factor, self.scale = 1.0, found.scale
+
+    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
+        """Continue the present assessment, or begin one if it is due; True if the factor has changed.
+
+        Parameters
+        ----------
+        where : gives the contacts that are possible now; called when an assessment is due.
+        dt : outer period, s.
+        """
+        self._since += dt
+        if self._work is None and self._since >= self._guard.parameters.interval:
+            self._since = 0.0
+            guarded = where()
+            contacts = [contact for each in guarded for contact in each.contacts]
+            if contacts and self._is_new(contacts):
+                self._pending, self._least = contacts, math.inf
+                self._work = self._guard.scales(self._task, guarded, self._tried())
+        if self._work is None:
+            return False
+        try:
+            self._least = min(self._least, next(self._work))
+            return False
+        except StopIteration:
+            self._work, self.assessed, self.scale = None, self._pending, self._least
+        before = self.factor
+        allowed = self.scale / self._needed
+        self.factor = min(allowed, self.scale / self._tuned) if self._is_scheduled else min(allowed, 1.0)
+        return self.factor != before
+
+    def _tried(self) -> list[float]:
+        top = LARGEST if self._is_scheduled else self._needed
+        return [part * top for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else PARTS)]
+
+    def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
+        return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
+
+
+def possible_contacts(guard: StabilityGuard, q: Sequence[float], cover: str, length: float) -> list[GuardedContact]:
+    """Contacts at an unknown position: along the whole cover, `length` m, along both axes across it."""
+    return [contact for part in POSITIONS for contact in guard.contacts(q, cover, part * length, 0.0)]
+
+
+def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
+    turned = any(abs(a - b) > TURN for a, b in zip(one.q, other.q, strict=True))
+    bent = any(abs(a - b) > TURN for a, b in zip(one.direction, other.direction, strict=True))
+    shifted = max(abs(one.position - other.position), abs(one.position_sd - other.position_sd)) > SHIFT
+    grown = not one.force / GROWTH <= other.force <= one.force * GROWTH
+    return turned or bent or shifted or grown or one.cover != other.cover
+
+
+class Report(NamedTuple):
+    """One line, whether it is a warning, and the numbers behind it by name."""
+
+    message: str
+    is_warning: bool
+    facts: dict[str, str]
+
+
+def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, is_joints: bool) -> Report:
+    """Report on the parameters in force.
+
+    Parameters
+    ----------
+    assessment : of these parameters; None where the guard is off or nothing is fed back.
+    watch : what the guard does while the arm moves.
+    mode : of the guard.
+    is_joints : whether joint torques are controlled, else the force along a direction.
+    """
+    if assessment is None or watch is None:
+        return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
+    force, length = ("N m", "rad") if is_joints else ("N", "m")
+    here = min(watch.scale, assessment.scale)
+    message = f"domain {assessment.domain}"
+    if assessment.reason:
+        message = f"not stable: {assessment.reason}"
+    elif watch.factor < 1.0 and mode != "warn":
+        message += f", gains scaled by {watch.factor:.3g}: the contact is stiffer here than where they were tuned"
+    cycle = assessment.cycle
+    facts = {
+        "guard": mode,
+        "domain": str(assessment.domain),
+        "margin": _margin(assessment.scale),
+        "margin here": _margin(here),
+        "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+        if watch.assessed
+        else UNKNOWN,
+        "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
+        "worst": assessment.where,
+        f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
+        f"stable error [{force}]": "any" if math.isinf(assessment.stable_error) else f"{assessment.stable_error:.4g}",
+        f"limit cycle [{force}]": f"{cycle.peak_to_peak:.4g}",
+        "limit cycle [s]": f"{cycle.period:.4g}",
+        f"deadband that removes it [{force}]": f"{cycle.deadband:.4g}",
+        "verdict": assessment.reason or "accepted",
+    }
+    return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
+
+
+def _margin(scale: float) -> str:
+    """Factor by which the gains may be larger."""
+    return f"more than {LARGEST:g}" if scale >= LARGEST else f"{scale:.4g}"
