@@ -11,9 +11,10 @@ import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_analysis.findings.analysis import analyse
-from wam_control.contact.contact_estimator import ALONE, ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact.contact_estimator_node import ContactEstimatorNode
 from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, SECOND
+from wam_control.contact.thresholds import CONTACT
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
@@ -99,7 +100,7 @@ def test_a_single_period_just_above_the_threshold_is_noise_and_the_second_one_a_
     assert not weak[above[0]].in_contact
     assert all(weak[i].in_contact for i in above[1:])
     strong = next(one for one in play(-size * math.sqrt(60.0 * SENSORS.detect)) if one.statistic > SENSORS.detect)
-    assert strong.statistic > ALONE * SENSORS.detect
+    assert strong.statistic > CONTACT.alone * SENSORS.detect
     assert strong.in_contact
 
 

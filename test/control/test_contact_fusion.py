@@ -9,10 +9,10 @@ import pytest
 from contact_truth import torques
 from scipy.stats import multivariate_normal
 
-from wam_control.contact import contact_fusion
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
-from wam_control.contact.contact_fusion import EVERY, MOST, SLIDES, ContactFusion, Guess, Torques, probability_of_slide
+from wam_control.contact.contact_fusion import ContactFusion, Guess, Torques, probability_of_slide
 from wam_control.contact.contact_inference import ContactInference, Hypothesis
+from wam_control.contact.thresholds import CONTACT
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 
@@ -35,7 +35,9 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
     moments = []
     for k in range(4):
         own = np.diag(random.uniform(0.1, 0.4, 4))
-        at = Torques(k * 1.1 * EVERY, same, random.standard_normal((4, 5)), shared, own, np.full(4, 0.01 * k))
+        at = Torques(
+            k * 1.1 * CONTACT.moment_interval, same, random.standard_normal((4, 5)), shared, own, np.full(4, 0.01 * k)
+        )
         rows = random.standard_normal((2, 7, 4))
         rows[:, 0] = same
         moments.append((rows, at))
@@ -116,7 +118,11 @@ def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> No
             multivariate_normal(np.zeros(6), each).pdf(torques)
             for each in (covariance, covariance + np.outer(slide, slide))
         )
-        expected = SLIDES * with_it / (SLIDES * with_it + (1.0 - SLIDES) * without)
+        expected = (
+            CONTACT.slide_probability
+            * with_it
+            / (CONTACT.slide_probability * with_it + (1.0 - CONTACT.slide_probability) * without)
+        )
         assert probability_of_slide(torques, covariance, slide) == pytest.approx(expected, rel=1e-9)
 
 
@@ -136,7 +142,7 @@ def test_an_arm_that_does_not_move_shows_nothing_new() -> None:
 
 def test_no_more_moments_than_allowed_count_and_none_without_time() -> None:
     _, fusion = played(np.random.default_rng(5), 0.0, count=12)
-    assert fusion.count == 1 + MOST
+    assert fusion.count == 1 + CONTACT.moments
     _, short = played(np.random.default_rng(5), 0.0, count=12, duration=3.5 * STEP)
     assert short.count == 1 + 3
     _, none = played(np.random.default_rng(5), 0.0, count=12, duration=0.0)
@@ -163,7 +169,7 @@ def test_a_force_that_grows_is_followed_at_once() -> None:
         seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force.tolist())
         now = Torques(k * STEP, seen, np.eye(4), 0.0 * np.eye(4), SD**2 * np.eye(4), q)
         best = inference.infer(q.tolist(), seen.tolist(), np.eye(4) / SD**2, None, fusion, now)[0]
-    assert fusion.count > contact_fusion.MOST
+    assert fusion.count > CONTACT.moments
     assert best.force == pytest.approx(force, rel=0.05, abs=0.3)
     assert best.position == pytest.approx(PLACE, abs=0.01)
 

@@ -12,6 +12,7 @@ from contact_truth import L3, L4, torques
 from wam_control.contact import contact_fit, contact_inference
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
 from wam_control.contact.contact_inference import ContactInference, Hypothesis, detection_statistic
+from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
@@ -404,7 +405,7 @@ def test_odds_of_a_force_along_the_tube_are_those_of_quadrature() -> None:
     products = (g[2, 2], g[2, 3], g[3, 3], g[0, 2], g[0, 3], g[1, 2], g[1, 3])
     logs = [
         contact_fit._log_evidence(g[0, 0], g[0, 1], g[1, 1], scale**-2, products, (lean * size) ** 2)
-        for lean in contact_fit.LEANS
+        for lean in CONTACT.end_slopes
     ]
     found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * g[0, 0]
     assert found == pytest.approx(along_by_quadrature(q, tau), abs=1e-3)

@@ -7,21 +7,10 @@ import pytest
 from arms import CONFIGURATION, WAM
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
-from wam_control.contact.model_errors import (
-    AWAY,
-    CORRELATED,
-    GATE,
-    HINDSIGHT,
-    LARGEST,
-    LEARN_EVERY,
-    MARGIN,
-    MOVED,
-    TRUST_TIME,
-    ModelErrors,
-    Observation,
-)
+from wam_control.contact.model_errors import ModelErrors, Observation
 from wam_control.contact.model_prior import ModelPrior, model_prior
 from wam_control.contact.momentum_observer import MomentumObserver
+from wam_control.contact.thresholds import CONTACT
 from wam_description.signals import State
 
 TRUE = np.array([0.3, -0.2, 0.1])
@@ -48,7 +37,7 @@ def follow(
 ) -> None:
     random = np.random.default_rng(seed)
     for _ in range(count):
-        tracked.follow(seen(random), statistic, in_contact, LEARN_EVERY)
+        tracked.follow(seen(random), statistic, in_contact, CONTACT.learn_interval)
 
 
 def test_free_motion_shows_the_errors_and_the_covariance_is_theirs() -> None:
@@ -59,13 +48,13 @@ def test_free_motion_shows_the_errors_and_the_covariance_is_theirs() -> None:
         scores.append((tracked.errors - TRUE) / np.sqrt(tracked.covariance.diagonal()))
     assert np.abs(tracked.errors - TRUE).max() < 0.1
     # observations count for less because they are taken as correlated; these are not
-    assert 0.6 < np.sqrt(CORRELATED) * np.std(scores) < 1.5
+    assert 0.6 < np.sqrt(CONTACT.correlated) * np.std(scores) < 1.5
     torques, covariance = tracked.corrected(seen(np.random.default_rng(9)))
     assert np.abs(torques).max() < 4.0 * np.sqrt(covariance.diagonal().max())
 
 
 def test_nothing_is_learned_in_contact_beyond_the_gate_or_shortly_after_a_contact() -> None:
-    for given in ({"in_contact": True}, {"statistic": GATE + 1.0}):
+    for given in ({"in_contact": True}, {"statistic": CONTACT.gate + 1.0}):
         tracked = errors()
         follow(tracked, 100, **given)
         assert not tracked.errors.any()
@@ -79,9 +68,10 @@ def test_nothing_is_learned_in_contact_beyond_the_gate_or_shortly_after_a_contac
 
 def test_what_was_seen_shortly_before_a_contact_is_not_learned() -> None:
     tracked, random = errors(), np.random.default_rng(2)
-    for _ in range(round(HINDSIGHT / LEARN_EVERY)):
-        tracked.follow(seen(random, (1.0, 1.0)), QUIET, False, LEARN_EVERY)  # a force that is not yet detected
-    tracked.follow(seen(random, (1.0, 1.0)), 30.0, True, LEARN_EVERY)
+    for _ in range(round(CONTACT.hindsight / CONTACT.learn_interval)):
+        # a force that is not yet detected
+        tracked.follow(seen(random, (1.0, 1.0)), QUIET, False, CONTACT.learn_interval)
+    tracked.follow(seen(random, (1.0, 1.0)), 30.0, True, CONTACT.learn_interval)
     assert not tracked.errors.any()
 
 
@@ -104,12 +94,12 @@ def test_what_is_learned_of_one_pose_by_holding_it_long_is_forgotten_elsewhere()
     for count in (20, 1000):
         tracked = errors()
         for _ in range(count):
-            shaken = held.pose + 0.4 * MOVED * random.uniform(-1.0, 1.0, 2)
-            tracked.follow(held._replace(pose=shaken), QUIET, False, LEARN_EVERY)
+            shaken = held.pose + 0.4 * CONTACT.pose_change * random.uniform(-1.0, 1.0, 2)
+            tracked.follow(held._replace(pose=shaken), QUIET, False, CONTACT.learn_interval)
         there = tracked.covariance.trace()
-        tracked.follow(held._replace(pose=held.pose + 1.1 * AWAY), QUIET, True, LEARN_EVERY)
+        tracked.follow(held._replace(pose=held.pose + 1.1 * CONTACT.rest_left), QUIET, True, CONTACT.learn_interval)
         assert tracked.covariance.trace() == there, "a push that moves the arm does not hide itself"
-        tracked.follow(held._replace(pose=held.pose + 1.1 * AWAY), QUIET, False, LEARN_EVERY)
+        tracked.follow(held._replace(pose=held.pose + 1.1 * CONTACT.rest_left), QUIET, False, CONTACT.learn_interval)
         found.append((tracked.errors, tracked.covariance))
     assert there < 0.8 * tracked.covariance.trace() < 0.8 * 3 * SD**2
     assert found[0][0].any()
@@ -124,7 +114,10 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
         residual = np.array([30.0 * 0.01 * random.standard_normal(), 0.0])
         pose = random.uniform(-1.0, 1.0, 2)
         tracked.follow(
-            Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2), pose, STAYS), QUIET, False, LEARN_EVERY
+            Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2), pose, STAYS),
+            QUIET,
+            False,
+            CONTACT.learn_interval,
         )
     assert np.sqrt(tracked.noise[0]) == pytest.approx(0.01, rel=0.3)
     assert tracked.noise[1] == 0.0
@@ -142,18 +135,18 @@ def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_r
             now = seen(random)._replace(moving=np.array([1.0, moving]))
             error = times * 0.05 * random.standard_normal(2)
             moment = now._replace(residual=now.effects @ TRUE + error)
-            tracked.follow(moment, QUIET, in_contact, LEARN_EVERY)
+            tracked.follow(moment, QUIET, in_contact, CONTACT.learn_interval)
 
-    for times, size in ((0.3, 1.0), (1.0, MARGIN)):
+    for times, size in ((0.3, 1.0), (1.0, CONTACT.margin)):
         tracked = errors()
-        rough(tracked, times, 6 * round(TRUST_TIME / LEARN_EVERY))
+        rough(tracked, times, 6 * round(CONTACT.trust_time / CONTACT.learn_interval))
         assert tracked.size == pytest.approx(size, rel=0.3)
         before = tracked.size
         rough(tracked, 3.0, 100, in_contact=True)
         assert tracked.size == before
     tracked = errors()
-    rough(tracked, 300.0, round(HINDSIGHT / LEARN_EVERY) + 5)
-    assert tracked.size == LARGEST
+    rough(tracked, 300.0, round(CONTACT.hindsight / CONTACT.learn_interval) + 5)
+    assert tracked.size == CONTACT.largest_size
     tracked = errors()
     rough(tracked, 3.0, 200, moving=0.0)
     assert tracked.size == 1.0
@@ -163,7 +156,7 @@ def test_noise_below_what_is_stated_counts_as_none() -> None:
     """A mean of positive parts alone would find half of the stated variance in errors that are just as stated."""
     tracked, random, found = errors(), np.random.default_rng(5), []
     for k in range(2000):
-        tracked.follow(seen(random), QUIET, False, LEARN_EVERY)
+        tracked.follow(seen(random), QUIET, False, CONTACT.learn_interval)
         if k > 300:
             found.append(tracked.noise.copy())
     stated = np.array([0.05 / 30.0, 0.05 / 20.0]) ** 2

@@ -5,7 +5,8 @@ from itertools import count
 import pytest
 
 from wam_control.task.motion import PostureMotion
-from wam_control.task.trajectory_goal import GOAL_TIME, GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
+from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
+from wam_control.thresholds import MOTION
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import PathPoint, PosturePath, State
@@ -57,7 +58,7 @@ def test_an_arm_that_stays_does_not_reach_the_goal_and_is_named_with_the_number(
     end, time = follow(goal(), moves=False)
     assert end.code is GoalCode.GOAL_TOLERANCE_VIOLATED
     assert "joint1 is off by -0.2 rad, allowed are 0.02 rad" in end.reason
-    assert time == pytest.approx(1.0 + GOAL_TIME, abs=2 * PERIOD)
+    assert time == pytest.approx(1.0 + MOTION.goal_time, abs=2 * PERIOD)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from wam_control.contact.velocity_fit import HALF_WINDOWS, VelocityFit
+from wam_control.contact.thresholds import CONTACT
+from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.signals import State
 
 DT = 1e-3
@@ -47,7 +48,7 @@ def test_a_coarse_encoder_takes_a_longer_window_and_the_stated_error_is_that_of_
         assert np.all(errors.std(axis=0) > 0.3 * np.array(fit.sd))
         delays.append(round(fit.delay / DT))
     assert delays == sorted(delays)
-    assert delays[-1] == HALF_WINDOWS[-1]
+    assert delays[-1] == CONTACT.half_windows[-1]
 
 
 def test_lost_samples_are_bridged_and_time_is_kept() -> None:

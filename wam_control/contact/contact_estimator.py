@@ -21,6 +21,7 @@ from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.second_contact import SecondContact
+from wam_control.contact.thresholds import CONTACT
 from wam_control.force.given_way import has_left
 from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
@@ -101,12 +102,7 @@ class ContactEstimate(NamedTuple):
 
 
 NOTHING = (0.0, 0.0, 0.0)
-SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
-SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
-SHAKEN = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
-ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
 TOO_EARLY = "too few samples yet"
-SMALLEST = 1e-12  # of the statistic of the torques, for a division
 
 
 class ContactEstimator:
@@ -224,11 +220,11 @@ class ContactEstimator:
         precision = inverse(covariance)
         late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
-        is_calm = self._in_contact or observer.age - self._ended > SHAKING
+        is_calm = self._in_contact or observer.age - self._ended > CONTACT.shaking_time
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
             quick = detection_statistic(fast[0], inverse(fast[1]))
-            statistic = max(statistic, quick / SUDDEN)
+            statistic = max(statistic, quick / CONTACT.sudden)
         was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
         if was_in_contact and not self._in_contact:
             self._ended = observer.age
@@ -273,7 +269,7 @@ class ContactEstimator:
             return late
         weighted = precision.dot(torques)
         size, change = float(weighted.dot(torques)), float(weighted.dot(np.subtract(torques, before or torques)))
-        late = self._delay / passed * abs(change) / max(size, SMALLEST) if passed > 0.0 else 0.0
+        late = self._delay / passed * abs(change) / max(size, CONTACT.smallest_statistic) if passed > 0.0 else 0.0
         self._before = self._observer.age, torques, late
         return late
 
@@ -288,10 +284,10 @@ class ContactEstimator:
 
     def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above
-        self._is_above = statistic > (detect if is_calm else SHAKEN * detect)
+        self._is_above = statistic > (detect if is_calm else CONTACT.shaken * detect)
         if self._in_contact:
             return statistic > self._parameters.release
-        return (is_calm and statistic > ALONE * detect) or (self._is_above and was_above)
+        return (is_calm and statistic > CONTACT.alone * detect) or (self._is_above and was_above)
 
     @property
     def model_errors(self) -> dict[str, TrackedError]:

@@ -5,6 +5,7 @@ from typing import Any
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact.contact_inference import SECOND
 from wam_control.contact.contact_table import friction_table, hypothesis_table
+from wam_control.contact.thresholds import CONTACT
 from wam_control.force.task import is_pressing
 from wam_description.arm import Shared, seconds
 from wam_description.signals import (
@@ -23,8 +24,6 @@ from wam_description.signals import (
 from wam_description.status import ENABLED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
-
-DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
 
 
 class ContactEstimatorNode:
@@ -87,7 +86,7 @@ class ContactEstimatorNode:
             outputs["contact/in_contact"] = estimate.in_contact
         self._doubted += (estimate.contacts > 1) * seconds(self._timing.outer_period_ns)
         self._doubted *= estimate.in_contact
-        warning = SECOND if self._doubted > DOUBTED else estimate.warning
+        warning = SECOND if self._doubted > CONTACT.second_contact_after else estimate.warning
         if warning != self._warned:
             self._warned = warning
             outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)

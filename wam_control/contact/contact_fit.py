@@ -17,20 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.contact.thresholds import CONTACT
+
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
-
-LEAST_FORCE = 1e-6  # N, avoids a division by zero where there is no force
-REACH = 8.0  # of the log of probability; positions further below the maximum are neglected
-FEW = 6  # positions in a peak; with fewer, it is refined
-PARTS = 12  # pieces of a refined peak, two thirds of a standard deviation each
-WEAK_PRIOR = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
-END = 0.01  # m, length of the end of a link
-LEANS = (0.05, 0.5)  # force across the tube per force along it, on its end
-SET = 0.9  # probability of the set that is reported, of contacts
-LARGEST_EXPONENT = 500.0
-LEAST_CHANCE = 1e-300  # avoids the logarithm of 0
 
 
 class Fit(NamedTuple):
@@ -137,7 +128,9 @@ class ContactFit:
         cells: list[Cell] = []
         for i, link in enumerate(links):
             cells += self._cells(i, link, log_density[i], top)
-            cells += self._at_ends(i, link, top - REACH) + self._along(i, full[i], top - REACH)
+            cells += self._at_ends(i, link, top - CONTACT.search_depth) + self._along(
+                i, full[i], top - CONTACT.search_depth
+            )
         parts = self._parts(sorted(cells, reverse=True), other)
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
@@ -160,12 +153,12 @@ class ContactFit:
 
         Such a peak is the exponential of a parabola, found by parabolas through three positions, ever closer.
         """
-        row, width, floor = self._row[i], self._widths[i], top - REACH
+        row, width, floor = self._row[i], self._widths[i], top - CONTACT.search_depth
         top_value = max(values)
         if top_value <= floor:
             return []
         cells = [(value, x, width, i, False) for value, x in zip(values, row, strict=True) if value > floor]
-        if len(cells) >= FEW:
+        if len(cells) >= CONTACT.few_positions:
             return cells
         peak = values.index(top_value)
         (start, end), x, near, last = self._ends[i], row[peak], width, len(values) - 1
@@ -184,8 +177,8 @@ class ContactFit:
         left, right = max(start, x - 4.0 * sd), min(end, x + 4.0 * sd)
         if left >= right:  # the peak lies beyond the end of the link, which gets all of it
             left, right = (end - sd, end) if x > end else (start, start + sd)
-        part = (right - left) / PARTS
-        positions = [left + (k + 0.5) * part for k in range(PARTS)]
+        part = (right - left) / CONTACT.peak_positions
+        positions = [left + (k + 0.5) * part for k in range(CONTACT.peak_positions)]
         return [(at + bend * (position - x) ** 2, position, part, i, False) for position in positions]
 
     @staticmethod
@@ -211,15 +204,15 @@ class ContactFit:
                 mine[3] += weight
                 mine[4] += weight * x
         total, passed = sum(weights), 0.0
-        enough = SET * total
-        total += math.exp(min(other - top, LARGEST_EXPONENT))
+        enough = CONTACT.reported_probability * total
+        total += math.exp(min(other - top, CONTACT.largest_exponent))
         inside = [[math.inf, -math.inf] for _ in self._ends]
         for weight, (_, x, width, i, _) in zip(weights, cells, strict=True):
             if passed >= enough:
                 break
             # of the last piece only the part that fills the set, on the side of the others; an end is not divided
             passed += weight
-            unused = width * (passed - enough) / weight if passed > enough and width != END else 0.0
+            unused = width * (passed - enough) / weight if passed > enough and width != CONTACT.end_length else 0.0
             part, half = inside[i], 0.5 * width
             low, high = x - half, x + half
             if part[0] > part[1]:
@@ -245,10 +238,14 @@ class ContactFit:
         if not self._end_weight:
             return []
         start, end = self._ends[i]
-        places = [start + 0.5 * END] * (i > 0) + [end - 0.5 * END] * (i + 1 < len(self._ends))
-        offset = math.log(self._end_weight / END) - link.constant
+        places = [start + 0.5 * CONTACT.end_length] * (i > 0) + [end - 0.5 * CONTACT.end_length] * (
+            i + 1 < len(self._ends)
+        )
+        offset = math.log(self._end_weight / CONTACT.end_length) - link.constant
         values = [link.log_density(x) + offset for x in places]
-        return [(value, x, END, i, False) for value, x in zip(values, places, strict=True) if value > floor]
+        return [
+            (value, x, CONTACT.end_length, i, False) for value, x in zip(values, places, strict=True) if value > floor
+        ]
 
     def _along(self, i: int, gram: list[list[float]], floor: float) -> list[Cell]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
@@ -257,10 +254,10 @@ class ContactFit:
         """
         (rr, ra1, ra2, rb1, rb2, _, ra), g1, g2, g3, g4, _, axial = gram
         aa, precision, weight = axial[6], self._precision, self._along_weight
-        if not weight or aa < WEAK_PRIOR * precision or i + 1 < len(self._ends):
+        if not weight or aa < CONTACT.weak_prior * precision or i + 1 < len(self._ends):
             return []
         start, end = self._ends[i]
-        size = abs(ra) / (aa + precision) + LEAST_FORCE
+        size = abs(ra) / (aa + precision) + CONTACT.smallest_force
         base, precision = math.log(weight), min(precision, size**-2)
         surface = (g3[3], g3[4], g4[4], rb1, rb2, g3[6], g4[6])
         value = base + _log_evidence(rr, ra, aa, precision, surface, 0.5 * (self._radius[i] * size) ** 2)
@@ -274,10 +271,10 @@ class ContactFit:
             g1[6] + end * g3[6],
             g2[6] + end * g4[6],
         )
-        caps = [base + _log_evidence(rr, ra, aa, precision, across, (lean * size) ** 2) for lean in LEANS]
+        caps = [base + _log_evidence(rr, ra, aa, precision, across, (lean * size) ** 2) for lean in CONTACT.end_slopes]
         cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]] if value > floor else []
-        caps = [cap - math.log(len(LEANS) * END) for cap in caps]
-        return cells + [(cap, end, END, i, True) for cap in caps if cap > floor]
+        caps = [cap - math.log(len(CONTACT.end_slopes) * CONTACT.end_length) for cap in caps]
+        return cells + [(cap, end, CONTACT.end_length, i, True) for cap in caps if cap > floor]
 
     def _fit(
         self,
@@ -294,7 +291,7 @@ class ContactFit:
         step = 0.5 * self._widths[i]
         ahead, _, _ = link.force(place + step)
         d1, d2 = (ahead[0] - force[0]) / step, (ahead[1] - force[1]) / step
-        size = math.hypot(*force) + LEAST_FORCE
+        size = math.hypot(*force) + CONTACT.smallest_force
         u1, u2 = force[0] / size, force[1] / size
         along = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22 + (u1 * d1 + u2 * d2) ** 2 * variance
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22 + (u1 * d2 - u2 * d1) ** 2 * variance
@@ -343,7 +340,7 @@ class _Link:
         (p0, p1, p2), (q0, q1, q2), (s0, s1, s2) = self.terms[:3]
         a1b1, a1b2, a2b1, a2b2, b11, b12, b22 = self._slopes
         f1, f2 = force
-        less = self.precision * (1.0 - WEAK_PRIOR)
+        less = self.precision * (1.0 - CONTACT.weak_prior)
         n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
         v1 = f1 * (a1b1 + x * b11) + f2 * (a1b2 + x * b12)
         v2 = f1 * (a2b1 + x * b12) + f2 * (a2b2 + x * b22)
@@ -365,7 +362,7 @@ def log_evidence_of_weight(gram: Array, least: float) -> float:
     """
     rr, ra, aa = float(gram[0, 0]), float(gram[0, 1]), float(gram[1, 1]) + least
     positive = 0.5 * math.erfc(-ra / math.sqrt(2.0 * aa))
-    return -0.5 * (rr - ra * ra / aa + math.log(aa / least)) + math.log(2.0 * max(positive, LEAST_CHANCE))
+    return -0.5 * (rr - ra * ra / aa + math.log(aa / least)) + math.log(2.0 * max(positive, CONTACT.least_chance))
 
 
 def _log_evidence(
@@ -448,9 +445,9 @@ def _with_tangential_force(
     terms = _terms(triangle, precision)
     found = [_force(terms, x) for x in places]
     _, best = max((explained, force) for force, explained, _ in found)
-    precision = min(precision, 1.0 / (best[0] * best[0] + best[1] * best[1] + LEAST_FORCE))
+    precision = min(precision, 1.0 / (best[0] * best[0] + best[1] * best[1] + CONTACT.smallest_force))
     _, (f1, f2) = max((explained + math.log(sd[0] * sd[2] - sd[1] * sd[1]), force) for force, explained, sd in found)
-    size = math.hypot(f1, f2) + LEAST_FORCE
+    size = math.hypot(f1, f2) + CONTACT.smallest_force
     sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2
     u0, u1, u2, u3, u4 = arm * t[0], arm * t[1], arm * t[2], arm * t[3], arm * t[4]

@@ -13,7 +13,7 @@ links' probabilities: its direction by a fraction of its size, its position by t
 and by the speed of a contact that slides along its link.  Few do: how probable that is follows from the same moments,
 by how much better a speed explains them, whatever the force and the position.
 How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
-`BELIEF` degrees of freedom of the statement itself.
+`freedom` degrees of freedom of the statement itself.
 
 The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past moments are
 computed when one joins them; with the present one, of covariance C_nn, they are those of (Rasmussen & Williams,
@@ -28,28 +28,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact.contact_fit import LARGEST_EXPONENT
+from wam_control.contact.thresholds import CONTACT
 from wam_description.small_matrices import inverse, solution, solutions
 
 Array = NDArray[np.float64]
 
-EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
-MOST = 6  # past moments
-FINEST = 1e-3  # N m, sd of the errors of one moment, below which rounding decides what moments have in common
-ROUNDING = 1e-4  # difference of inner products that are equal but for rounding, above which it decides what they are
-MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments show nothing
-TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
-SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
-DRIFTS = 0.02  # m/s: the same, of what touches an arm that does not move
-FAST = 0.5  # m/s: sd of the speed along its link of a contact that slides
-SLIDES = 0.05  # probability of such a contact
-ANY_FORCE, ANY_PLACE = 2.0, 0.1  # of its size, and m: sd of its force and position where only its speed counts
-LATE = 0.03  # s that a contact moves on after the last moment: torques are 20 ms late, and moments that far apart
 UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
-LIKE, GROWN = 0.25, 4.0  # least and largest torques of the same contact, of those of its last moment
-BELIEF = 10.0  # degrees of freedom
-UNKNOWN = 3  # of a contact: its position and the force across the link
-DIFFERENT = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
 
 
 class Torques(NamedTuple):
@@ -123,7 +107,7 @@ class ContactFusion:
         self._moments: deque[_Seen] = deque()
         self._past: _Past | None = None
         self._widening = 1.0
-        self._speed = _speed(SLIDES)
+        self._speed = _speed(CONTACT.slide_probability)
         self.count = 1
 
     def gram(self, rows: Array, now: Torques) -> Array | None:
@@ -142,7 +126,7 @@ class ContactFusion:
         covariance = effects.dot(now.covariance).dot(effects.T) + now.own
         way = self._speed * (now.time - past.last.time)
         grown = _grown(now.residual, past.last.residual, covariance, way * past.slope)
-        if not LIKE < grown < GROWN:
+        if not CONTACT.least_likeness < grown < CONTACT.most_growth:
             self.reset()
             return None
         scale = np.array([1.0, *[1.0 / grown] * 6])
@@ -151,7 +135,7 @@ class ContactFusion:
         found: Array = (
             past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)
         ) / self._widening
-        if np.abs(found - found.transpose(0, 2, 1)).max() > ROUNDING:
+        if np.abs(found - found.transpose(0, 2, 1)).max() > CONTACT.rounding:
             self.reset()
             return None
         self.count = 1 + past.moments
@@ -166,20 +150,20 @@ class ContactFusion:
         residual : chi^2 of all moments that the fit does not explain.
         """
         if self._past is not None and self.count > 1:
-            freedom = max(0.0, self._past.expected + len(now.residual) - UNKNOWN)
-            self._widening = (BELIEF + self._widening * residual) / (BELIEF + freedom)
-            if self._widening > DIFFERENT:
+            freedom = max(0.0, self._past.expected + len(now.residual) - CONTACT.unknowns)
+            self._widening = (CONTACT.freedom + self._widening * residual) / (CONTACT.freedom + freedom)
+            if self._widening > CONTACT.different:
                 self.reset()
         moments, last = self._moments, self._last
-        is_early = last is not None and now.time - last.torques.time < EVERY
-        if is_early or not self._duration or now.own.diagonal().min() < FINEST**2:
+        is_early = last is not None and now.time - last.torques.time < CONTACT.moment_interval
+        if is_early or not self._duration or now.own.diagonal().min() < CONTACT.finest_sd**2:
             return
-        has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > MOVED
+        has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > CONTACT.pose_change
         if has_moved:
             moments.extend([] if last is None else [last])
             self._last = _Seen(now, rows)
         count = len(moments)
-        while moments and (len(moments) > MOST or now.time - moments[0].torques.time > self._duration):
+        while moments and (len(moments) > CONTACT.moments or now.time - moments[0].torques.time > self._duration):
             moments.popleft()
         if has_moved or len(moments) < count:
             self._past = self._of(list(moments), now, guess) if moments else None
@@ -198,8 +182,8 @@ class ContactFusion:
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
         forces = solutions(levers, present @ last.residual)  # (links, 3), N
-        moved = SLIPS * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
-        elapsed = np.array([now.time + LATE - moment.torques.time for moment in moments])
+        moved = CONTACT.slip * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
+        elapsed = np.array([now.time + CONTACT.moves_on - moment.torques.time for moment in moments])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
         ways = (moved + self._speed * elapsed).tolist()
@@ -212,7 +196,7 @@ class ContactFusion:
         for j, moment in enumerate(moments):
             common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
         covariance = common.copy()
-        turned = sides * (chances * TURNED * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
+        turned = sides * (chances * CONTACT.force_turn * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
         for j in range(count):
             of = slice(n * j, n * j + n)
             side = turned[:, :, j].reshape(-1, n)
@@ -221,15 +205,15 @@ class ContactFusion:
         link = int(chances.argmax())
         unknown = np.concatenate(
             (
-                ANY_FORCE * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),
-                ANY_PLACE * per_metre[link].reshape(1, -1),
-                (per_metre[link] * (moved + DRIFTS * elapsed)[:, None]).reshape(1, -1),
+                CONTACT.any_force * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),
+                CONTACT.any_position * per_metre[link].reshape(1, -1),
+                (per_metre[link] * (moved + CONTACT.drift * elapsed)[:, None]).reshape(1, -1),
             )
         )
         slides = probability_of_slide(
             np.concatenate([moment.torques.residual for moment in moments]),
             self._widening * (covariance + unknown.T @ unknown),
-            FAST * (per_metre[link] * elapsed[:, None]).reshape(-1),
+            CONTACT.slide_speed * (per_metre[link] * elapsed[:, None]).reshape(-1),
         )
         self._speed = _speed(slides)
         far = np.multiply.outer(chances, moved + self._speed * elapsed)
@@ -264,7 +248,7 @@ def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> fl
 
 
 def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> float:
-    """Probability that a contact slides, by the ratio of the evidence with and without, of prior odds `SLIDES`.
+    """Probability that a contact slides, by the ratio of the evidence with and without.
 
     Parameters
     ----------
@@ -275,10 +259,14 @@ def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> flo
     weighted = solution(covariance, slide)
     gain = float(slide.dot(weighted))
     evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
-    odds = SLIDES / (1.0 - SLIDES) * math.exp(min(evidence, LARGEST_EXPONENT))
+    odds = (
+        CONTACT.slide_probability
+        / (1.0 - CONTACT.slide_probability)
+        * math.exp(min(evidence, CONTACT.largest_exponent))
+    )
     return odds / (1.0 + odds)
 
 
 def _speed(slides: float) -> float:
     """Standard deviation of the speed along the link, m/s, of a contact that slides with a probability."""
-    return math.sqrt(slides * FAST**2 + (1.0 - slides) * DRIFTS**2)
+    return math.sqrt(slides * CONTACT.slide_speed**2 + (1.0 - slides) * CONTACT.drift**2)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence_of_weight
 from wam_control.contact.contact_fusion import ContactFusion, Guess, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
+from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, require
 from wam_description.rigid_body import RigidBody
@@ -25,8 +26,6 @@ Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
 
-SMALLEST_SD = 1e-4  # N m, of external torques: below that rounding decides where a contact is, or on which link
-NOTED = 0.05  # probability of a force along the tube above which that is a reason why the link is not identified
 
 MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
 BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
@@ -178,7 +177,7 @@ class ContactInference:
         ----------
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
-        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); of smaller ones than `SMALLEST_SD` that.
+        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); not below `smallest_sd`.
         load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
         fusion : earlier moments of the same contact, to which this one is added; None for this one alone.
         now : the same torques with what is known of their errors, for `fusion`.
@@ -188,11 +187,11 @@ class ContactInference:
         tuple of Hypothesis
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
-        if (size := sum(precision.diagonal().tolist())) > (10.0 * SMALLEST_SD) ** -2:
+        if (size := sum(precision.diagonal().tolist())) > (10.0 * CONTACT.smallest_sd) ** -2:
             fusion = None  # together they would be as exact
-        if size > SMALLEST_SD**-2:
+        if size > CONTACT.smallest_sd**-2:
             precision = np.asarray(
-                np.linalg.inv(np.linalg.inv(precision) + SMALLEST_SD**2 * np.eye(len(torques))), np.float64
+                np.linalg.inv(np.linalg.inv(precision) + CONTACT.smallest_sd**2 * np.eye(len(torques))), np.float64
             )
         at, links = np.array(q), len(self._covers)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
@@ -215,7 +214,7 @@ class ContactInference:
             moments = fusion.count
             best = max(fits, key=lambda fit: fit.probability)
             fusion.remember(rows, now, [Guess(fit.position, fit.probability) for fit in fits], best.residual)
-        is_payload = 1.0 - sum(fit.probability for fit in fits) > NOTED
+        is_payload = 1.0 - sum(fit.probability for fit in fits) > CONTACT.noted_probability
         ambiguity = (
             self._ambiguity(q, fits)
             if max(fit.probability for fit in fits) < self._parameters.identification_threshold
@@ -258,7 +257,7 @@ class ContactInference:
         reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
         if ambiguity:
             reasons.append(ambiguity)
-        if fit.along > (NOTED if ambiguity else 0.5):
+        if fit.along > (CONTACT.noted_probability if ambiguity else 0.5):
             reasons.append(ALONG)
         if fit.residual > moments * self._parameters.largest_residual:
             reasons.append(MORE)

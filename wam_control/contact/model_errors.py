@@ -17,23 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.model_prior import ModelPrior
+from wam_control.contact.thresholds import CONTACT
 
 Array = NDArray[np.float64]
-
-LEARN_EVERY = 0.01  # s
-HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
-MOVED = 2e-3  # rad, of any joint: another pose
-AWAY = 0.005  # rad, from a pose where the arm has rested: what was learned there is no longer true
-CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
-GATE = 12.0  # of the detection statistic, above which nothing is learned
-HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
-NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
-TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
-MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
-LARGEST = 4.0  # of that size
-ALIKE = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
-LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
-SURE = 2.0  # sd of an error that it must have beyond what is tolerable
 
 
 class Observation(NamedTuple):
@@ -132,7 +118,9 @@ class ModelErrors:
         `then` is a mean, of which the noise of the motors is left out.
         """
         effects = now.effects - then.effects
-        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + self._noise_of(now)
+        covariance = (
+            effects.dot(self.covariance).dot(effects.T) + CONTACT.alike * (now.rest + then.rest) + self._noise_of(now)
+        )
         return now.residual - then.residual - effects.dot(self.errors), covariance
 
     def _noise_of(self, seen: Observation) -> Array:
@@ -145,24 +133,26 @@ class ModelErrors:
         """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""
         if in_contact:
             self._contact += span
-            self._hold = min(HOLD_OFF * self._contact, LONGEST_HOLD_OFF)
+            self._hold = min(CONTACT.hold_off * self._contact, CONTACT.longest_hold_off)
             self._waiting.clear()
         elif self._hold > 0.0:
             self._hold, self._contact = self._hold - span, 0.0
         self._since += span
-        if self._since < LEARN_EVERY:
+        if self._since < CONTACT.learn_interval:
             return
         self._grow(self._since)
         self._rested += self._since
-        if not in_contact and np.abs(seen.pose - self._at).max() > (AWAY if self._elsewhere else MOVED):
+        if not in_contact and np.abs(seen.pose - self._at).max() > (
+            CONTACT.rest_left if self._elsewhere else CONTACT.pose_change
+        ):
             self._leave(seen.pose)
         if not in_contact and self._hold <= 0.0:
             self._contact = 0.0
             self._waiting.append(seen)
-            if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
+            if len(self._waiting) > CONTACT.hindsight / CONTACT.learn_interval and statistic < CONTACT.gate:
                 before = self._waiting.popleft()
                 self._of_pose += 1
-                if self._of_pose > CORRELATED and self._elsewhere is None:
+                if self._of_pose > CONTACT.correlated and self._elsewhere is None:
                     self._elsewhere, self._rested = (self.errors.copy(), self.covariance.copy()), 0.0
                 self._learn(before, self._since)
         self._since = 0.0
@@ -179,24 +169,24 @@ class ModelErrors:
     def _grow(self, span: float) -> None:
         covariance = self.covariance
         covariance += span * self._walk
-        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), LEAST)))
+        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), CONTACT.least_variance)))
         covariance *= scale
         covariance *= scale[:, None]
 
     def _learn(self, seen: Observation, span: float) -> None:
         innovation, covariance = self.corrected(seen)
         # of a shaft at rest stiction hides the errors
-        rate = span / TRUST_TIME * float(seen.moving.min())
+        rate = span / CONTACT.trust_time * float(seen.moving.min())
         squared = float(innovation.dot(np.linalg.solve(covariance, innovation))) / len(innovation)
-        self.size = min(max(self.size + rate * (MARGIN * squared - self.size), 1.0), LARGEST)
-        rate = span / NOISE_TIME
+        self.size = min(max(self.size + rate * (CONTACT.margin * squared - self.size), 1.0), CONTACT.largest_size)
+        rate = span / CONTACT.noise_time
         at_motors = self._to_motors @ innovation
         known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
         # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
         self.noise += rate * seen.moving * (at_motors * at_motors - known - self.noise)
         self.noise = np.maximum(0.0, self.noise)
         gain_torques = self.covariance @ seen.effects.T
-        coloured = covariance + (CORRELATED - 1.0) * (covariance - seen.effects @ gain_torques)
+        coloured = covariance + (CONTACT.correlated - 1.0) * (covariance - seen.effects @ gain_torques)
         gain = np.linalg.solve(coloured, gain_torques.T).T
         self.errors += gain @ innovation
         self.covariance -= gain @ gain_torques.T
@@ -204,7 +194,7 @@ class ModelErrors:
         self.beyond = self._beyond()
 
     def _beyond(self) -> list[str]:
-        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
+        excess = np.abs(self.errors) - CONTACT.sure * np.sqrt(self.covariance.diagonal())
         ratio = excess / self._prior.tolerable
         found = np.flatnonzero(ratio > 1.0)
         return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []

@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 WAYS = ("positive", "negative")
-# friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
-TOLERABLE = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
-LEAST = 0.02  # sd of an identified friction, per friction: what changes from the identification to the use
 
 
 class ModelPrior(NamedTuple):
@@ -81,7 +79,7 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
         "delay of the torques",
         "payload",
     )
-    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, 2 * n, n, 1, 1]))
+    return ModelPrior(names, errors, covariance, limit, np.repeat(CONTACT.tolerable, [4 * n, n, 2 * n, n, 1, 1]))
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
@@ -116,4 +114,4 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
     rows = np.flatnonzero(mixing.any(axis=1))
     found = mixing[rows] @ np.reshape(model.covariance.values, (len(known), len(known))) @ mixing[rows].T
     covariance[rows] = covariance[:, rows] = 0.0
-    covariance[np.ix_(rows, rows)] = found + np.diag(np.where(rows < 4 * n, LEAST, 0.0) ** 2)
+    covariance[np.ix_(rows, rows)] = found + np.diag(np.where(rows < 4 * n, CONTACT.identified_friction_sd, 0.0) ** 2)

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
-from wam_control.contact.model_errors import ALIKE, ModelErrors, Observation, TrackedError
+from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import ShaftFriction
+from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.tool_load import ToolLoad
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
@@ -26,7 +27,6 @@ from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
-SETTLED = 2.0  # time constants from the first sample until the estimate is ready
 
 
 class MomentumObserver:
@@ -248,7 +248,7 @@ class MomentumObserver:
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
-        settled = self.age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
+        settled = self.age > CONTACT.settled * self._parameters.time_constant and self._filled >= 2 * self._cycle
         self.is_ready = self.is_ready or (before is not None and settled)
         return True
 
@@ -324,7 +324,7 @@ class MomentumObserver:
             torques, covariance = self._errors.change(self.seen, then)
             return torques, self._errors.size * covariance
         effects = self.seen.effects - then.effects
-        return self.seen.residual - then.residual, effects.dot(effects.T) + ALIKE * (self.seen.rest + then.rest)
+        return self.seen.residual - then.residual, effects.dot(effects.T) + CONTACT.alike * (self.seen.rest + then.rest)
 
     def corrected(self, then: Observation) -> Array:
         """External torques, (n,), N m, of a mean of what was `seen`, with the present errors of the model."""

@@ -16,25 +16,12 @@ from numpy.typing import NDArray
 from wam_control.contact.contact_inference import ContactInference, Hypothesis
 from wam_control.contact.model_errors import Observation
 from wam_control.contact.momentum_observer import MomentumObserver
+from wam_control.contact.thresholds import CONTACT
 from wam_description.small_matrices import solution, solutions
 
 Array = NDArray[np.float64]
 
-EVERY = 0.0099  # s
-SETTLING = 0.05  # s, of the filters of the observer, from the start of a contact
-OLDEST, YOUNGEST = 0.141, 0.059  # s, ages of the moments that are the steady contact
-LEAST = 3  # of them
-LASTING = 2  # changes in succession
-# change of the friction of the first contact, per its force, that stays below the threshold: a friction coefficient of
-# 0.8 may turn back. What even that does not explain is nearly certain to be a second contact, if it is noticed before
-# the steady contact is older than `OLDEST`: later, it has changed itself
-TURNED = 1.6
 RELEASED = 1.0 / 3.0  # of the threshold, below which the second contact has gone
-GROWTH = 3.0  # sd of the change of the first contact's force, per force
-FRICTION = 0.1  # sd of its other components, per change
-SLIDE = 0.02  # m, sd of its displacement
-TURN = 0.5  # sd of the torques that change because the arm turns, per such change: the force may stay in the world
-LEAST_PROBABILITY = 0.1  # of a hypothesis
 UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
 
 
@@ -92,28 +79,30 @@ class SecondContact:
         self, time: float, hypotheses: tuple[Hypothesis, ...], observer: MomentumObserver, inference: ContactInference
     ) -> None:
         """Take the explanation of one moment, `time` in s, by the observer's torques and pose."""
-        if not self._threshold or time - self._last < EVERY:
+        if not self._threshold or time - self._last < CONTACT.change_interval:
             return
         self._last = time
         if math.isnan(self._begin):
             self._begin = time
         seen = observer.seen
-        if seen is None or time - self._begin < SETTLING:
+        if seen is None or time - self._begin < CONTACT.settling:
             return
         if not self._sums:
             self._sums = [np.zeros_like(part) for part in seen]
         if not self.is_suspected:
             self._remember(_Moment(time, seen, hypotheses, inference.jacobians))
-        if len(self._steady) < LEAST:
+        if len(self._steady) < CONTACT.least_moments:
             return
         change = self._change(observer, inference)
         statistic = self._statistic(change, 0.0) if change else 0.0
         if self.is_suspected:
             if not change or statistic < RELEASED * self._threshold:
                 self.reset()
-                self._begin = time - SETTLING
-            elif time - self._since < OLDEST and not self.is_certain:
-                self.is_certain = self._exceeds(self._statistic(change, TURNED / math.sqrt(self._threshold)))
+                self._begin = time - CONTACT.settling
+            elif time - self._since < CONTACT.oldest and not self.is_certain:
+                self.is_certain = self._exceeds(
+                    self._statistic(change, CONTACT.friction_turn / math.sqrt(self._threshold))
+                )
             return
         if self._exceeds(statistic):
             self.is_suspected, self._since, self._found = True, time, 0
@@ -121,16 +110,16 @@ class SecondContact:
     def _exceeds(self, statistic: float) -> bool:
         """Whether so many changes in succession have exceeded the threshold."""
         self._found = self._found + 1 if statistic > self._threshold else 0
-        return self._found >= LASTING
+        return self._found >= CONTACT.changes
 
     def _remember(self, moment: _Moment) -> None:
         recent, steady = self._recent, self._steady
         recent.append(moment)
-        while moment.time - recent[0].time > YOUNGEST:
+        while moment.time - recent[0].time > CONTACT.youngest:
             entering = recent.popleft()
             steady.append(entering)
             self._sums = [total + part for total, part in zip(self._sums, entering.seen, strict=True)]
-        while steady and moment.time - steady[0].time > OLDEST:
+        while steady and moment.time - steady[0].time > CONTACT.oldest:
             self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
 
     def _change(self, observer: MomentumObserver, inference: ContactInference) -> _Change | None:
@@ -152,7 +141,7 @@ class SecondContact:
         forces = solutions(levers, then_sides @ observer.corrected(then))[:, None]
         turned, force = sides - then_sides, forces[0, 0]
         turns = (forces @ turned)[:, 0]
-        weight = np.array([max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses])
+        weight = np.array([max(h.probability, CONTACT.least_probability) for h in first.hypotheses])
         weight /= weight.sum()
         turn = weight.dot(turns)
         change -= turn
@@ -160,9 +149,9 @@ class SecondContact:
         changes = np.empty((others + 4, len(change)))  # of one sd each
         changes[:others] = (turns - turn) * np.sqrt(weight)[:, None]
         changes[others] = turns[0] - np.array(best.force).dot(turned[0])
-        changes[others + 1] = TURN * turn
-        changes[others + 2] = SLIDE * inference.slide(best, force)
-        changes[others + 3] = GROWTH * own
+        changes[others + 1] = CONTACT.torque_turn * turn
+        changes[others + 2] = CONTACT.slide * inference.slide(best, force)
+        changes[others + 3] = CONTACT.growth * own
         covariance += changes.T.dot(changes)
         return _Change(change, covariance, math.sqrt(force.dot(force)), own, sides[0])
 
@@ -173,6 +162,6 @@ class SecondContact:
         statistic = float(torques.dot(explained))
         if statistic < RELEASED * self._threshold:
             return statistic
-        grown = GROWTH * GROWTH * abs(float(change.own.dot(explained)))
-        across = (FRICTION * grown + turned) * change.force * change.sides
+        grown = CONTACT.growth * CONTACT.growth * abs(float(change.own.dot(explained)))
+        across = (CONTACT.friction * grown + turned) * change.force * change.sides
         return float(torques.dot(solution(covariance + across.T.dot(across), torques)))

@@ -5,14 +5,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.thresholds import CONTACT
 from wam_description.parts import Joints, Motors
 
-SLOW = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
-# of `shape_uncertainty`, and seconds at the rest velocity: angle after a reversal over which it counts (presliding)
-STEEP, NEAR = 2.0, 0.6
-SHALLOW, FAR = 3.2, 0.2
-LONGEST = 6.0 * NEAR
-FULL = 3.0  # sd of the measured velocity that the rest velocity is at least
+LONGEST = 6.0 * CONTACT.steep_angle
 
 
 class ShaftMotion(NamedTuple):
@@ -64,7 +60,7 @@ class ShaftFriction:
 
     def expect(self, velocity_sd: Sequence[float]) -> None:
         """Take the standard deviations of the velocities, (n,), rad/s: a shaft slower than them may be at rest."""
-        self._rest = [max(self._rest_velocity, FULL * sd) for sd in velocity_sd]
+        self._rest = [max(self._rest_velocity, CONTACT.rest_noise * sd) for sd in velocity_sd]
 
     def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
         """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
@@ -86,11 +82,15 @@ class ShaftFriction:
             friction.append(self.dynamic[i] * acting + self._viscous[i] * v)
             sliding.append(share)
             resting.append(rests)
-            slow, since = abs(v) / (SLOW * slowest), abs(travel[i]) / slowest
+            slow, since = abs(v) / (CONTACT.slow * slowest), abs(travel[i]) / slowest
             if travel[i] * v < 0.0 < keep:
                 since = 0.0  # it turns back; a dither ends each of its swings in that way
             uncertain = math.exp(-slow) if slow < LONGEST else 0.0
             if since < LONGEST:
-                uncertain = max(uncertain, STEEP * math.exp(-since / NEAR) + SHALLOW * math.exp(-since / FAR))
+                uncertain = max(
+                    uncertain,
+                    CONTACT.steep_shape * math.exp(-since / CONTACT.steep_angle)
+                    + CONTACT.shallow_shape * math.exp(-since / CONTACT.shallow_angle),
+                )
             shape.append(fraction * uncertain)
         return ShaftMotion(friction, sliding, resting, shape)

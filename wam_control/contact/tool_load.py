@@ -6,11 +6,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
-
-LOAD_DIVISOR = 4  # samples per update of the payload's torque, which changes slowly
-NO_MASS = 1e-6  # kg, the smallest mass that a link may have
 
 
 class ToolLoad:
@@ -19,7 +17,7 @@ class ToolLoad:
     def __init__(self, arm: Arm, payload: tuple[float, ...]) -> None:
         n = len(arm.links.names)
         centre = (*arm.links.centre[:-3], *arm.tool)
-        masses, none = (NO_MASS,) * (n - 1) + (1.0,), (0.0,) * (3 * n)
+        masses, none = (CONTACT.smallest_mass,) * (n - 1) + (1.0,), (0.0,) * (3 * n)
         links = dataclasses.replace(arm.links, mass=masses, centre=centre, inertia=none, product=none)
         self._body = RigidBody(dataclasses.replace(arm, links=links, payload=0.0))
         low, high = payload
@@ -39,7 +37,7 @@ class ToolLoad:
     def observe(self, q: list[float], qd: list[float], span: float, keep: float) -> None:
         """Follow one sample of the joints, (n,) rad and rad/s."""
         self._span, self._keep, self._count = self._span + span, self._keep * keep, self._count + 1
-        if self._before is not None and self._count < LOAD_DIVISOR:
+        if self._before is not None and self._count < CONTACT.load_divisor:
             return
         span, keep, body = self._span, self._keep, self._body
         self._span, self._keep, self._count = 0.0, 1.0, 0

@@ -7,16 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.contact.thresholds import CONTACT
 from wam_description.signals import State
 
 Array = NDArray[np.float64]
-HALF_WINDOWS = (0, 1, 2, 4)  # samples on each side of the fitted one
-LONGEST = 0.0081  # s, of a window: motion is nearly uniform in it
-VELOCITY_SD = 0.04  # rad/s, above which the next longer window is taken, while there is one
 THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
-UP, DOWN = 5e-3, 2.5e-3  # per sample, how fast that mean is followed
-LARGEST = 1.0  # rad, of a third difference; more is a false reading
-UNIFORM = 0.01  # relative difference of two periods that count as equal
 
 
 class FittedState(NamedTuple):
@@ -47,7 +42,7 @@ class VelocityFit:
 
     def reset(self) -> None:
         """Forget the samples, not the error of the angles."""
-        self._samples: deque[tuple[float, State]] = deque(maxlen=2 * HALF_WINDOWS[-1] + 1)
+        self._samples: deque[tuple[float, State]] = deque(maxlen=2 * CONTACT.half_windows[-1] + 1)
         self._time, self._middle = 0.0, math.nan
         self._period = self._scale = self.delay = 0.0
 
@@ -66,14 +61,14 @@ class VelocityFit:
         self._time += dt
         samples.append((self._time, state))
         self._follow(dt)
-        half = HALF_WINDOWS[self._choice]
+        half = CONTACT.half_windows[self._choice]
         if half == 0:
             return FittedState(state, dt)
         if len(samples) <= 2 * half:
             return None
         window = list(samples)[-2 * half - 1 :]
         first = window[0][0]
-        if abs(self._time - first - 2.0 * half * dt) <= UNIFORM * dt:
+        if abs(self._time - first - 2.0 * half * dt) <= CONTACT.uniform * dt:
             middle, weights = self._time - half * dt, self._uniform(half, dt)
         else:  # a sample was lost
             times = np.array([time for time, _ in window])
@@ -94,29 +89,32 @@ class VelocityFit:
     def _follow(self, dt: float) -> None:
         """Follow the error of the angles, and take a longer window where it calls for one."""
         samples = self._samples
-        if len(samples) > 3 and abs(self._time - samples[-4][0] - 3.0 * dt) < UNIFORM * dt:
+        if len(samples) > 3 and abs(self._time - samples[-4][0] - 3.0 * dt) < CONTACT.uniform * dt:
             least, third = 3.0 * dt * self._rest, self._third
             positions = [samples[i][1].position for i in (-4, -3, -2, -1)]
             for i, (a, b, c, d) in enumerate(zip(*positions, strict=True)):
                 moved = d - a
                 if moved > least or moved < -least:
                     size, mean = abs(moved + 3.0 * (b - c)), third[i]
-                    if not size < LARGEST:
+                    if not size < CONTACT.largest_step:
                         continue
-                    third[i] = mean + (UP if size > mean else DOWN) * (size - mean)
+                    third[i] = mean + (CONTACT.follow_up if size > mean else CONTACT.follow_down) * (size - mean)
         if dt != self._period:
             self._period, self._scale = dt, self._sd_per_mean(dt)
         longer = self._choice + 1
-        if longer == len(HALF_WINDOWS):
+        if longer == len(CONTACT.half_windows):
             return
-        if self._scale * max(self._third) > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
+        if (
+            self._scale * max(self._third) > CONTACT.velocity_sd
+            and 2 * CONTACT.half_windows[longer] * dt < CONTACT.longest_window
+        ):
             if self._choice == 0:
                 self._middle = self._time
             self._choice = longer
             self._scale = self._sd_per_mean(dt)
 
     def _sd_per_mean(self, dt: float) -> float:
-        half = HALF_WINDOWS[self._choice]
+        half = CONTACT.half_windows[self._choice]
         # half a window and more: sum of the squared distances from the middle; none: a difference of two
         squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
         return THIRD / (math.sqrt(squares) * dt)

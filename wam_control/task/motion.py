@@ -13,21 +13,15 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, MotionParameters
 from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import PathPoint, PosturePath, Triple
 
 Array = NDArray[np.float64]
-NODES = 200  # of a line, between which the joint angles are interpolated
-FASTEST = 1.875  # speed in the middle of a minimum-jerk path, of its mean
-STEEPEST = 15.0  # rad/m, of a joint on a line
-EXACT = 1e-10  # m, of the nodes of a line
-REACHED = 1e-6  # m, between a node and the line; what is further from it is out of reach
-ROUNDING = 1e-9
+FASTEST = 15.0 / 8.0  # speed in the middle of a minimum-jerk path, of its mean
 UNITS = ("rad/s", "rad/s^2", "rad/s^3")  # of the derivatives of a joint angle
-SHORTEST, LONGEST = 1e-6, 1e6  # s, of a part of a trajectory: its fifth power is a number, too
-THERE = 0.02  # rad, between the arm and the first point of a trajectory, if that is at 0 s
 
 
 class Moving(NamedTuple):
@@ -171,9 +165,9 @@ class PostureMotion:
                 "from above 0, or all be 0",
             )
             require(
-                SHORTEST <= point.time - before <= LONGEST,
+                MOTION.shortest <= point.time - before <= MOTION.longest,
                 f"a point of the trajectory is at {point.time:g} s, {point.time - before:g} s after the one before; "
-                f"allowed: {SHORTEST:g} to {LONGEST:g} s between them",
+                f"allowed: {MOTION.shortest:g} to {MOTION.longest:g} s between them",
             )
             self._require_within(1, list(map(abs, point.velocity)) or rest)  # what is far beyond has no polynomial
             parts.append(part := _Polynomials(a, rate, b, point.velocity or rest, point.time - before))
@@ -192,9 +186,9 @@ class PostureMotion:
     def _require_there(self, start: Sequence[float], first: PathPoint) -> None:
         for name, angle, begin in zip(self._joints.names, start, first.position, strict=True):
             require(
-                abs(angle - begin) <= THERE,
-                f"{name} of the trajectory starts at {begin:.4g} rad and is at {angle:.4g} rad; allowed are {THERE:g} "
-                "rad between them: plan from where the arm is, or leave out the point at 0 s",
+                abs(angle - begin) <= MOTION.arrived,
+                f"{name} of the trajectory starts at {begin:.4g} rad and is at {angle:.4g} rad; allowed are "
+                f"{MOTION.arrived:g} rad between them: plan from where the arm is, or leave out the point at 0 s",
             )
         require(not any(first.velocity), "the trajectory starts with a velocity; allowed: 0 rad/s, the arm is at rest")
 
@@ -212,7 +206,7 @@ class PostureMotion:
         unit = UNITS[order - 1]
         for name, size, limit in zip(self._joints.names, sizes, limits[order - 1], strict=True):
             require(
-                size <= limit * (1.0 + ROUNDING),
+                size <= limit * (1.0 + MOTION.rounding),
                 f"{name} of the trajectory reaches {size:.3g} {unit}; allowed: {limit:g} {unit} (motion); give it "
                 f"{(size / limit) ** (1.0 / order):.3g} times the time, or no times",
             )
@@ -255,20 +249,20 @@ class LineMotion:
         self._slopes: list[Array] = []
         self._profile: SCurve | None = None
         self.duration, self.fastest = 0.0, [0.0] * len(start)
-        if self._length < ROUNDING:
+        if self._length < MOTION.rounding:
             return
         along = (np.array(goal) - begin) / self._length
-        for k in range(NODES + 1):
-            distance = self._length * k / NODES
+        for k in range(MOTION.nodes + 1):
+            distance = self._length * k / MOTION.nodes
             if k:
                 self._angles.append(self._node(body, begin + along * distance))
                 self._require_reached(body, begin + along * distance, distance)
             self._slopes.append(self._slope(arm, body, along, distance))
         steepest = np.abs(self._slopes).max(axis=0)
-        speed = min(limits.speed, *(np.array(limits.joint_speed) / np.maximum(steepest, ROUNDING)).tolist())
+        speed = min(limits.speed, *(np.array(limits.joint_speed) / np.maximum(steepest, MOTION.rounding)).tolist())
         self._profile = SCurve(self._length, speed, limits.acceleration, limits.jerk)
         self.duration = self._profile.duration
-        times = (self.duration * k / NODES for k in range(NODES + 1))
+        times = (self.duration * k / MOTION.nodes for k in range(MOTION.nodes + 1))
         self.fastest = np.abs([self.at(time).velocity for time in times]).max(axis=0).tolist()
 
     def at(self, time: float) -> Moving:
@@ -276,8 +270,8 @@ class LineMotion:
         if self._profile is None:
             return Moving(self._angles[0].tolist(), [0.0] * len(self._angles[0]))
         distance, speed = self._profile.at(time)
-        step = self._length / NODES
-        k = min(int(distance / step), NODES - 1)
+        step = self._length / MOTION.nodes
+        k = min(int(distance / step), MOTION.nodes - 1)
         s = distance / step - k
         (a, b), (c, d) = self._angles[k : k + 2], self._slopes[k : k + 2]
         rest = b - a - step * c  # cubic through both nodes with their slopes
@@ -288,11 +282,11 @@ class LineMotion:
 
     def _node(self, body: RigidBody, target: Array) -> Array:
         """Joint angles for a position of the tool, nearest to those of the node before."""
-        step = self._length / NODES
+        step = self._length / MOTION.nodes
         q = self._angles[-1] + step * self._slopes[-1]
         for _ in range(10):
             error = target - body.tool_pose(q).position
-            if float(np.abs(error).max()) < EXACT:
+            if float(np.abs(error).max()) < MOTION.exact:
                 break
             q = q + np.linalg.pinv(body.tool_jacobian(q)) @ error
         return q
@@ -301,7 +295,7 @@ class LineMotion:
         """Refuse a line that leaves the positions which the tool can reach."""
         missed = float(np.linalg.norm(target - body.tool_pose(self._angles[-1]).position))
         require(
-            missed < REACHED,
+            missed < MOTION.reached,
             f"at {distance:.3g} m of the line of {self._length:.3g} m the tip is {missed:.3g} m off; allowed: "
             "positions within the reach of the arm; give another goal, m in the base frame",
         )
@@ -319,9 +313,10 @@ class LineMotion:
         result: Array = np.linalg.pinv(body.tool_jacobian(q)) @ along
         steepest = float(np.abs(result).max())
         require(
-            steepest < STEEPEST,
-            f"{where} a joint would turn by {steepest:.3g} rad per metre; allowed: less than {STEEPEST:g} rad/m: the "
-            "line goes to where the arm is straight or folded, or out of its reach; go another way",
+            steepest < MOTION.steepest,
+            f"{where} a joint would turn by {steepest:.3g} rad per metre; allowed: less than "
+            f"{MOTION.steepest:g} rad/m: the line goes to where the arm is straight or folded, or out of its reach; go "
+            "another way",
         )
         return result
 
@@ -334,8 +329,10 @@ class _Straight:
         allowed = (limits.joint_speed, limits.joint_acceleration, limits.joint_jerk)
         ways = [abs(way) for way in self._way]
         self._profile = None
-        if max(ways) > ROUNDING:
-            most = [min(m / way for m, way in zip(limit, ways, strict=True) if way > ROUNDING) for limit in allowed]
+        if max(ways) > MOTION.rounding:
+            most = [
+                min(m / way for m, way in zip(limit, ways, strict=True) if way > MOTION.rounding) for limit in allowed
+            ]
             self._profile = SCurve(1.0, *most)
         self.duration = self._profile.duration if self._profile else 0.0
         self.fastest = [(self._profile.fastest if self._profile else 0.0) * way for way in ways]
@@ -372,7 +369,7 @@ class _Polynomials:
 
     def _turns(self, one: Polynomial) -> list[float]:
         roots: list[complex] = one.deriv().roots().astype(complex).tolist()
-        real = [r.real for r in roots if abs(r.imag) < ROUNDING * (1.0 + abs(r))]
+        real = [r.real for r in roots if abs(r.imag) < MOTION.rounding * (1.0 + abs(r))]
         return [0.0, self.duration, *(r for r in real if 0.0 < r < self.duration)]
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -15,12 +15,13 @@ from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMoti
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
 from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list, require_made
 from wam_control.task.task_text import as_of_file, require_task, task_of_text, torque_task
+from wam_control.thresholds import MOTION
 from wam_description import yaml_text
 from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, Contact, ForceCommand, PathPoint, PosturePath, Triple
+from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; needed",
@@ -47,10 +48,7 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
-ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
-ROUNDING = 1e-9  # s, of a sum of periods
-SLOWEST_CHIRP, FASTEST_CHIRP = 1e-6, 1e6  # Hz; their ratio is a number, too
 FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
 Motion = GoalMotion | PostureMotion | LineMotion
 
@@ -92,8 +90,8 @@ class Push(NamedTuple):
         elapsed : s from the start of the step.
         dt : outer period, s.
         """
-        is_within = elapsed <= self.begin and self.end <= elapsed + dt + ROUNDING
-        return is_within or self.begin <= elapsed + ROUNDING < self.end
+        is_within = elapsed <= self.begin and self.end <= elapsed + dt + MOTION.rounding
+        return is_within or self.begin <= elapsed + MOTION.rounding < self.end
 
 
 class Chirp(NamedTuple):
@@ -255,7 +253,7 @@ class Scenario:
         if self.done:
             return False
         detected = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
-        if not detected and self._elapsed < step.seconds - ROUNDING:
+        if not detected and self._elapsed < step.seconds - MOTION.rounding:
             return False
         if step.until_force > 0.0 and not detected:
             self.failure = (
@@ -299,7 +297,7 @@ def motion_of(
         motion = _planned(step, start, shared)
         if motion is not None and shared is not None:
             require(
-                motion.duration <= step.seconds + ROUNDING,
+                motion.duration <= step.seconds + MOTION.rounding,
                 f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
             )
             _require_speed(step, motion, start, shared, followed)
@@ -330,13 +328,13 @@ def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], s
         most, limit = min((fault, "arm.joints.speed_limit"), loop)
         found.append((speed / most if most else math.copysign(math.inf, speed) if speed else 0.0, k, most, limit))
     excess, k, most, limit = max(found)
-    if excess <= 1.0 + ROUNDING:
+    if excess <= 1.0 + MOTION.rounding:
         return
     what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
     if step.posture:
         what = f"goes from {round(start[k], 6) + 0.0:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
         least = FASTEST * abs(step.posture[k] - start[k]) / most if most else 0.0
-        advice = f"give the step at least {math.ceil(1e3 * (least - ROUNDING)) / 1e3:g} s"
+        advice = f"give the step at least {math.ceil(1e3 * (least - MOTION.rounding)) / 1e3:g} s"
         if followed == math.inf:
             advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
     elif step.trajectory is not None and any(point.time for point in step.trajectory.points):
@@ -671,8 +669,9 @@ def _require_chirp(where: str, chirp: Chirp) -> None:
     _, start, end = (number(where + ", chirp", key, value) for key, value in zip(keys, chirp, strict=True))
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
     require(
-        start >= SLOWEST_CHIRP and end <= FASTEST_CHIRP,
-        f"{where}: chirp goes from {start:g} to {end:g} Hz; allowed: {SLOWEST_CHIRP:g} to {FASTEST_CHIRP:g} Hz",
+        start >= MOTION.slowest_chirp and end <= MOTION.fastest_chirp,
+        f"{where}: chirp goes from {start:g} to {end:g} Hz; "
+        f"allowed: {MOTION.slowest_chirp:g} to {MOTION.fastest_chirp:g} Hz",
     )
 
 
@@ -709,7 +708,7 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
         _require_within_tube(where, push, shared.arm)
     begin, end = number(where, "begin", push.begin), number(where, "end", push.end)
     require(
-        0.0 <= begin < end <= seconds + ROUNDING,
+        0.0 <= begin < end <= seconds + MOTION.rounding,
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
         f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
     )
@@ -723,7 +722,7 @@ def _require_within_tube(where: str, push: Push, arm: Arm) -> None:
     at_y, at_z = arm.covers.aside(push.cover, push.position)
     radius = arm.covers.radius_of(push.cover)
     require(
-        math.hypot(y - at_y, z - at_z) <= radius + ROUNDING,
+        math.hypot(y - at_y, z - at_z) <= radius + MOTION.rounding,
         f"{where}: aside is ({y:g}, {z:g}) m; allowed: up to the radius of {push.cover}, {radius:g} m, from its axis, "
         f"({at_y:.4g}, {at_z:.4g}) m; leave it out for the axis",
     )

@@ -5,13 +5,10 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from wam_control.task.motion import Moving, PostureMotion
-from wam_control.task.trajectory_player import AT_REST
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, MotionParameters
 from wam_description.parameters import ParameterError
 from wam_description.signals import PosturePath, State
-
-GOAL_TOLERANCE: Final = 0.02  # rad, of each joint at the end, where the client names none
-GOAL_TIME: Final = 1.0  # s after the end, in which the arm must be there, where the client gives no time
 
 
 class GoalCode(IntEnum):
@@ -72,8 +69,8 @@ class TrajectoryGoal:
         names = arm.joints.names
         self._on_path = [on_path.get(name, NO_TOLERANCE) for name in names]
         goal = [at_goal.get(name, NO_TOLERANCE) for name in names]
-        self._at_goal = [one._replace(position=one.position or GOAL_TOLERANCE) for one in goal]
-        self._goal_time = goal_time or GOAL_TIME
+        self._at_goal = [one._replace(position=one.position or MOTION.arrived) for one in goal]
+        self._goal_time = goal_time or MOTION.goal_time
         self._motion: PostureMotion | None = None
         self.desired: Moving | None = None
         self.time = 0.0
@@ -87,7 +84,7 @@ class TrajectoryGoal:
         dt : s, since the last period.
         """
         if self._motion is None:
-            if max(map(abs, joints.velocity)) > AT_REST:
+            if max(map(abs, joints.velocity)) > MOTION.at_rest:
                 return None
             try:
                 self._motion = PostureMotion(joints.position, self._path, self._arm, self._limits)

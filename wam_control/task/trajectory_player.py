@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 
 from wam_control.task.motion import Moving, PostureMotion
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, MotionParameters
 from wam_description.parameters import ParameterError
 from wam_description.signals import PosturePath
-
-AT_REST = 0.05  # rad/s, of every joint, from which a trajectory starts
 
 
 class TrajectoryPlayer:
@@ -44,7 +43,7 @@ class TrajectoryPlayer:
         if trajectory is None or self.refusal:
             return None
         if self._motion is None:
-            if max(map(abs, qd)) > AT_REST:
+            if max(map(abs, qd)) > MOTION.at_rest:
                 return None
             try:
                 self._motion = PostureMotion(q, trajectory, self._arm, self._limits)

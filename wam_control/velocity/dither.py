@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Timing
 from wam_description.parameters import parameter, require, tunable
 from wam_description.rigid_body import RigidBody
@@ -57,8 +58,9 @@ class Dither:
             f"parameter 'dither.phase' has {len(parameters.phase)} values; {n} motors need {n}",
         )
         require(
-            timing.dither_cycle == 0 or timing.dither_cycle >= SHORTEST_CYCLE,
-            f"parameter 'timing.dither_cycle' is {timing.dither_cycle}; it must be 0 or at least {SHORTEST_CYCLE}",
+            timing.dither_cycle == 0 or timing.dither_cycle >= VELOCITY.shortest_cycle,
+            f"parameter 'timing.dither_cycle' is {timing.dither_cycle}; it must be 0 or at "
+            f"least {VELOCITY.shortest_cycle}",
         )
         self._arm, self._parameters = arm, parameters
         self._period_ns, cycle = timing.period_ns, timing.dither_cycle
@@ -97,9 +99,6 @@ class Dither:
         efforts = np.array([transmission.joint_torques(torque) for torque in self._torque])
         moved = body.tool_jacobian(q) @ np.linalg.solve(inertia, efforts.T) / self._angular_frequency**2
         return DitherCost(2.0 * float(np.linalg.norm(moved, axis=0).max()), heat)
-
-
-SHORTEST_CYCLE = 4  # periods; a shorter one is no sine
 
 
 def friction_at_motors(arm: Arm) -> list[float]:

@@ -6,7 +6,8 @@ loop.  The gains are `wam_description.arm.Servo`: integral_gain is the stiffness
 
 from collections.abc import Sequence
 
-from wam_control.velocity.servo_guard import DEAD, ServoGuard, ServoGuardParameters
+from wam_control.thresholds import VELOCITY
+from wam_control.velocity.servo_guard import ServoGuard, ServoGuardParameters
 from wam_control.velocity.velocity_loop import SERVO_REACTION
 from wam_description.arm import Servo, Shared
 from wam_description.parts import Motors
@@ -44,7 +45,7 @@ class PositionLoop:
         for i, (stiffness, damping, peak, constant) in enumerate(self._each):
             torque = feedforward[i]
             if command:
-                if motors.effort[i] == 0.0 and abs(self._commanded[i]) > DEAD * peak:
+                if motors.effort[i] == 0.0 and abs(self._commanded[i]) > VELOCITY.deadband * peak:
                     reference[i] = theta[i]
                 lead, most = reference[i] + command[i] * dt - theta[i], peak / max(stiffness, 1e-9)
                 lead = min(max(lead, -most), most)

@@ -15,16 +15,13 @@ from numpy.typing import NDArray
 
 from wam_control.force.sampled_loop import Feedback, SampledLoop
 from wam_control.force.stability_guard import rounded_down, rounded_up
+from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import ParameterError, lengths, parameter, require
 from wam_description.transmission_map import TransmissionMap
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
 Array = NDArray[np.float64]
-LARGEST = 1e3  # factor on the gains up to which a margin is searched
-DAMPING = 0.03  # least damping ratio of a slow mode: what the integral gain alone holds swings on its spring
-SLOW = 0.6  # rad per period, up to which a mode is slow
-DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
 
 
 @dataclass(frozen=True)
@@ -106,12 +103,12 @@ class ServoGuard:
         )
 
     def margin(self, servo: Servo) -> float:
-        """Largest factor on all gains, up to `LARGEST`, that is stable with currents on time."""
+        """Largest factor on all gains, up to `VELOCITY.largest_scale`, that is stable with currents on time."""
 
         def is_stable_at(scale: float) -> bool:
             return all(is_stable(self._period(each, servo, scale, scale, 0)) for each in self._mechanisms)
 
-        return largest_scale(is_stable_at, LARGEST)
+        return largest_scale(is_stable_at, VELOCITY.largest_scale)
 
     def _require_holding(self, servo: Servo) -> None:
         """Refuse proportional gains with which a motor at its largest speed is hardly braked.
@@ -120,13 +117,16 @@ class ServoGuard:
         """
         motors = self._arm.motors
         speeds = TransmissionMap.of(self._arm).largest_motor_velocities(self._arm.joints.speed_limit)
-        least = [DEAD * peak / speed if speed else 0.0 for peak, speed in zip(motors.peak_torque, speeds, strict=True)]
+        least = [
+            VELOCITY.deadband * peak / speed if speed else 0.0
+            for peak, speed in zip(motors.peak_torque, speeds, strict=True)
+        ]
         for name, gain, enough, speed in zip(motors.names, servo.proportional_gain, least, speeds, strict=True):
             require(
                 gain >= enough,
                 f"servo.proportional_gain {_listed(servo.proportional_gain)} cannot hold the arm: {name} at "
                 f"{speed:.3g} rad/s, from arm.joints.speed_limit, is braked with {gain * speed:.3g} N m, less than "
-                f"{DEAD:.0%} of its peak torque, whatever servo.integral_gain is; "
+                f"{VELOCITY.deadband:.0%} of its peak torque, whatever servo.integral_gain is; "
                 f"allowed: at least {_listed([rounded_up(each) for each in least])}",
             )
 
@@ -138,11 +138,11 @@ class ServoGuard:
         fraction = self._parameters.stability_fraction
         late = self._parameters.extra_delay if self._timing.mode == "realtime" else 0
         for mechanism in self._mechanisms:
-            found = least_damping(self._period(mechanism, servo, proportional, integral, 0), SLOW)
-            if found < DAMPING:
+            found = least_damping(self._period(mechanism, servo, proportional, integral, 0), VELOCITY.slow_mode)
+            if found < VELOCITY.least_damping:
                 return (
                     f"an oscillation hardly decays with {mechanism.what}, its damping ratio is {found:.2g} "
-                    f"(at least {DAMPING:g})"
+                    f"(at least {VELOCITY.least_damping:g})"
                 )
             for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
                 if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from wam_control.thresholds import VELOCITY
 from wam_control.velocity.dither import DitherParameters
-from wam_control.velocity.servo_guard import DEAD, ServoGuardParameters
+from wam_control.velocity.servo_guard import ServoGuardParameters
 from wam_description.arm import Servo
 from wam_description.parameters import lengths, parameter
 from wam_description.parts import Motors
@@ -93,7 +94,7 @@ class VelocityLoop:
             else:
                 if tau_motor[i] == 0.0 and commanded[i] != 0.0:
                     velocities[i] = speed
-                    integral[i] *= abs(commanded[i]) <= DEAD * peak
+                    integral[i] *= abs(commanded[i]) <= VELOCITY.deadband * peak
                 velocity = command[i]
                 if not -faster <= velocity - velocities[i] <= faster:
                     velocity = _toward(velocity, velocities[i], faster)

@@ -1,0 +1,113 @@
+"""Thresholds of the contact estimator: values that no parameter sets, each with its unit and reason."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ContactThresholds:
+    """When a contact is detected, where it may be, how it may move, and how model errors are learned."""
+
+    # detection
+    sudden: float = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
+    shaking_time: float = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
+    shaken: float = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
+    # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
+    alone: float = 2.0
+    smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division
+    # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
+    second_contact_after: float = 0.5
+    settled: float = 2.0  # time constants of the observer, from the first sample until the estimate is ready
+    load_divisor: int = 4  # samples per update of the payload's torque, which changes slowly
+    smallest_mass: float = 1e-6  # kg, the smallest mass that a link may have
+    # position, force and link of one contact
+    smallest_force: float = 1e-6  # N, avoids a division by zero where there is no force
+    search_depth: float = 8.0  # of the log of probability; positions further below the maximum are neglected
+    few_positions: int = 6  # positions in a peak; with fewer, it is refined
+    peak_positions: int = 12  # pieces of a refined peak, two thirds of a standard deviation each
+    weak_prior: float = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
+    end_length: float = 0.01  # m, length of the end of a link
+    end_slopes: tuple[float, ...] = (0.05, 0.5)  # force across the tube per force along it, on its end
+    reported_probability: float = 0.9  # probability of the set that is reported, of contacts
+    largest_exponent: float = 500.0  # beyond it, the exponential function overflows
+    least_chance: float = 1e-300  # avoids the logarithm of 0
+    # N m, of external torques: below that rounding decides where a contact is, or on which link
+    smallest_sd: float = 1e-4
+    # probability of a force along the tube above which that is a reason why the link is not identified
+    noted_probability: float = 0.05
+    # several moments of one contact
+    # s, between moments: one and a half time constants of the observer, within which errors are alike
+    moment_interval: float = 0.0299
+    moments: int = 6  # past moments
+    # N m, sd of the errors of one moment, below which rounding decides what moments have in common
+    finest_sd: float = 1e-3
+    # difference of inner products that are equal but for rounding, above which it decides what they are
+    rounding: float = 1e-4
+    pose_change: float = 2e-3  # rad, of any joint: another pose. In one pose the errors of the model stay
+    force_turn: float = 0.15  # of the size of the force: sd of the change of its components from moment to moment
+    slip: float = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
+    drift: float = 0.02  # m/s: the same, of what touches an arm that does not move
+    slide_speed: float = 0.5  # m/s: sd of the speed along its link of a contact that slides
+    slide_probability: float = 0.05  # probability of such a contact
+    any_force: float = 2.0  # of its size: sd of the force of a contact, where only its speed counts
+    any_position: float = 0.1  # m: sd of the position of a contact, where only its speed counts
+    # s that a contact moves on after the last moment: torques are 20 ms late, and moments that far apart
+    moves_on: float = 0.03
+    least_likeness: float = 0.25  # least torques of the same contact, of those of its last moment
+    most_growth: float = 4.0  # largest torques of the same contact, of those of its last moment
+    freedom: float = 10.0  # degrees of freedom
+    unknowns: int = 3  # of a contact: its position and the force across the link
+    different: float = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
+    # a second contact
+    change_interval: float = 0.0099  # s, between moments that are compared
+    settling: float = 0.05  # s, of the filters of the observer, from the start of a contact
+    oldest: float = 0.141  # s, largest age of the moments that are the steady contact
+    youngest: float = 0.059  # s, least age of them
+    least_moments: int = 3  # of the steady contact
+    changes: int = 2  # in succession, above the threshold
+    # change of the friction of the first contact, per its force, that stays below the threshold: a friction
+    # coefficient of 0.8 may turn back. What even that does not explain is nearly certain to be a second contact, if
+    # it is noticed before the steady contact is older than `oldest`: later, it has changed itself
+    friction_turn: float = 1.6
+    growth: float = 3.0  # sd of the change of the first contact's force, per force
+    friction: float = 0.1  # sd of its other components, per change
+    slide: float = 0.02  # m, sd of its displacement
+    # sd of the torques that change because the arm turns, per such change: the force may stay in the world
+    torque_turn: float = 0.5
+    least_probability: float = 0.1  # of a hypothesis
+    # errors of the model
+    learn_interval: float = 0.01  # s, between samples that are learned from
+    hindsight: float = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
+    rest_left: float = 0.005  # rad, from a pose where the arm has rested: what was learned there is no longer true
+    correlated: float = 8.0  # of R: the rest stays for so many samples, of which each is learned from
+    gate: float = 12.0  # of the detection statistic, above which nothing is learned
+    hold_off: float = 0.25  # of the length of a contact: for that time after it nothing is learned
+    longest_hold_off: float = 0.5  # s, the longest such time
+    noise_time: float = 1.0  # s, in which the noise of the motors is followed
+    trust_time: float = 5.0  # s of motion, in which the size of the errors is followed
+    margin: float = 2.0  # of that size: errors in contact are larger, and some come rarely
+    largest_size: float = 4.0  # of that size
+    alike: float = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
+    least_variance: float = 1e-30  # variance: avoids a division by zero for errors that are none
+    sure: float = 2.0  # sd of an error that it must have beyond what is tolerable
+    # friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
+    tolerable: tuple[float, ...] = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
+    # sd of an identified friction, per friction: what changes from the identification to the use
+    identified_friction_sd: float = 0.02
+    # friction of shafts
+    slow: float = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
+    steep_shape: float = 2.0  # of `shape_uncertainty`, just after a reversal (presliding): the part that decays slowly
+    steep_angle: float = 0.6  # its angle after the reversal, in seconds at the rest velocity
+    shallow_shape: float = 3.2  # the same: the part that decays fast
+    shallow_angle: float = 0.2  # its angle, in seconds at the rest velocity
+    rest_noise: float = 3.0  # sd of the measured velocity that the rest velocity is at least
+    # velocity of a motor
+    half_windows: tuple[int, ...] = (0, 1, 2, 4)  # samples on each side of the fitted one
+    longest_window: float = 0.0081  # s, of a window: motion is nearly uniform in it
+    velocity_sd: float = 0.04  # rad/s, above which the next longer window is taken, while there is one
+    follow_up: float = 5e-3  # per sample, how fast the mean size of the errors is followed as it grows
+    follow_down: float = 2.5e-3  # the same as it falls
+    largest_step: float = 1.0  # rad, of a third difference; more is a false reading
+    uniform: float = 0.01  # relative difference of two periods that count as equal
+
+
+CONTACT = ContactThresholds()
