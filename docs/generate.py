@@ -34,7 +34,7 @@ from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
 from wam_sim.batch import processes
-from wam_sim.pieces import default_folder
+from wam_sim.pieces import default_file
 from wam_studies import design_choices
 from wam_studies.contact_benchmark import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
@@ -262,7 +262,7 @@ def plant_study() -> str:
 def found_figures() -> dict[str, Any]:
     """Numbers of every figure."""
     with processes() as executor:
-        return numbers(list(FIGURES), executor, default_folder())
+        return numbers(list(FIGURES), executor, default_file("figures"))
 
 
 @cache

@@ -1,6 +1,6 @@
 """Batches: one function over many inputs, on any `concurrent.futures` executor.
 
-Finished pieces are kept in files (`pieces`) and not computed again.  The caller defines the pieces, so the results are
+Finished pieces are kept in a file (`pieces`) and not computed again.  The caller defines the pieces, so the results are
 equal bit for bit on every executor.
 """
 
@@ -18,7 +18,7 @@ from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, TypeVar
 
-from wam_sim import pieces
+from wam_sim.pieces import FinishedPieces, key_of
 
 Input = TypeVar("Input")
 Output = TypeVar("Output")
@@ -34,9 +34,8 @@ def results(
     function: Callable[[Input], Output],
     inputs: Sequence[Input],
     executor: Executor,
-    folder: Path | None = None,
+    file: Path | None = None,
     report: Report | None = None,
-    take: Callable[[int, Output], None] | None = None,
 ) -> list[Output]:
     """The function's result for each input, in order.
 
@@ -45,9 +44,8 @@ def results(
     function : at the top level of a module, so that other processes find it; depends on its input only.
     inputs : plain data: numbers, strings, arrays, tuples and dataclasses of them.
     executor : see `processes` and `dask`.
-    folder : of finished pieces, owned by the user (`pieces.default_folder`); None keeps nothing.
+    file : of finished pieces, owned by the user (`pieces.default_file`); None keeps nothing.
     report : called with the numbers of finished and of all pieces, at the start and after each piece.
-    take : called with the number of an input and its result, as soon as it is computed.
 
     Raises
     ------
@@ -56,15 +54,14 @@ def results(
     KeyboardInterrupt
         on Ctrl-C; pieces that have not started are cancelled.
     ValueError
-        if the folder belongs to another user.
+        if the file belongs to another user, or is of another kind.
     """
     progress = report or (lambda done, of: None)
-    if folder is not None:
-        pieces.require_own(folder)
-    files = [None if folder is None else pieces.file_of(folder, function, given) for given in inputs]
+    pieces = None if file is None else FinishedPieces(file)
+    keys = [key_of(function, given) for given in inputs] if pieces else []
     found = dict[int, Output]()
-    for i, file in enumerate(files):
-        if file is not None and (kept := pieces.read(file)) is not None:
+    for i, key in enumerate(keys):
+        if pieces is not None and (kept := pieces.get(key)) is not None:
             found[i] = kept[0]
     progress(len(found), len(inputs))
     pending: dict[Future[Output], int] = {}
@@ -77,10 +74,8 @@ def results(
             for future in done:
                 i = pending.pop(future)
                 found[i] = _result(future, inputs[i])
-                if take is not None:
-                    take(i, found[i])
-                if (file := files[i]) is not None:
-                    pieces.write(file, found[i])
+                if pieces is not None:
+                    pieces.add(keys[i], found[i])
                 progress(len(found), len(inputs))
     finally:
         for future in pending:

@@ -243,7 +243,7 @@ def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: Topic
 
 
 def sweep(
-    runs: Sequence[SweepPoint], executor: Executor, folder: Path | None = None, report: Report | None = None
+    runs: Sequence[SweepPoint], executor: Executor, file: Path | None = None, report: Report | None = None
 ) -> list[SweepResult]:
-    """The result of each run, in order; finished ones are kept in the folder, see `wam_sim.batch.results`."""
-    return results(outcome, runs, executor, folder, report)
+    """The result of each run, in order; finished ones are kept in the file, see `wam_sim.batch.results`."""
+    return results(outcome, runs, executor, file, report)

@@ -1,5 +1,6 @@
-"""What is measured on the whole stack: the thesis's experiments and figures, the contact benchmark, studies.
+"""What is measured on the whole stack: the thesis's experiments and figures, studies.
 
+harness             a study is cases of a seed, a run of each, and scores; page and scores are its text and numbers
 thesis              experiments of the thesis: runs as YAML, evaluations as functions, predicted against measured
 tasks               whole-arm tasks: pushing, sweeping, holding, a door, a moving surface
 figures             the thesis's figures that carry data: theory as lines, the plant as circles

@@ -37,8 +37,8 @@ from wam_description.world import NO_SPRINGS, World
 from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_sim.recording import recorded_run
-from wam_studies.identification.evaluation import IdentificationTrial, play, run_trial
 from wam_studies.identification.plants import plant as drawn
+from wam_studies.identification.trial import IdentificationTrial, play, run_trial
 
 ROOT = Path(__file__).parents[2]
 SHARED = CONFIGURATION.shared

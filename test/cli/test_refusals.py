@@ -25,19 +25,19 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
     [
         ("map out.csv --gamma-points 0", "wam map: --gamma-points is 0; it must be at least 1"),
         ("map out.csv --zeta-points -2", "wam map: --zeta-points is -2; it must be at least 1"),
-        ("map out.csv --workers 0", "wam map: --workers is 0; it must be at least 1"),
+        ("map out.csv --jobs 0", "wam map: --jobs is 0; it must be at least 1"),
         ("map out.csv --zeta 0.9 0.1", "wam map: --zeta is 0.9 to 0.1; LOW must be above 0 and HIGH not below it"),
         ("map out.csv --gamma 0 2", "wam map: --gamma is 0 to 2; LOW must be above 0 and HIGH not below it"),
         ("guard --sets -3", "wam guard: --sets is -3; it must be at least 1"),
         ("guard --testbed 0", "wam guard: --testbed is 0; it must be at least 1"),
         ("guard --seed -1", "wam guard: --seed is -1; it must be at least 0"),
         ("evaluate contact --contacts 0", "wam evaluate: --contacts is 0; it must be at least 1"),
-        ("evaluate contact --workers 0", "wam evaluate: --workers is 0; it must be at least 1"),
+        ("evaluate contact --jobs 0", "wam evaluate: --jobs is 0; it must be at least 1"),
         ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
         ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
-        ("figures --workers 0", "wam figures: --workers is 0; it must be at least 1"),
-        ("map out.csv --workers 99999", "wam map: --workers is 99999; it must be at most 1024"),
-        ("evaluate force --workers 99999", "wam evaluate: --workers is 99999; it must be at most 1024"),
+        ("figures --jobs 0", "wam figures: --jobs is 0; it must be at least 1"),
+        ("map out.csv --jobs 99999", "wam map: --jobs is 99999; it must be at most 1024"),
+        ("evaluate force --jobs 99999", "wam evaluate: --jobs is 99999; it must be at most 1024"),
         (
             "identify --excite e.yaml --only-write --seconds inf",
             "wam identify: --seconds is inf; it must be at most 3600",
@@ -70,8 +70,8 @@ def test_a_count_or_a_range_that_says_nothing_is_named(
         ("analyse bag --html .", "cannot write .: it is a directory; give another file as --html"),
         ("map none/x.csv", "cannot write none/x.csv: none is no directory; give another file as FILE"),
         (
-            "map x.csv --keep file/in",
-            "cannot write into file/in: file is no directory; give another directory as --keep",
+            "map x.csv --results file/in/x",
+            "cannot write into file/in: file is no directory; give another directory as --results",
         ),
         ("figures --to file", "cannot write into file: file is no directory; give another directory as --to"),
         ("experiment creep --directory file/in", "cannot write into file/in: file is no directory; give another"),
@@ -146,7 +146,7 @@ def test_a_directory_without_permission_is_named_with_the_option(
     for words, option in (
         (f"experiment creep --directory {closed[0]}/bags", "give another directory as --directory"),
         (f"record --directory {closed[0]}/bags", "give another directory as --directory"),
-        (f"figures --keep {closed[0]}/.cache", "give another directory as --keep"),
+        (f"figures --results {closed[0]}/.cache/x", "give another directory as --results"),
         (f"analyse bag --html {closed[0]}/x.html", "give another file as --html"),
     ):
         said = refused(capfd, *words.split())

@@ -16,8 +16,7 @@ from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import (
-    DITHER_CYCLE,
-    RELEASE,
+    RANGES,
     Task,
     TaskConditions,
     configured,
@@ -48,7 +47,7 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
         **changes,
     }
     configuration = with_accepted_gain(CONFIGURATION.with_values(given))
-    run = Simulation(configuration, [ScenarioStep("release", RELEASE, request="enable"), *steps])
+    run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), *steps])
     model, data = run.driver.plant.model, run.driver.plant.data
     rod, wrench, forces, reactions = model.geom(NAMES[0]).id, np.zeros(6), [], []
     while not run.step():
@@ -59,7 +58,7 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
                 total += abs(float(np.array(DIRECTION) @ data.contact.frame[i].reshape(3, 3).T @ wrench[:3]))
         forces.append(total)
         reactions.append(run.nodes["force_loop"].force_reaction)
-    begin = round(1e3 * RELEASE)
+    begin = round(1e3 * RANGES.release)
     return np.array(forces[begin:]), reactions[begin:]
 
 
@@ -146,6 +145,7 @@ def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:
     configuration = with_accepted_gain(configured(CONFIGURATION, task))
     run = Simulation(configuration, steps(task, 3.5))
     forces = TaskWatch(configuration, task, run).traces()[0].forces[-1000:]
-    without_dither = forces[: DITHER_CYCLE * (len(forces) // DITHER_CYCLE)].reshape(-1, DITHER_CYCLE).mean(axis=1)
+    cycle = RANGES.dither_cycle
+    without_dither = forces[: cycle * (len(forces) // cycle)].reshape(-1, cycle).mean(axis=1)
     assert without_dither.mean() == pytest.approx(task.force, rel=0.03)
     assert np.ptp(without_dither) < 0.03 * task.force

@@ -18,7 +18,7 @@ from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.outcome import TaskEnd
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import RELEASE, Task, triple
+from wam_studies.force_benchmark.tasks import RANGES, Task, triple
 from wam_studies.force_benchmark.trial import perform
 
 BODY = RigidBody(WAM)
@@ -36,7 +36,9 @@ MOTORS = {
 def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simulation:
     """A simulation of the arm released in free space, at its start."""
     given = {"arm.joints.start": list(q), "force_loop:guard.posture": list(q), **FAR_AWAY, **changes}
-    return Simulation(CONFIGURATION.with_values(given), [ScenarioStep("release", RELEASE, request="enable"), step])
+    return Simulation(
+        CONFIGURATION.with_values(given), [ScenarioStep("release", RANGES.release, request="enable"), step]
+    )
 
 
 @pytest.mark.slow
@@ -60,7 +62,7 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
     speeds = []
     while not run.step():
         speeds.append(run.driver.plant.qd)
-    pressed = np.array(speeds)[round(1e3 * RELEASE) :]
+    pressed = np.array(speeds)[round(1e3 * RANGES.release) :]
     assert np.abs(pressed).max() < 1.2, "rad/s"
     signs = np.sign(np.where(np.abs(pressed) < 0.3, 0.0, pressed)).T
     assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 2, "turns at more than 0.3 rad/s"

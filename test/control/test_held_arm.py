@@ -21,7 +21,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import Surface, obstacles
-from wam_studies.force_benchmark.tasks import RELEASE, triple
+from wam_studies.force_benchmark.tasks import RANGES, triple
 from wam_studies.force_benchmark.trial import with_accepted_gain
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
@@ -50,7 +50,9 @@ def came(
 ) -> tuple[float, ForceReaction, str]:
     """Largest force of a surface that comes at 20 mm/s by 30 mm, N, and what the arm reports at the end."""
     across = -BODY.cover_pose(POSE, cover).rotation[:, 1]
-    surface = Surface(cover, place, triple(across), 4000.0, 0.3, False, triple(-0.03 * across), 0.106, RELEASE + begin)
+    surface = Surface(
+        cover, place, triple(across), 4000.0, 0.3, False, triple(-0.03 * across), 0.106, RANGES.release + begin
+    )
     given = {
         "arm.joints.start": list(POSE),
         "force_loop:guard.posture": list(POSE),
@@ -61,7 +63,7 @@ def came(
     here = np.array(given["driver:world.obstacles.positions"])
     given["driver:world.obstacles.positions"] = (here + away * across).tolist()
     configuration = with_accepted_gain(CONFIGURATION.with_values({**given, **changes}))
-    run = Simulation(configuration, [ScenarioStep("release", RELEASE, request="enable"), step])
+    run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
     peak, loop = 0.0, run.nodes["force_loop"]
     while not run.step():
         peak = max(peak, float(np.linalg.norm(run.driver.true_contact.force)))
@@ -130,12 +132,12 @@ def test_a_false_contact_does_not_make_the_arm_wander() -> None:
 def pushed(command: ForceCommand, hand: Push, pulses: int, pose: list[float], **near: Any) -> list[Moment]:
     """What an arm does that is pushed at times by a hand, from before the first push on."""
     given = {"arm.joints.start": pose, "force_loop:guard.posture": pose, **near}
-    steps = [ScenarioStep("release", RELEASE, request="enable"), ScenarioStep("press", 2.0, force=command)]
+    steps = [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("press", 2.0, force=command)]
     steps += [ScenarioStep(f"pushed {k}", 2.2, force=command, push=hand) for k in range(pulses)]
     run = Simulation(CONFIGURATION.with_values(given), steps)
     loop, found = run.nodes["force_loop"], []
     while not run.step():
-        time, plant = 1e-9 * run.driver.stamp - RELEASE - 2.0, run.driver.plant
+        time, plant = 1e-9 * run.driver.stamp - RANGES.release - 2.0, run.driver.plant
         if run.driver.is_outer and time > 0.0:
             speed = float(np.linalg.norm(BODY.tool_jacobian(plant.q) @ plant.qd))
             tool = BODY.tool_pose(plant.q).position
@@ -183,7 +185,7 @@ def test_what_pushes_against_the_commanded_force_is_followed_no_further_than_the
     given = {"arm.joints.start": list(POSE), "force_loop:guard.posture": list(POSE), **near}
     given |= {"force_loop:contact_source": "pinned", "force_loop:contact_position": PLACE}
     hand = Push(OUTER, PLACE, triple(-newtons * (BODY.cover_pose(POSE, OUTER).rotation.T @ DOWN)), 0.0, 9.0)
-    steps = [ScenarioStep("release", RELEASE, request="enable"), press(8.0, 0.4, as_task)]
+    steps = [ScenarioStep("release", RANGES.release, request="enable"), press(8.0, 0.4, as_task)]
     run = Simulation(
         with_accepted_gain(CONFIGURATION.with_values(given)), [*steps, press(8.0, 9.0, as_task, push=hand)]
     )

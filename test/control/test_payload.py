@@ -21,7 +21,7 @@ from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark import surfaces
 from wam_studies.force_benchmark.outcome import TaskEnd
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import RELEASE, Task, configured, triple
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, triple
 from wam_studies.force_benchmark.trial import perform, with_accepted_gain
 
 MASS = 0.5  # kg
@@ -84,7 +84,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
     run = Simulation(
         with_accepted_gain(given.with_values({**PINNED, "driver:mismatch.payload": 0.05})),
         [
-            ScenarioStep("release", RELEASE, request="enable"),
+            ScenarioStep("release", RANGES.release, request="enable"),
             *(
                 ScenarioStep(f"{force} N", seconds, force=ForceCommand("base", triple(force * np.array(direction))))
                 for force, seconds in ((8.0, 0.8), (2.0, 2.5))
@@ -158,7 +158,7 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
     }
     down = triple(-10.0 * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
     steps = [
-        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("release", RANGES.release, request="enable"),
         ScenarioStep("move", 0.43, posture=DEMO),
         ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
     ]

@@ -13,7 +13,7 @@ from wam_control.force.force_hold import ForceReaction
 from wam_control.task.scenario import ScenarioStep
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
-from wam_studies.force_benchmark.tasks import RELEASE, triple
+from wam_studies.force_benchmark.tasks import RANGES, triple
 from wam_studies.force_benchmark.trial import with_accepted_gain
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
@@ -41,7 +41,7 @@ def pushed(
         **changes,
     }
     configuration = with_accepted_gain(CONFIGURATION.with_values(given))
-    run = Simulation(configuration, [ScenarioStep("release", RELEASE, request="enable"), step])
+    run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
     model, data, loop = run.driver.plant.model, run.driver.plant.data, run.nodes["force_loop"]
     geom, wrench, peak, periods = model.geom(NAMES[1]).id, np.zeros(6), 0.0, 0
     found, reason = set(), ""
@@ -51,7 +51,7 @@ def pushed(
             if geom in data.contact.geom[i]:
                 mujoco.mj_contactForce(model, data, i, wrench)
                 peak = max(peak, abs(float(wrench[0])))
-        if periods > 1e3 * (RELEASE + 2.0):
+        if periods > 1e3 * (RANGES.release + 2.0):
             found.add(loop.force_reaction)
             reason = loop.reason or reason
     return peak, found, reason
@@ -85,7 +85,7 @@ def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() ->
 def test_the_force_with_which_the_brakes_stop_the_arm_is_no_push() -> None:
     start = CONFIGURATION.shared.arm.joints.start
     steps = [
-        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("release", RANGES.release, request="enable"),
         ScenarioStep("turn", 0.5, posture=(start[0], start[1] - 0.4, start[2], start[3] + 0.5)),
         ScenarioStep("back", 0.4, posture=(*start[:3], start[3] + 0.2)),
         ScenarioStep("brake", 0.2, request="disable"),

@@ -13,7 +13,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, PathPoint, PosturePath
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import RELEASE, Task, configured, triple
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, triple
 from wam_studies.force_benchmark.trial import TaskWatch, with_accepted_gain
 
 BODY = RigidBody(WAM)
@@ -33,7 +33,7 @@ class Played:
     ) -> None:
         configuration = with_accepted_gain(configured(CONFIGURATION, task).with_values(changes))
         steps = [
-            ScenarioStep("release", RELEASE, request="enable"),
+            ScenarioStep("release", RANGES.release, request="enable"),
             ScenarioStep("press", seconds, task=TaskCommand("base", tuple(axes))),
             *later,
         ]
@@ -146,7 +146,7 @@ def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: f
 def test_a_motion_that_drives_a_tube_into_an_edge_ends_with_a_fault(shoulder: float, fault: str) -> None:
     """At -2.005 rad the edge is at the axis of the tube; deeper, the force turned by 80 degrees in silence."""
     steps = [
-        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("release", RANGES.release, request="enable"),
         ScenarioStep("above", 2.0, posture=(0.0, -1.8, 0.0, 1.45)),
         ScenarioStep("into", 2.0, trajectory=PosturePath((PathPoint((0.0, shoulder, 0.0, 1.45)),))),
     ]

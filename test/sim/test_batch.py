@@ -2,18 +2,19 @@
 
 import argparse
 import hashlib
+import json
 import math
 import os
-import pickle
 import signal
 import struct
 import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
+from enum import StrEnum
 from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +25,7 @@ from conftest import LONG
 
 from wam_cli.commands import batch_of
 from wam_sim import batch, pieces
+from wam_sim.pieces import FinishedPieces
 from wam_sim.progress import Progress
 from wam_studies.stability.stability_map import stability_map
 
@@ -41,9 +43,9 @@ def half(x: float) -> float:
     return x / 2.0
 
 
-def run(inputs: Sequence[float], folder: Path | None = None) -> list[float]:
+def run(inputs: Sequence[float], file: Path | None = None) -> list[float]:
     with ThreadPoolExecutor(1) as executor:
-        return batch.results(root, inputs, executor, folder)
+        return batch.results(root, inputs, executor, file)
 
 
 def steps(executor: Executor) -> np.ndarray:
@@ -67,9 +69,14 @@ def test_every_executor_gives_the_same_bits() -> None:
 
 def test_finished_pieces_are_not_computed_again(tmp_path: Path) -> None:
     calls.clear()
-    assert run([4.0, 9.0], tmp_path) == [2.0, 3.0]
-    assert run([9.0, 16.0, 4.0], tmp_path) == [3.0, 4.0, 2.0]
+    file = tmp_path / "new" / "results.jsonl"
+    assert run([4.0, 9.0], file) == [2.0, 3.0]
+    assert run([9.0, 16.0, 4.0], file) == [3.0, 4.0, 2.0]
     assert sorted(calls) == [4.0, 9.0, 16.0]
+
+
+class Colour(StrEnum):
+    RED = "red"
 
 
 class Numbers(NamedTuple):
@@ -81,76 +88,100 @@ class Numbers(NamedTuple):
     names: list[str]
     count: int
     is_whole: bool
+    colour: Colour
+    groups: dict[int, str]
 
 
 def test_a_piece_holds_every_number_to_the_bit(tmp_path: Path) -> None:
     values = (0.1, -0.0, math.nan, math.inf, 5e-324)
     array = np.arange(6.0).reshape(2, 3).T / 7.0
-    written = Numbers(array, np.array([1 + 2j]), values, ["a", "é"], 3, True)
-    pieces.write(tmp_path / "x.piece", written)
-    (read,) = pieces.read(tmp_path / "x.piece") or (None,)
+    written = Numbers(array, np.array([1 + 2j]), values, ["a", "é"], 3, True, Colour.RED, {1: "one"})
+    FinishedPieces(tmp_path / "x.jsonl").add("k", written)
+    (read,) = FinishedPieces(tmp_path / "x.jsonl").get("k") or (None,)
     assert type(read) is Numbers
     assert np.array_equal(read.array, array)
     assert read.response.dtype == complex
     assert struct.pack("5d", *read.values) == struct.pack("5d", *values)
     assert read[3:] == written[3:]
     assert type(read.values) is tuple
+    assert read.colour is Colour.RED
     with pytest.raises(TypeError, match="object"):
-        pieces.write(tmp_path / "y.piece", [object()])
+        FinishedPieces(tmp_path / "y.jsonl").add("k", [object()])
 
 
 def test_reading_a_piece_runs_no_code(tmp_path: Path) -> None:
-    """A pickle with the right hash, and a name that is no NamedTuple, count as damaged."""
-    for content in (
-        pickle.dumps(os.system).decode("latin-1").encode("ascii", "ignore"),
-        b'{"named": ["os", "system", ["true"]]}',
-        b'{"named": ["subprocess", "Popen", ["true"]]}',
-        b'{"array": ["|O", [1], "AAAAAAAAAAA="]}',
+    """A name that is no NamedTuple and an array of objects count as damaged, with the right hash, too."""
+    for value in (
+        {"named": ["os", "system", {"command": "true"}]},
+        {"named": ["subprocess", "Popen", {"args": "true"}]},
+        {"enum": ["os", "system", "true"]},
+        {"array": ["|O", [1], "AAAAAAAAAAA="]},
     ):
-        (tmp_path / "x.piece").write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
-        assert pieces.read(tmp_path / "x.piece") is None
+        digest = hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]
+        (tmp_path / "x.jsonl").write_text(json.dumps({"key": "k", "hash": digest, "value": value}) + "\n")
+        assert FinishedPieces(tmp_path / "x.jsonl").get("k") is None
 
 
-def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_of_another_user_or_kind_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "results.jsonl"
+    for text in ("eggs\nmilk\n", "eggs"):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=r"results.jsonl is no file of results; choose another one"):
+            run([4.0], file)
+        assert file.read_text() == text
+    file.write_text("")
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
     with pytest.raises(ValueError, match="another user"):
-        run([4.0], tmp_path)
+        run([4.0], file)
 
 
-def test_pieces_are_kept_in_the_users_cache_directory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_are_kept_in_the_users_cache_directory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
-    assert pieces.default_folder() == Path("/somewhere/wam_stack/pieces")
+    assert pieces.default_file("sweep") == Path("/somewhere/wam_stack/sweep.jsonl")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert pieces.default_folder() == Path.home() / ".cache" / "wam_stack" / "pieces"
+    assert pieces.default_file("sweep") == Path.home() / ".cache" / "wam_stack" / "sweep.jsonl"
 
 
-@pytest.mark.parametrize("damage", [b"", b"short", b"x" * 200])
-def test_a_damaged_piece_is_computed_again(tmp_path: Path, damage: bytes) -> None:
-    run([4.0], tmp_path)
-    (file,) = tmp_path.iterdir()
-    whole = file.read_bytes()
-    file.write_bytes(damage)
+@pytest.mark.parametrize("damaged", [lambda line: line[:-20], lambda line: line.replace("2.0", "3.0")])
+def test_a_damaged_piece_is_computed_again(tmp_path: Path, damaged: Callable[[str], str]) -> None:
+    """The last line is cut off where the program was ended while it wrote."""
+    file = tmp_path / "results.jsonl"
+    run([9.0, 4.0], file)
+    first, last = file.read_text().splitlines(keepends=True)
+    file.write_text(first + damaged(last))
     calls.clear()
-    assert run([4.0], tmp_path) == [2.0]
+    assert run([9.0, 4.0], file) == [3.0, 2.0]
     assert calls == [4.0]
-    assert file.read_bytes() == whole
+    assert run([9.0, 4.0], file) == [3.0, 2.0]
+    assert calls == [4.0]
 
 
 def test_another_function_or_source_uses_no_earlier_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run([4.0], tmp_path)
+    file = tmp_path / "results.jsonl"
+    run([4.0], file)
     with ThreadPoolExecutor(1) as executor:
-        assert batch.results(half, [4.0], executor, tmp_path) == [2.0]
-    assert len(list(tmp_path.iterdir())) == 2
-    monkeypatch.setattr(pieces, "sources", lambda: "changed")
-    run([4.0], tmp_path)
-    assert len(list(tmp_path.iterdir())) == 3
+        assert batch.results(half, [4.0], executor, file) == [2.0]
+    assert len(file.read_text().splitlines()) == 2
+    monkeypatch.setattr(pieces, "sources", lambda file: "changed")
+    run([4.0], file)
+    assert len(file.read_text().splitlines()) == 3
+
+
+def test_the_code_of_a_piece_is_the_stack_and_what_its_module_imports(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    found = []
+    for text in ("import numpy\n", "import numpy  # changed\n", "from wam_studies import scores\n"):
+        own.write_text(text)
+        pieces.sources.cache_clear()
+        found.append(pieces.sources(own))
+    assert len({*found, pieces.sources(None)}) == 4
 
 
 def test_an_error_names_its_input_and_keeps_what_is_done(tmp_path: Path) -> None:
     with pytest.raises(batch.PieceError, match=r"-1\.0: ZeroDivisionError"):
-        run([4.0, -1.0], tmp_path)
+        run([4.0, -1.0], tmp_path / "results.jsonl")
     calls.clear()
-    run([4.0], tmp_path)
+    run([4.0], tmp_path / "results.jsonl")
     assert calls == []
 
 
@@ -168,7 +199,7 @@ def piece(n):
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
     with batch.processes(2) as executor:
-        batch.results(piece, range(2), executor, Path("kept"), lambda done, of: Path(f"report.{done}").touch())
+        batch.results(piece, range(2), executor, Path("kept.jsonl"), lambda done, of: Path(f"report.{done}").touch())
 """
 
 
@@ -195,7 +226,7 @@ def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) 
                 os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == -signal.SIGINT
     assert errors.count(b"KeyboardInterrupt") == 1, "a worker prints a traceback, too"
-    assert len(list((tmp_path / "kept").glob("*.piece"))) == 1
+    assert len((tmp_path / "kept.jsonl").read_text().splitlines()) == 1
     with suppress(ProcessLookupError):
         while True:  # until the last of the group has ended
             os.killpg(process.pid, 0)
@@ -227,7 +258,7 @@ if __name__ == "__main__":
 def test_no_more_processes_are_started_than_there_are_pieces(
     workers: int, pieces: int, count: int, tmp_path: Path
 ) -> None:
-    given = argparse.Namespace(workers=workers, dask=None, fresh=True, command="sweep")
+    given = argparse.Namespace(jobs=workers, dask=None, fresh=True, command="sweep")
     with batch_of(given, pieces) as options:
         assert isinstance(options.executor, ProcessPoolExecutor)
         assert len(options.executor._processes) == count

@@ -143,7 +143,7 @@ steps:
     table = tmp_path / "table.csv"
     vary = f"{GAIN}={configuration.sections['force_loop']['force_gain'][0]}"
     with pytest.raises(SystemExit, match="0"):
-        main(["sweep", str(table), "--scenario", str(file), "--vary", vary, "--keep", str(tmp_path)])
+        main(["sweep", str(table), "--scenario", str(file), "--vary", vary, "--results", str(tmp_path / "kept.jsonl")])
     with table.open() as stream:
         (row,) = csv.DictReader(stream)
     assert row["failure"] == ""
@@ -209,13 +209,13 @@ def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> 
 def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
     given = runs(script, (0.004, 0.02, -1.0))
     with ThreadPoolExecutor(1) as one:
-        found = sweep(given, one, tmp_path / "kept")
+        found = sweep(given, one, tmp_path / "kept.jsonl")
     assert [bool(result.failure) for result in found] == [False, False, True]
     assert found[2].failure
     assert found[0].force_rms > found[1].force_rms, "a small gain is slower"
     again: list[tuple[int, int]] = []
     with ThreadPoolExecutor(1) as one:
-        kept = sweep(given, one, tmp_path / "kept", lambda done, of: again.append((done, of)))
+        kept = sweep(given, one, tmp_path / "kept.jsonl", lambda done, of: again.append((done, of)))
     assert again == [(3, 3)]
     assert kept[:2] == found[:2]
 
@@ -279,7 +279,7 @@ def test_a_sweep_does_not_write_over_what_it_reads(
     }
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
-    command = ["sweep", str(tmp_path / target), "--config", str(tmp_path / "own.yaml"), "--workers", "1", "--fresh"]
+    command = ["sweep", str(tmp_path / target), "--config", str(tmp_path / "own.yaml"), "--jobs", "1", "--fresh"]
     with pytest.raises(SystemExit) as ended:
         main([*command, "--scenario", str(tmp_path / "steps.yaml"), "--vary", f"{GAIN}=0.004"])
     assert ended.value.code == 1
@@ -298,18 +298,18 @@ def test_runs_with_a_node_of_ones_own_are_computed_again(
         "base: wam\n/**: {ros__parameters: {nodes: [driver, transform, velocity_loop, 'own_push:Own']}}\n"
     )
     script.write_text("steps:\n  - {name: release, seconds: 0.1, request: enable}\n")
-    command = ["sweep", str(tmp_path / "s.csv"), "--config", str(overlay), "--scenario", str(script), "--workers", "1"]
+    command = ["sweep", str(tmp_path / "s.csv"), "--config", str(overlay), "--scenario", str(script), "--jobs", "1"]
     for _ in range(2):
         with pytest.raises(SystemExit):
-            main([*command, "--vary", "arm.payload=0.0", "--keep", str(tmp_path / "kept")])
+            main([*command, "--vary", "arm.payload=0.0", "--results", str(tmp_path / "kept.jsonl")])
         assert "from an earlier run" not in capsys.readouterr().err
-    assert not list((tmp_path / "kept").glob("**/*.*"))
+    assert not (tmp_path / "kept.jsonl").exists()
 
 
 def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path) -> None:
     table, plot = tmp_path / "sweep.csv", tmp_path / "sweep.png"
     command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--config", "testbed", "--fresh"]
-    command += ["--workers", "1", "--scenario", str(script), "--vary", f"{GAIN}=0.004:0.02:2", "--picture", str(plot)]
+    command += ["--jobs", "1", "--scenario", str(script), "--vary", f"{GAIN}=0.004:0.02:2", "--picture", str(plot)]
     subprocess.run(command, check=True, capture_output=True)
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
@@ -323,7 +323,7 @@ def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Pat
     """Cables that do not creep are measured as such, against a prediction that knows only their radii."""
     table, plot = tmp_path / "creep.csv", tmp_path / "creep.png"
     command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--experiment", "creep", "--fresh"]
-    command += ["--workers", "1", "--vary", "driver:effects.creep=true,false", "--picture", str(plot)]
+    command += ["--jobs", "1", "--vary", "driver:effects.creep=true,false", "--picture", str(plot)]
     subprocess.run(command, check=True, capture_output=True)
     with table.open() as stream:
         rows = list(csv.DictReader(stream))

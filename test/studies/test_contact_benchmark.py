@@ -45,8 +45,8 @@ from wam_studies.contact_benchmark.scenarios import (
 )
 from wam_studies.contact_benchmark.score import ANY, ScenarioScore, further_metrics, required_metrics, score
 from wam_studies.contact_benchmark.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
-from wam_studies.contact_benchmark.statistics import FEW, Interval, counted, events, quantile, rms, share
 from wam_studies.contact_robustness.requirements import RequiredRow, required_table
+from wam_studies.scores import FEW, Interval, counted, events, quantile, rms, share
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm

@@ -13,15 +13,13 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact_benchmark.evaluation import evaluate_scenario
 from wam_studies.contact_benchmark.scenarios import base_values
-from wam_studies.contact_benchmark.statistics import Interval, share
 from wam_studies.contact_robustness.comparison import ALIKE, comparison_table, first_tasks
 from wam_studies.contact_robustness.degradations import NAMES, drawn
 from wam_studies.contact_robustness.evaluation import (
-    DriveTrial,
     RobustnessResult,
     drives,
     evaluate,
-    evaluate_trial,
+    evaluate_drive,
     page,
     report_text,
 )
@@ -45,8 +43,9 @@ from wam_studies.contact_robustness.requirements import (
 )
 from wam_studies.contact_robustness.rows import kinds_table, masses_table
 from wam_studies.contact_robustness.touches import axis_of
-from wam_studies.identification.evaluation import IdentificationResult
-from wam_studies.identification.signals import MeasuredSignals
+from wam_studies.identification.plants import MeasuredSignals
+from wam_studies.identification.trial import IdentificationResult
+from wam_studies.scores import Interval, share
 
 TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
 OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
@@ -214,7 +213,7 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
 def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_report_is_counted() -> None:
     """0.9 kg are 9 N at the tool, which nobody overlooks."""
     drive = Drive(CONFIGURATION, STATED, 3402, 14.0, "masses")
-    score = evaluate_trial(DriveTrial(drive, ""))
+    score = evaluate_drive(drive)
     assert not score.failure
     (carried,), (outcome,) = score.masses, score.outcomes
     assert carried.mass > 0.8

@@ -12,7 +12,7 @@ import pytest
 
 from wam_cli.main import main
 from wam_sim.batch import processes
-from wam_sim.pieces import default_folder
+from wam_sim.pieces import default_file
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, table
 from wam_studies.figures.series import Series
 
@@ -24,7 +24,7 @@ INERTIA, K_TR, K_C = 64.0 / 16.0 * 0.1129848, 14.0**2 * 8.33, 1464.28
 @pytest.fixture(scope="module")
 def found() -> dict[str, Any]:
     with processes() as executor:
-        return numbers(list(FIGURES), executor, default_folder())
+        return numbers(list(FIGURES), executor, default_file("figures"))
 
 
 @pytest.mark.slow
@@ -158,7 +158,7 @@ def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Any], tm
 def test_command_draws_what_is_named_and_refuses_what_is_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--fresh", "--workers", "1", "--to", str(tmp_path)]
+    options = ["--fresh", "--jobs", "1", "--to", str(tmp_path)]
     with pytest.raises(SystemExit) as ended:
         main(["figures", *options, "3.1"])
     assert ended.value.code == 0
@@ -175,7 +175,7 @@ def test_command_writes_the_map_as_a_table(tmp_path: Path) -> None:
     file = tmp_path / "map.csv"
     points = ["--gamma", "0.9", "2.0", "--gamma-points", "12", "--zeta", "0.25", "0.25", "--zeta-points", "1"]
     with pytest.raises(SystemExit) as ended:
-        main(["map", str(file), *points, "--fresh", "--workers", "1"])
+        main(["map", str(file), *points, "--fresh", "--jobs", "1"])
     assert ended.value.code == 0
     head, *rows = [line.split(",") for line in file.read_text().splitlines()]
     assert head[-1] == "largest stable F_error/F_dynamic"

@@ -1,31 +1,24 @@
 """The benchmark of force control: its tasks, how it evaluates them, and that it goes on where it was stopped."""
 
 import dataclasses
-import json
 import math
-from concurrent.futures import Executor, Future
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
-from wam_cli.main import main
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import Driver, DriverParameters
-from wam_studies.force_benchmark import evaluation
-from wam_studies.force_benchmark.evaluation import ForceTrial, evaluate
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
-from wam_studies.force_benchmark.page import GROUPINGS, page, report, required
-from wam_studies.force_benchmark.results_file import key, read
+from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import NOMINAL, SECONDS, Task, TaskConditions, configured, draw, steps
-from wam_studies.force_benchmark.trial import inertia, perform, with_accepted_gain
+from wam_studies.force_benchmark.tasks import NOMINAL, RANGES, Task, TaskConditions, configured, draw, steps
+from wam_studies.force_benchmark.trial import ForceTrial, inertia, perform, with_accepted_gain
+from wam_studies.harness import chosen_cases
 
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
 Q = (0.0, -1.0, 0.0, 0.8)
@@ -102,7 +95,7 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
 
 def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
     task = TASK._replace(conditions=NOMINAL._replace(ramp=1.0))
-    _, *ramp, press = steps(task, SECONDS)
+    _, *ramp, press = steps(task, RANGES.seconds)
     forces = [math.hypot(*step.force.force) for step in ramp]
     assert sum(step.seconds for step in ramp) == pytest.approx(1.0)
     assert forces == sorted(forces)
@@ -112,10 +105,10 @@ def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
 
 def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
     stepped = TASK._replace(before=30.0, conditions=NOMINAL._replace(ramp=0.5))
-    _, *ramp, first, press = steps(stepped, SECONDS)
+    _, *ramp, first, press = steps(stepped, RANGES.seconds)
     forces = [math.hypot(*step.force.force) for step in (ramp[0], first, press)]
     assert forces == pytest.approx([6.0, 30.0, 10.0])
-    assert steps(TASK._replace(longer=5.0), SECONDS)[-1].seconds == 5.0 * SECONDS
+    assert steps(TASK._replace(longer=5.0), RANGES.seconds)[-1].seconds == 5.0 * RANGES.seconds
     courses = [(task.before > 0.0, task.longer > 1.0) for task in DRAWN]
     assert all(0.05 < np.mean(share) < 0.15 for share in zip(*courses, strict=True))
     lasting = [task for task in DRAWN if task.longer > 1.0]
@@ -267,14 +260,8 @@ def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_don
     assert abs(wrong.mean - 10.0) > 1.0
 
 
-# ---------------------------------------------------------------------------- many tasks, page
-class AtOnce(Executor):
-    """Does each piece when it is submitted."""
-
-    def submit(self, function: Any, /, *arguments: Any, **keywords: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        future.set_result(function(*arguments, **keywords))
-        return future
+# -------------------------------------------------------------------------------------- scores
+STUDY = ForceStudy(CONFIGURATION)
 
 
 def result_of(task: Task) -> TaskResult:
@@ -282,61 +269,9 @@ def result_of(task: Task) -> TaskResult:
     return evaluated(task, held(1.05 * task.force))
 
 
-@pytest.fixture
-def counted(monkeypatch: pytest.MonkeyPatch) -> list[Task]:
-    """Tasks that are done, each without a simulation."""
-    done: list[Task] = []
-
-    def quick(base: Configuration, task: Task, seconds: float) -> TaskResult:
-        done.append(task)
-        return result_of(task)
-
-    monkeypatch.setattr(evaluation, "perform", quick)
-    return done
-
-
-def test_a_stopped_benchmark_goes_on_from_its_file(tmp_path: Path, counted: list[Task]) -> None:
-    file, shown = tmp_path / "new" / "results.jsonl", []
-    run = (CONFIGURATION, 5)
-
-    def play(count: int) -> list[ForceTrial]:
-        return evaluate(*run, range(count), 4.0, AtOnce(), file, lambda done, of: shown.append((done, of)))
-
-    first = play(2)
-    file.write_text(file.read_text() + '{"code": "cut o')  # killed while it wrote
-    whole = play(4)
-    assert whole[:2] == first
-    assert counted == [draw(WAM, 5, number) for number in range(4)], "none is done twice"
-    assert shown[-1] == (4, 4)
-    assert (2, 4) in shown
-    lines = map(json.loads, file.read_text().splitlines())
-    kept = {line["number"]: line["task"]["force"] for line in lines}
-    assert kept == {number: draw(WAM, 5, number).force for number in range(4)}
-    assert play(4) == whole, "and all of it can be read again"
-
-
-def test_results_of_another_seed_code_or_configuration_are_not_used(tmp_path: Path, counted: list[Task]) -> None:
-    file = tmp_path / "results.jsonl"
-    evaluate(CONFIGURATION, 5, range(2), 4.0, AtOnce(), file, lambda done, of: None)
-    other = CONFIGURATION.with_values({"force_loop:force_gain": [0.01]})
-    assert len(read(file, key(CONFIGURATION, 5, 4.0))) == 2
-    for wanted in (key(CONFIGURATION, 6, 4.0), key(CONFIGURATION, 5, 3.0), key(other, 5, 4.0)):
-        assert read(file, wanted) == {}
-    assert read(file, key(CONFIGURATION, 5, 4.0)._replace(code="other")) == {}
-
-
-def test_a_file_of_something_else_is_refused_by_name(tmp_path: Path) -> None:
-    file = tmp_path / "notes.txt"
-    for text in ("eggs\nmilk\n", "eggs"):
-        file.write_text(text)
-        with pytest.raises(ValueError, match=r"notes.txt, line 1 is no result of a task; give another file as --res"):
-            evaluate(CONFIGURATION, 5, range(2), 4.0, AtOnce(), file, lambda done, of: None)
-        assert file.read_text() == text
-
-
 def trials() -> list[ForceTrial]:
     """Two hundred tasks with known failures: task 3 silent, task 4 above the limit, task 5 refused."""
-    found = [ForceTrial(number, task, result_of(task)) for number, task in enumerate(DRAWN[:200])]
+    found = [ForceTrial(7, number, task, result_of(task)) for number, task in enumerate(DRAWN[:200])]
     found[3] = found[3]._replace(result=evaluated(DRAWN[3], held(2.0 * DRAWN[3].force)))
     above = trace([4.0 * DRAWN[4].force] + [DRAWN[4].force] * 3000, impact=0.0)
     found[4] = found[4]._replace(result=evaluated(DRAWN[4], above))
@@ -345,20 +280,17 @@ def trials() -> list[ForceTrial]:
     return found
 
 
-def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
-    found = trials()
-    rows = {name: (value, met) for name, _, value, met, _ in required(found)}
-    assert rows["wrong force without a reason"] == ("1", False)
-    assert rows["tasks refused with a reason"][0] == "0.5% of 200"
-    text = page(found, 7, "0123abcd", "wam evaluate force --seed 7", "picture.png")
-    assert "`0123abcd`" in text
-    assert "| all | 200 | 99% | 0% | 0% | 0% | 0% | 2 | 0 |" in text
-    assert "`wam evaluate force --seed 7 --only 3`" in text
-    assert "| force known to +-# N | 1 |" in text
-    assert "Unreported cycles" not in text
-    lines = report(7, "0123abcd", found)
-    assert "    wam evaluate force --seed 7 --only 4" in lines
-    assert "above the limit: " in lines
+def test_the_scores_count_what_went_in_and_list_each_failure() -> None:
+    scores = STUDY.score(trials())
+    rows = {row.name: row for row in scores.rows}
+    silent = rows["wrong force without a reason"]
+    assert (silent.found.value, silent.is_missed) == (1, True)
+    assert rows["tasks refused with a reason"].found[::3] == (1 / 200, 200)
+    outcomes, reasons = scores.tables
+    assert outcomes.rows[0] == ["all", "", "200", "99%", "0%", "0%", "0%", "0%", "2", "0"]
+    assert reasons.rows == [["force known to +-# N", "1"]]
+    assert [(one.seed, one.number) for one in scores.failures] == [(7, 3), (7, 4)]
+    assert [one.reason.split(":")[0] for one in scores.failures] == ["silent and above the limit", "above the limit"]
 
 
 def test_required_shares_are_of_the_accepted_tasks() -> None:
@@ -369,22 +301,14 @@ def test_required_shares_are_of_the_accepted_tasks() -> None:
     ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
     refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
     assert withdrawals == 1
-    strict, wide = [value for name, _, value, *_ in required(found) if "joint sensors" in name]
-    assert f" of {len(ends) - refusals - withdrawals} (" in strict
-    assert f" of {len(ends) - refusals} (" in wide
+    strict, wide = [row.found.observed for row in STUDY.score(found).rows if "joint sensors" in row.name]
+    assert strict == len(ends) - refusals - withdrawals
+    assert wide == len(ends) - refusals
 
 
-def test_a_wrong_option_is_refused_in_a_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    results = ["--results", str(tmp_path / "results.jsonl")]
-    for options, text in (
-        (["--tasks", "0"], "--tasks is 0; it must be at least 1"),
-        (["--only", "-3"], "--only is -3"),
-        (["--write", str(tmp_path / "no" / "page.md")], "is no directory; give another file as --write"),
-    ):
-        with pytest.raises(SystemExit) as end:
-            main(["evaluate", "force", *results, *options])
-        assert end.value.code == 1
-        assert text in capsys.readouterr().err
+def test_cases_are_the_tasks_of_the_seed() -> None:
+    assert [case.task for case in chosen_cases(STUDY, 1, 3)] == DRAWN[:3]
+    assert "pose" in STUDY.details(trials()[0])
 
 
 def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
@@ -393,19 +317,3 @@ def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
         factors = np.array([getattr(conditions, name) for conditions in every])
         assert 0.95 * width < float(np.abs(factors - 1.0).max()) <= width
     assert isinstance(every[0], TaskConditions)
-
-
-def test_a_value_that_every_task_sets_itself_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    results = ["--results", str(tmp_path / "results")]
-    given = ["evaluate", "force", "--tasks", "1", *results, "--set", "force_loop:contact_source=pinned"]
-    with pytest.raises(SystemExit, match="1"):
-        main(given)
-    assert "--set force_loop:contact_source has no effect here: each task sets it" in capsys.readouterr().err
-    given = ["evaluate", "contact", "--contacts", "1", "--set", "contact_estimator:use_joint_sensors=true"]
-    with pytest.raises(SystemExit, match="1"):
-        main(given)
-    assert "use_joint_sensors has no effect here: each scenario sets it" in capsys.readouterr().err
-    for of in ("force", "contact", "robustness"):
-        with pytest.raises(SystemExit, match="1"):
-            main(["evaluate", of, "--set", "timing.mode=realtime"])
-        assert "--set timing.mode has no effect: the runs are in Python" in capsys.readouterr().err

@@ -19,13 +19,13 @@ from wam_description.configuration import Configuration, files_of, option_values
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.page import PORT
 from wam_sim.batch import executor
-from wam_sim.pieces import default_folder
+from wam_sim.pieces import default_file
 from wam_sim.progress import Progress
 
 BASE_CONFIGURATION = "wam"
 LAST_PORT = 65535
 YAML_SUFFIXES = (".yaml", ".yml")
-MOST_WORKERS = 1024
+MOST_JOBS = 1024
 
 
 def namespace(text: str) -> str:
@@ -263,16 +263,16 @@ RERUN = FileKind("a recording for Rerun", (".rrd", ""))
 
 
 class BatchOptions(NamedTuple):
-    """Executor, folder of finished pieces, and progress report of a batch."""
+    """Executor, file of finished pieces, and progress report of a batch."""
 
     executor: Executor
-    folder: Path | None
+    file: Path | None
     report: Progress
 
 
 def take_executor(parser: argparse.ArgumentParser) -> None:
     """Give a command the options of where it computes."""
-    parser.add_argument("--workers", type=int, help="processes; default: one for each core")
+    parser.add_argument("--jobs", type=int, help="processes; default: one for each core")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
     )
@@ -280,20 +280,20 @@ def take_executor(parser: argparse.ArgumentParser) -> None:
 
 def executor_of(given: argparse.Namespace, pieces: int) -> AbstractContextManager[Executor]:
     """What the options of `take_executor` name, with no more processes than pieces."""
-    if given.workers is not None:
-        at_least("--workers", given.workers, 1, MOST_WORKERS)
-    return executor(min(given.workers or os.cpu_count() or 1, pieces), given.dask)
+    if given.jobs is not None:
+        at_least("--jobs", given.jobs, 1, MOST_JOBS)
+    return executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask)
 
 
-def take_batch(parser: argparse.ArgumentParser) -> None:
-    """Give a command the options of a long computation."""
+def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
+    """Give a command of this name the options of a long computation."""
     take_executor(parser)
     parser.add_argument(
-        "--keep",
+        "--results",
         type=Path,
-        default=default_folder(),
-        metavar="DIRECTORY",
-        help="finished pieces are kept and looked for here; default: %(default)s",
+        default=default_file(name),
+        metavar="FILE",
+        help="what is finished is kept and looked for here, a line of JSON each; default: %(default)s",
     )
     parser.add_argument("--fresh", action="store_true", help="compute everything, keep nothing")
 
@@ -302,9 +302,9 @@ def take_batch(parser: argparse.ArgumentParser) -> None:
 def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
     """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
     if not given.fresh:
-        writable_directory("--keep", given.keep)
+        writable_directory("--results", given.results.parent)
     with executor_of(given, pieces) as found:
-        yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+        yield BatchOptions(found, None if given.fresh else given.results, Progress(given.command, sys.stderr))
 
 
 def take_topic_map(parser: argparse.ArgumentParser) -> None:
@@ -339,7 +339,7 @@ def take_evaluation(parser: argparse.ArgumentParser, seeds: Sequence[int], of: s
     parser.add_argument("--seed", type=int, nargs="+", default=list(seeds), help=words)
     parser.add_argument("--write", type=Path, help=f"page to write, for example {page}")
     take_configuration(parser)
-    take_batch(parser)
+    take_batch(parser, "evaluate")
 
 
 def evaluation_of(given: argparse.Namespace) -> Configuration:

@@ -1,7 +1,6 @@
 """`wam evaluate robustness`: contact estimation on arms and signals that differ from what the estimator states."""
 
 import argparse
-from pathlib import Path
 
 from wam_cli.commands import at_least, batch_of, evaluation_of, take_evaluation
 from wam_sim.batch import results
@@ -20,7 +19,7 @@ from wam_studies.contact_robustness.evaluation import (
     page,
     report_text,
 )
-from wam_studies.identification.evaluation import run_trial
+from wam_studies.identification.trial import run_trial
 
 SEEDS = (1, 2, 3)
 
@@ -30,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_evaluation(parser, SEEDS, "arms and contacts", "docs/contact-robustness.md")
     names = ", ".join(map(repr, degradations.NAMES)).replace("%", "%%")
     parser.epilog = (
-        "One degradation with one seed takes about two minutes of one core; --workers share them. Progress on stderr "
+        "One degradation with one seed takes about two minutes of one core; --jobs share them. Progress on stderr "
         "has the time left."
     )
     parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
@@ -41,20 +40,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DEGRADATION",
         help=f"of: {names}; default: all, and the first benchmark on the same seeds",
     )
-    parser.add_argument(
-        "--recordings", type=Path, metavar="DIRECTORY", help="keep the recordings here, and use those that are here"
-    )
-    parser.add_argument("--before", type=Path, help="page of another version on the same seeds, to put below")
 
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate and print the tables."""
     at_least("--seconds", given.seconds, SHORTEST)
-    before = given.before.read_text(encoding="utf-8") if given.before else ""
     configuration = evaluation_of(given)
     chosen = drives(configuration, given.seed, given.only, given.seconds)
     with batch_of(given, max(map(len, chosen))) as batch:
-        groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
+        groups = [evaluate(each, *batch) for each in chosen]
         whole = given.only == list(degradations.NAMES)
         first = results(evaluate_scenario, first_tasks(configuration, given.seed), *batch) if whole else []
         identifications = results(run_trial, friction_trials(configuration, given.seed), *batch)
@@ -71,5 +65,5 @@ def run(given: argparse.Namespace) -> int:
         if not whole:
             command += " --only " + " ".join(f"'{name}'" for name in given.only)
         command += f" --write {given.write}"
-        given.write.write_text(page(text, command, before), encoding="utf-8")
+        given.write.write_text(page(text, command), encoding="utf-8")
     return 0

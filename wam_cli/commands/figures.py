@@ -11,7 +11,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}; default: all")
     parser.add_argument("--to", type=Path, default=Path("docs/figures"), help="directory; default: %(default)s")
-    take_batch(parser)
+    take_batch(parser, "figures")
 
 
 def run(given: argparse.Namespace) -> int:

@@ -19,7 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name}-points", type=int, metavar="N", default=count, help=f"default: {count}")
     parser.add_argument("--stiffness-ratio", type=float, default=1.0, help="k_tr/k_c; default: %(default)s")
     parser.add_argument("--stiction", type=float, default=1.0, help="F_static/F_dynamic; default: %(default)s")
-    take_batch(parser)
+    take_batch(parser, "map")
 
 
 def run(given: argparse.Namespace) -> int:

@@ -81,7 +81,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="plot over each parameter of the force error, or of what an experiment measures, PNG, PDF or SVG",
     )
-    take_batch(parser)
+    take_batch(parser, "sweep")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -140,7 +140,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tup
     runs = points(configuration, load(_scenario_file(given), configuration.shared), axes, sets)
     with batch_of(given, len(runs)) as batch:
         is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
-        found = sweep(runs, batch.executor, None if is_own else batch.folder, batch.report)
+        found = sweep(runs, batch.executor, None if is_own else batch.file, batch.report)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
         scenario_figure(given.picture, axes, sets, found)

@@ -77,9 +77,9 @@ def evaluate(
     configuration: Configuration,
     chosen: Sequence[BenchmarkScenario],
     executor: Executor,
-    folder: Path | None = None,
+    file: Path | None = None,
     report: Report | None = None,
 ) -> list[ScenarioScore]:
     """Score of each scenario, in order, simulated without ROS; the other arguments are those of `batch.results`."""
     tasks = [ScenarioTask(configuration, scenario) for scenario in chosen]
-    return results(evaluate_scenario, tasks, executor, folder, report)
+    return results(evaluate_scenario, tasks, executor, file, report)

@@ -19,7 +19,7 @@ from wam_studies.contact_benchmark.score import (
     further_metrics,
     required_metrics,
 )
-from wam_studies.contact_benchmark.statistics import FEW, Interval, counted
+from wam_studies.scores import FEW, Interval, counted
 
 # every seed that was looked at while the estimator, its configuration or the benchmark was changed
 TUNED = (1, 2, 3, 11, 21, 22, 101, 102, 103, 201, 202, 203, 301, 302, 401, 41)

@@ -16,7 +16,7 @@ from wam_studies.contact_benchmark.free_motion import (
 )
 from wam_studies.contact_benchmark.scenarios import KINDS, LEVELS, ROUGH
 from wam_studies.contact_benchmark.simulation import Played
-from wam_studies.contact_benchmark.statistics import NONE, Interval, events, quantile, rms, share
+from wam_studies.scores import NONE, Interval, events, quantile, rms, share
 
 Bound = tuple[float, float]  # least and greatest allowed value
 ANY: Bound = (-math.inf, math.inf)

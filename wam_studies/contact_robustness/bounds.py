@@ -16,8 +16,8 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact_benchmark.moves import MoveGenerator
-from wam_studies.contact_benchmark.statistics import quantile
 from wam_studies.contact_robustness.touches import LEVEL_KINDS, LEVELS, axis_of, touches
+from wam_studies.scores import quantile
 
 Array = NDArray[np.float64]
 COUNT = 1200  # contacts

@@ -10,8 +10,8 @@ from wam_studies.contact_benchmark.evaluation import BenchmarkExtent, ScenarioTa
 from wam_studies.contact_benchmark.page import number
 from wam_studies.contact_benchmark.scenarios import dither_values
 from wam_studies.contact_benchmark.score import ScenarioScore, required_metrics
-from wam_studies.contact_benchmark.statistics import Interval, events
 from wam_studies.contact_robustness.requirements import RequiredRow
+from wam_studies.scores import Interval, events
 
 EXTENT: Final = BenchmarkExtent(contacts=24, resting=6, free=36.0)  # of one seed
 # how the name of a row begins, and of the quantity of the first benchmark that is the same

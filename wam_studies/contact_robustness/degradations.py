@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_studies.identification.signals import MeasuredSignals
+from wam_studies.identification.plants import MeasuredSignals
 
 Random = np.random.Generator
 Values = tuple[tuple[str, Any], ...]  # of a configuration, by name

@@ -15,7 +15,6 @@ from wam_control.contact.contact_estimator import ContactEstimator, ContactEstim
 from wam_description.arm import Arm, seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
-from wam_sim import pieces
 from wam_sim.batch import Report, results
 from wam_studies.contact_benchmark.scenarios import base_values
 from wam_studies.contact_benchmark.score import ScenarioScore
@@ -23,7 +22,7 @@ from wam_studies.contact_robustness import degradations
 from wam_studies.contact_robustness.bounds import BOUNDS, bounds
 from wam_studies.contact_robustness.comparison import EXTENT, comparison_table
 from wam_studies.contact_robustness.reasons import Evidence, missed_table
-from wam_studies.contact_robustness.recording import Drive, DriveRecording, record
+from wam_studies.contact_robustness.recording import Drive, record
 from wam_studies.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_studies.contact_robustness.requirements import (
     MIX,
@@ -35,7 +34,7 @@ from wam_studies.contact_robustness.requirements import (
 )
 from wam_studies.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, masses_table, table
 from wam_studies.identification import plants
-from wam_studies.identification.evaluation import IdentificationResult, IdentificationTrial
+from wam_studies.identification.trial import IdentificationResult, IdentificationTrial
 
 Groups = dict[str, list[ReplayScore]]  # scores by degradation
 ARMS = 3  # of each seed, that are identified
@@ -85,13 +84,6 @@ class RobustnessResult(NamedTuple):
     first: Sequence[ScenarioScore] = ()
 
 
-class DriveTrial(NamedTuple):
-    """A drive, and the folder of recordings, '' for none."""
-
-    drive: Drive
-    folder: str
-
-
 def drives(configuration: Configuration, seeds: Sequence[int], names: Sequence[str], seconds: float) -> DrivePlan:
     """The drives of some degradations.
 
@@ -115,38 +107,16 @@ def drives(configuration: Configuration, seeds: Sequence[int], names: Sequence[s
     return DrivePlan(wide, second, masses, level, [drive._replace(is_identified=True) for drive in level])
 
 
-def evaluate_trial(trial: DriveTrial) -> ReplayScore:
-    """Record a drive, or read its recording from the folder, and score the estimator on it."""
-    drive = trial.drive
-    kind = drive.contacts + " identified" * drive.is_identified
-    name = f"{drive.degradation} {drive.seed} {drive.seconds:g} s {kind}.recording"
-    file = Path(trial.folder) / name.replace("/", " ")
-    kept = pieces.read(file) if trial.folder else None
-    recording: DriveRecording = record(drive) if kept is None else kept[0]
-    if trial.folder and kept is None:
-        pieces.write(file, recording)
-    return replay(drive.configuration, drive.degradation, recording, drive.seed)
+def evaluate_drive(drive: Drive) -> ReplayScore:
+    """Record a drive and score the estimator on it."""
+    return replay(drive.configuration, drive.degradation, record(drive), drive.seed)
 
 
 def evaluate(
-    chosen: Sequence[Drive],
-    executor: Executor,
-    folder: Path | None = None,
-    report: Report | None = None,
-    recordings: Path | None = None,
+    chosen: Sequence[Drive], executor: Executor, file: Path | None = None, report: Report | None = None
 ) -> Groups:
-    """Scores by degradation.
-
-    Parameters
-    ----------
-    recordings : folder in which recordings are kept, so that another version can be scored on the same ones.
-
-    The other arguments are those of `batch.results`.
-    """
-    if recordings is not None:
-        pieces.require_own(recordings)
-    kept = "" if recordings is None else str(recordings)
-    scores = results(evaluate_trial, [DriveTrial(drive, kept) for drive in chosen], executor, folder, report)
+    """Scores by degradation; the other arguments are those of `batch.results`."""
+    scores = results(evaluate_drive, chosen, executor, file, report)
     names = [name for name in degradations.NAMES if any(drive.degradation == name for drive in chosen)]
     return {name: [score for score in scores if score.degradation == name] for name in names}
 
@@ -236,16 +206,9 @@ def report_text(result: RobustnessResult, arm: Arm) -> str:
     return "\n".join([text, *(f"\nEnded early: {failure}" for failure in failures)])
 
 
-def page(text: str, command: str, before: str = "") -> str:
-    """The page of the documentation; `before` is the page of another version, whose tables follow."""
-    parts = [HEAD.format(command=command), text]
-    if before:
-        tables = before[before.index("## Detection") :].split("## Method")[0].rstrip()
-        parts.append(
-            "## The estimator before, on the same recordings\n\n"
-            + tables.replace("\n## ", "\n### ").replace("## D", "### D", 1)
-        )
-    return "\n\n".join([*parts, METHOD])
+def page(text: str, command: str) -> str:
+    """The page of the documentation."""
+    return "\n\n".join([HEAD.format(command=command), text, METHOD])
 
 
 HEAD = """# Contact estimation on arms that differ from the model

@@ -12,7 +12,6 @@ import numpy as np
 
 from wam_analysis.table import markdown
 from wam_studies.contact_benchmark.page import bound_text
-from wam_studies.contact_benchmark.statistics import quantile
 from wam_studies.contact_robustness.replay import SECOND_WITHIN, SLIDING, SURE, TouchOutcome
 from wam_studies.contact_robustness.requirements import (
     COVERAGE,
@@ -24,7 +23,8 @@ from wam_studies.contact_robustness.requirements import (
     coverage,
 )
 from wam_studies.contact_robustness.rows import SMALL_SD, Scores, calibration, near, outcomes
-from wam_studies.identification.evaluation import IdentificationResult
+from wam_studies.identification.trial import IdentificationResult
+from wam_studies.scores import quantile
 
 SOON = 0.5  # s after a contact
 NO_BOUND = "none, because {}"

@@ -25,7 +25,7 @@ from wam_studies.contact_robustness.touches import (
     axis_of,
     touches,
 )
-from wam_studies.identification.evaluation import play
+from wam_studies.identification.trial import play
 
 Array = NDArray[np.float64]
 WARM_UP = 6.0  # s of free motion before the first contact

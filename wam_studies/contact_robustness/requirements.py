@@ -9,10 +9,10 @@ import numpy as np
 from wam_analysis.table import markdown
 from wam_studies.contact_benchmark.page import MET, bound_text, mark, number
 from wam_studies.contact_benchmark.score import ANY, Bound
-from wam_studies.contact_benchmark.statistics import NONE, Interval, counted, events, quantile, rms, share
 from wam_studies.contact_robustness.replay import SECOND_WITHIN, SURE, ReplayScore, TouchOutcome
 from wam_studies.contact_robustness.rows import SMALL_SD, Scores, near, outcomes
-from wam_studies.identification.evaluation import IdentificationResult
+from wam_studies.identification.trial import IdentificationResult
+from wam_studies.scores import NONE, Interval, counted, events, quantile, rms, share
 
 STATED, MIX = "as stated", "realistic mix"
 COVERAGE: Bound = (0.85, 0.97)

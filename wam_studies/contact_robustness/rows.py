@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from wam_analysis.table import markdown
-from wam_studies.contact_benchmark.statistics import quantile
 from wam_studies.contact_robustness.replay import SECOND_WITHIN, SURE, MassOutcome, ReplayScore, TouchOutcome
+from wam_studies.scores import quantile
 
 NEAR = 0.2  # of a force: 5 N are 4 to 6 N
 SMALL_SD = 0.02

@@ -210,7 +210,7 @@ def numbers_of(name: str) -> Any:
 def numbers(
     names: Sequence[str],
     executor: Executor,
-    folder: Path | None = None,
+    file: Path | None = None,
     report: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Numbers of these figures, computed in parallel.
@@ -218,9 +218,9 @@ def numbers(
     Parameters
     ----------
     names : of `FIGURES`.
-    executor, folder, report : as in `batch.results`.
+    executor, file, report : as in `batch.results`.
     """
-    return dict(zip(names, batch.results(numbers_of, list(known(names)), executor, folder, report), strict=True))
+    return dict(zip(names, batch.results(numbers_of, list(known(names)), executor, file, report), strict=True))
 
 
 def file_of(name: str, folder: Path) -> Path:

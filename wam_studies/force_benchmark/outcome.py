@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -9,15 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import limit_cycle
-from wam_studies.force_benchmark.tasks import DITHER_CYCLE, Task
+from wam_studies.force_benchmark.tasks import RANGES, Task
 
 Array = NDArray[np.float64]
-TOLERANCE = 0.1  # of the commanded force
-OVERSHOOT = 1.5  # of the commanded force, to which the impact (3.1) is added
-EVALUATED = 480  # inner periods at the end, whole cycles of the dither
-CYCLING = 2000  # inner periods at the end in which cycles are looked for
-CONFIDENCE = 0.5  # of a cycle that counts
-STILL = 1e-3  # m, motion along the force below which the arm has not moved
+
+
+@dataclass(frozen=True)
+class OutcomeLimits:
+    """When a force counts as right, and what counts as a cycle or as motion."""
+
+    tolerance: float = 0.1  # of the commanded force
+    overshoot: float = 1.5  # of the commanded force, to which the impact (3.1) is added
+    evaluated: int = 480  # inner periods at the end, whole cycles of the dither
+    cycling: int = 2000  # inner periods at the end in which cycles are looked for
+    confidence: float = 0.5  # of a cycle that counts
+    predicted: float = 0.5  # of the size of a cycle, from which a prediction of the guard reports it
+    still: float = 1e-3  # m, motion along the force below which the arm has not moved
+
+
+OUTCOME = OutcomeLimits()
 
 
 class TaskEnd(StrEnum):
@@ -91,15 +102,15 @@ class TaskResult(NamedTuple):
 
 def refused(task: Task, reason: str) -> TaskResult:
     """The result of a task that is refused before the start."""
-    limit = OVERSHOOT * task.force
+    limit = OUTCOME.overshoot * task.force
     return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason, is_over=False)
 
 
 def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
     """The result of a task that was played."""
-    last = trace.forces[-EVALUATED:]
+    last = trace.forces[-OUTCOME.evaluated :]
     mean, peak = float(last.mean()), float(trace.forces.max())
-    cycle, limit = _cycle(task, trace), OVERSHOOT * max(task.force, task.before) + trace.impact
+    cycle, limit = _cycle(task, trace), OUTCOME.overshoot * max(task.force, task.before) + trace.impact
     return TaskResult(
         outcome=_outcome(task, trace, mean, peak),
         mean=mean,
@@ -107,10 +118,10 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
         peak=peak,
         limit=limit,
         cycle=cycle,
-        cycle_is_reported=bool(trace.reason) or trace.predicted_cycle >= 0.5 * cycle > 0.0,
+        cycle_is_reported=bool(trace.reason) or trace.predicted_cycle >= OUTCOME.predicted * cycle > 0.0,
         gain=trace.gain,
         reason=trace.reason,
-        is_over=peak > limit or mean > OVERSHOOT * task.force + trace.impact,
+        is_over=peak > limit or mean > OUTCOME.overshoot * task.force + trace.impact,
     )
 
 
@@ -121,12 +132,13 @@ def worst(results: Sequence[TaskResult]) -> TaskResult:
 
 
 def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
-    if trace.is_stopped and trace.travel < STILL and peak == 0.0:
+    if trace.is_stopped and trace.travel < OUTCOME.still and peak == 0.0:
         return TaskEnd.REFUSED
-    if abs(mean - task.force) <= TOLERANCE * task.force and not trace.is_stopped:
+    if abs(mean - task.force) <= OUTCOME.tolerance * task.force and not trace.is_stopped:
         return TaskEnd.DONE
     # the first command was obeyed, the second one is declined
-    is_declined = task.before and peak <= OVERSHOOT * task.before and mean <= (1.0 + TOLERANCE) * task.force
+    is_below = mean <= (1.0 + OUTCOME.tolerance) * task.force
+    is_declined = task.before and peak <= OUTCOME.overshoot * task.before and is_below
     if trace.is_stopped and not trace.is_fault and (peak <= task.force or is_declined):
         return TaskEnd.GIVEN_UP
     return TaskEnd.ENDED if trace.reason else TaskEnd.SILENT
@@ -134,12 +146,13 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
 
 def _cycle(task: Task, trace: TaskTrace) -> float:
     """Peak to peak of a limit cycle above the tolerance, N, else 0; the dither is averaged out."""
-    forces: Array = trace.forces[-CYCLING:]
-    if trace.is_stopped or len(forces) < CYCLING:
+    forces: Array = trace.forces[-OUTCOME.cycling :]
+    if trace.is_stopped or len(forces) < OUTCOME.cycling:
         return 0.0
     if task.conditions.is_dithered:
-        forces = np.convolve(forces, np.full(DITHER_CYCLE, 1.0 / DITHER_CYCLE), "valid").astype(np.float64)
+        cycle = RANGES.dither_cycle
+        forces = np.convolve(forces, np.full(cycle, 1.0 / cycle), "valid").astype(np.float64)
     time: Array = trace.period * np.arange(len(forces), dtype=np.float64)
     found = limit_cycle(time, forces)
-    is_cycle = found.confidence > CONFIDENCE and found.peak_to_peak > TOLERANCE * task.force
+    is_cycle = found.confidence > OUTCOME.confidence and found.peak_to_peak > OUTCOME.tolerance * task.force
     return found.peak_to_peak if is_cycle and math.isfinite(found.peak_to_peak) else 0.0

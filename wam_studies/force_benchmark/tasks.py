@@ -5,7 +5,8 @@ contacts anywhere on both links, and a true arm that differs from the configured
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,29 +19,75 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
 
-# model mismatch, uniform in +- this
-MASS, FRICTION, CABLES, TORQUE = 0.03, 0.2, 0.1, 0.03
-DOUBLED, APART, TRIES = 0.1, 0.1, 100  # share of tasks with a second force; m between them on a link; draws of it
-FORCES, STIFFNESSES = (1.0, 40.0), (400.0, 4e5)  # N and N/m, uniform in the logarithm
-FRICTIONS, STEEPEST = (0.0, 0.8), math.radians(75.0)  # of the surface; lean of a plane from the side of the link
-MARGIN = 0.1  # rad, of a start from the ends of the joints
-NEAR = 0.3  # rad, of a singular pose
+Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
-POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
-ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
-LOADED, PAYLOADS = 0.05, (0.05, 2.0)  # share of arms with a payload that is not declared, kg, uniform in the logarithm
-OTHERWISE, ASYMMETRY = 0.05, 0.15  # share of arms with another law of friction, and with more of it in one direction
-MOVING, ALONG = 0.15, 0.5  # share of surfaces that move, and of these along the force, else across it
-SPEEDS, FREQUENCIES, FARTHEST = (0.002, 0.05), (0.1, 1.0), 0.02  # m/s and Hz, uniform in the logarithm; m
-LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
-RAMP_STEP = 0.02  # s
-DITHER_CYCLE = 40  # inner periods: 25 Hz
-RELEASE = 0.5  # s, until the force is commanded
-SECONDS = 4.0  # s of the whole force
-FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
-AT_REST = 1.5  # s of the whole force, until a surface moves
-STEPPED, DOWN, CHANGES, FIRST_HELD = 0.1, 0.7, (2.0, 4.0), 2.5  # share; of these down; factor; s of the first force
-LONG, LONGER, SMALL_FORCES, SOFT = 0.1, 5.0, (1.0, 3.0), 4e3  # share; of `SECONDS`; N; N/m, of the surface at most
+
+
+def _poses() -> dict[str, float]:
+    return {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}
+
+
+@dataclass(frozen=True)
+class TaskRanges:
+    """What is drawn of a task.
+
+    Ranges are uniform in the logarithm where `draw` does so; a single number of the model mismatch is the largest
+    error, a share is the fraction of tasks.
+    """
+
+    mass: float = 0.03  # of each link
+    motor_friction: float = 0.2  # of each motor and joint
+    cables: float = 0.1  # stiffness of each cable
+    torque_constant: float = 0.03  # of each motor
+    loaded: float = 0.05  # share of arms with a payload that is not declared
+    payloads: Range = (0.05, 2.0)  # kg
+    other_friction: float = 0.05  # share of arms with another law of friction
+    asymmetry: float = 0.15  # of that friction by direction
+
+    forces: Range = (1.0, 40.0)  # N
+    stiffnesses: Range = (400.0, 4e5)  # N/m: a hundred times the foam that the defaults are for
+    frictions: Range = (0.0, 0.8)  # of the surface
+    steepest: float = math.radians(75.0)  # lean of a plane from the side of the link
+    on_outer: float = 0.85  # share of contacts on the covers after the first
+    at_plane: float = 0.3  # share of planes at the tip of the last one
+    places: Range = (0.1, 0.97)  # of the length of a cover, along which a rod is
+    moving: float = 0.15  # share of surfaces that move
+    along: float = 0.5  # share of these that move along the force, else across it
+    speeds: Range = (0.002, 0.05)  # m/s
+    frequencies: Range = (0.1, 1.0)  # Hz
+    farthest: float = 0.02  # m, amplitude
+    at_rest: float = 1.5  # s of the whole force, until a surface moves
+    full_friction: float = 0.5  # sd of the friction of a moving surface, which is there in full: rms of `frictions`
+
+    poses: Mapping[str, float] = field(default_factory=_poses)  # share of each class
+    margin: float = 0.1  # rad, of a start from the ends of the joints
+    near: float = 0.3  # rad, of a singular pose
+
+    dithered: float = 0.4  # share with feedback from the motors
+    pinned: float = 0.5  # share with a configured contact position
+    tared: float = 0.5  # share that is tared before
+    ramped: float = 0.5  # share whose force rises in a ramp
+    longest_ramp: float = 1.0  # s
+    first: float = 0.2  # fraction of the force that a ramp starts with
+    ramp_step: float = 0.02  # s
+    dither_cycle: int = 40  # inner periods: 25 Hz
+    release: float = 0.5  # s, until the force is commanded
+    seconds: float = 4.0  # of the whole force
+
+    doubled: float = 0.1  # share with a second force
+    apart: float = 0.1  # m, between two forces on a link
+    tries: int = 100  # draws of the second one
+    stepped: float = 0.1  # share, of those of one force, that command another force first
+    down: float = 0.7  # share of these that command a larger one first
+    changes: Range = (2.0, 4.0)  # factor between the two
+    first_held: float = 2.5  # s of the first force
+    long: float = 0.1  # share of small forces that are held for long
+    longer: float = 5.0  # times `seconds`
+    small_forces: Range = (1.0, 3.0)  # N
+    soft: float = 4e3  # N/m, of their surface at most
+
+
+RANGES = TaskRanges()
 
 
 class TaskConditions(NamedTuple):
@@ -122,13 +169,13 @@ class ElbowJoint(NamedTuple):
         return cls(joint, exact if abs(exact - straight) < ROUNDING else straight)
 
     def pose(self, q: Sequence[float]) -> str:
-        """The class of a pose, one of `POSES`; the shoulder's second joint is two before the elbow."""
+        """The class of a pose, one of `TaskRanges.poses`; the shoulder's second joint is two before the elbow."""
         bend = abs(q[self.joint] - self.straight)
-        if bend < NEAR:
+        if bend < RANGES.near:
             return "elbow nearly straight"
-        if abs(q[self.joint - 2]) < NEAR:
+        if abs(q[self.joint - 2]) < RANGES.near:
             return "theta2 near 0"
-        return "elbow near 90 deg" if abs(bend - RIGHT) < NEAR else "any"
+        return "elbow near 90 deg" if abs(bend - RIGHT) < RANGES.near else "any"
 
 
 def draw(arm: Arm, seed: int, number: int) -> Task:
@@ -136,7 +183,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     random = np.random.Generator(np.random.PCG64((seed, number)))
     body = RigidBody(arm)
     conditions = _with_unknowns(_conditions(arm, random), np.random.Generator(np.random.PCG64((seed, number, 2))))
-    force = _log_uniform(random, *FORCES)
+    force = _log_uniform(random, *RANGES.forces)
     elbow = ElbowJoint.of(body)
     q = _pose(arm, elbow, random)
     surface = _surface(body, q, random)
@@ -144,7 +191,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
     task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
-    if random.random() < DOUBLED:
+    if random.random() < RANGES.doubled:
         return _doubled(body, task, random)
     return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
 
@@ -155,25 +202,25 @@ def _in_time(task: Task, random: np.random.Generator) -> Task:
     From the motors most small forces on hard surfaces or at estimated positions are refused.
     """
     share = random.random()
-    if share < STEPPED:
-        change = _log_uniform(random, *CHANGES)
-        first = task.force * (change if random.random() < DOWN else 1.0 / change)
-        return task._replace(before=min(max(first, FORCES[0]), FORCES[1]))
-    if share < STEPPED + LONG:
-        surface = task.surface._replace(stiffness=_log_uniform(random, STIFFNESSES[0], SOFT))
+    if share < RANGES.stepped:
+        change = _log_uniform(random, *RANGES.changes)
+        first = task.force * (change if random.random() < RANGES.down else 1.0 / change)
+        return task._replace(before=min(max(first, RANGES.forces[0]), RANGES.forces[1]))
+    if share < RANGES.stepped + RANGES.long:
+        surface = task.surface._replace(stiffness=_log_uniform(random, RANGES.stiffnesses[0], RANGES.soft))
         conditions = task.conditions._replace(is_pinned=True)
-        small = _log_uniform(random, *SMALL_FORCES)
-        return task._replace(surface=surface, force=small, conditions=conditions, longer=LONGER)
+        small = _log_uniform(random, *RANGES.small_forces)
+        return task._replace(surface=surface, force=small, conditions=conditions, longer=RANGES.longer)
     return task
 
 
 def _with_unknowns(conditions: TaskConditions, random: np.random.Generator) -> TaskConditions:
     """The conditions, with a payload or a law of friction of which the controllers know nothing in some of them."""
     share = random.random()
-    if share < LOADED:
-        return conditions._replace(payload=_log_uniform(random, *PAYLOADS))
-    if share < LOADED + OTHERWISE:
-        return conditions._replace(asymmetry=float(random.uniform(-ASYMMETRY, ASYMMETRY)))
+    if share < RANGES.loaded:
+        return conditions._replace(payload=_log_uniform(random, *RANGES.payloads))
+    if share < RANGES.loaded + RANGES.other_friction:
+        return conditions._replace(asymmetry=float(random.uniform(-RANGES.asymmetry, RANGES.asymmetry)))
     return conditions
 
 
@@ -183,23 +230,24 @@ def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
 
     motors, joints = len(arm.motors.names), len(arm.joints.names)
     return TaskConditions(
-        is_dithered=bool(random.random() < DITHERED) or not arm.joint_sensors,
-        is_pinned=bool(random.random() < PINNED),
-        is_tared=bool(random.random() < TARED),
-        ramp=float(random.uniform(0.0, LONGEST_RAMP)) if random.random() < RAMPED else 0.0,
-        mass=factors(MASS, len(arm.links.names)),
-        motor_friction=factors(FRICTION, motors),
-        joint_friction=factors(FRICTION, joints),
-        cables=factors(CABLES, motors),
-        torque_constant=factors(TORQUE, motors),
+        is_dithered=bool(random.random() < RANGES.dithered) or not arm.joint_sensors,
+        is_pinned=bool(random.random() < RANGES.pinned),
+        is_tared=bool(random.random() < RANGES.tared),
+        ramp=float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
+        mass=factors(RANGES.mass, len(arm.links.names)),
+        motor_friction=factors(RANGES.motor_friction, motors),
+        joint_friction=factors(RANGES.motor_friction, joints),
+        cables=factors(RANGES.cables, motors),
+        torque_constant=factors(RANGES.torque_constant, motors),
     )
 
 
 def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[float, ...]:
     joints = arm.joints
     ends = zip(joints.lower, joints.upper, strict=True)
-    q = [float(random.uniform(low + MARGIN, high - MARGIN)) for low, high in ends]
-    kind, near = random.choice(list(POSES), p=list(POSES.values())), float(random.uniform(-NEAR, NEAR))
+    q = [float(random.uniform(low + RANGES.margin, high - RANGES.margin)) for low, high in ends]
+    kind = random.choice(list(RANGES.poses), p=list(RANGES.poses.values()))
+    near = float(random.uniform(-RANGES.near, RANGES.near))
     if kind == "elbow nearly straight":
         q[elbow.joint] = elbow.straight + near
     elif kind == "theta2 near 0":
@@ -214,39 +262,39 @@ def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[flo
 def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -> Surface:
     covers = body.arm.covers
     share = random.random()
-    cover = covers.names[1 + int(share / ON_OUTER * (len(covers.names) - 1)) if share < ON_OUTER else 0]
+    cover = covers.names[1 + int(share / RANGES.on_outer * (len(covers.names) - 1)) if share < RANGES.on_outer else 0]
     length = covers.length_of(cover)
-    is_plane = cover == covers.names[-1] and bool(random.random() < AT_A_PLANE)
-    lean = float(random.uniform(0.0, STEEPEST)) if is_plane else 0.0
-    place = length if is_plane else float(random.uniform(0.1 * length, 0.97 * length))
+    is_plane = cover == covers.names[-1] and bool(random.random() < RANGES.at_plane)
+    lean = float(random.uniform(0.0, RANGES.steepest)) if is_plane else 0.0
+    place = length if is_plane else float(random.uniform(RANGES.places[0] * length, RANGES.places[1] * length))
     about = float(random.uniform(-math.pi, math.pi))
     local = np.array([math.sin(lean), math.cos(lean) * math.cos(about), math.cos(lean) * math.sin(about)])
-    stiffness = _log_uniform(random, *STIFFNESSES)
+    stiffness = _log_uniform(random, *RANGES.stiffnesses)
     direction = triple(body.cover_pose(q, cover).rotation @ local)
-    return Surface(cover, place, direction, stiffness, float(random.uniform(*FRICTIONS)), is_plane)
+    return Surface(cover, place, direction, stiffness, float(random.uniform(*RANGES.frictions)), is_plane)
 
 
 def _moving(surface: Surface, conditions: TaskConditions, random: np.random.Generator) -> Surface:
     """The surface at rest, or with a motion along the force or across it."""
-    if random.random() >= MOVING:
+    if random.random() >= RANGES.moving:
         return surface
     along, about = np.array(surface.direction), random.normal(size=3)
-    if random.random() >= ALONG:
+    if random.random() >= RANGES.along:
         along = np.cross(along, about) / np.linalg.norm(np.cross(along, about))
-    speed, frequency = _log_uniform(random, *SPEEDS), _log_uniform(random, *FREQUENCIES)
-    amplitude = min(speed / (2.0 * math.pi * frequency), FARTHEST)
-    begin = RELEASE + conditions.ramp + AT_REST
+    speed, frequency = _log_uniform(random, *RANGES.speeds), _log_uniform(random, *RANGES.frequencies)
+    amplitude = min(speed / (2.0 * math.pi * frequency), RANGES.farthest)
+    begin = RANGES.release + conditions.ramp + RANGES.at_rest
     return surface._replace(motion=triple(amplitude * along), frequency=frequency, begin=begin)
 
 
 def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
     """The task with a second force elsewhere on a surface of its own, both at known positions, where it fits."""
     conditions = task.conditions._replace(is_pinned=True)
-    for _ in range(TRIES):
+    for _ in range(RANGES.tries):
         found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
-        is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > APART
+        is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > RANGES.apart
         if is_apart and is_clear(body, task.q, found):
-            return task._replace(second=(found, _log_uniform(random, *FORCES)), conditions=conditions)
+            return task._replace(second=(found, _log_uniform(random, *RANGES.forces)), conditions=conditions)
     return task
 
 
@@ -283,7 +331,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
     if surface.frequency:
         along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
         values |= {
-            "force_loop:sensing.friction": FULL_FRICTION,
+            "force_loop:sensing.friction": RANGES.full_friction,
             "force_loop:limits.surface_speed": surface.speed,
             "force_loop:limits.slide_speed": surface.slide_speed,
             "force_loop:contact_position_sd": surface.slide(along),
@@ -293,7 +341,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
             "arm.joint_sensors": False,
             "contact_estimator:use_joint_sensors": False,
             "force_loop:feedback": "contact_estimate",
-            "timing.dither_cycle": DITHER_CYCLE,
+            "timing.dither_cycle": RANGES.dither_cycle,
         }
     return values
 
@@ -310,14 +358,14 @@ def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:
     """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
-    count = round(task.conditions.ramp / RAMP_STEP)
-    rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
+    count = round(task.conditions.ramp / RANGES.ramp_step)
+    rising = [RANGES.first + (1.0 - RANGES.first) * i / count for i in range(count)]
     before = task.before / task.force if task.before else 1.0
-    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, before * fraction)) for fraction in rising]
+    ramp = [ScenarioStep("ramp", RANGES.ramp_step, **_command(task, before * fraction)) for fraction in rising]
     return [
-        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("release", RANGES.release, request="enable"),
         *ramp,
-        *([ScenarioStep("press first", FIRST_HELD, **_command(task, before))] if task.before else []),
+        *([ScenarioStep("press first", RANGES.first_held, **_command(task, before))] if task.before else []),
         ScenarioStep("press", task.longer * seconds, **_command(task, 1.0)),
     ]
 

@@ -19,7 +19,7 @@ from wam_driver.driver import DriverParameters
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
 from wam_studies.force_benchmark.surfaces import NAMES
-from wam_studies.force_benchmark.tasks import RELEASE, SECONDS, Task, configured, steps
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps
 
 Array = NDArray[np.float64]
 STOPPED = 1.0  # s, after which a task that is held or in fault is over
@@ -34,8 +34,35 @@ class _Standing(NamedTuple):
     predicted_cycle: float
 
 
+class ForceTaskCase(NamedTuple):
+    """A task of a number, and the seconds of its whole force."""
+
+    configuration: Configuration
+    seed: int
+    number: int
+    task: Task
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"task {self.number} of seed {self.seed}"
+
+
+class ForceTrial(NamedTuple):
+    """A task of the benchmark and its result."""
+
+    seed: int
+    number: int
+    task: Task
+    result: TaskResult
+
+
+def play(case: ForceTaskCase) -> ForceTrial:
+    """Do the task of a case."""
+    return ForceTrial(case.seed, case.number, case.task, perform(case.configuration, case.task, case.seconds))
+
+
 def perform(
-    base: Configuration, task: Task, seconds: float = SECONDS, changes: Mapping[str, Any] | None = None
+    base: Configuration, task: Task, seconds: float = RANGES.seconds, changes: Mapping[str, Any] | None = None
 ) -> TaskResult:
     """Do a task in simulation and evaluate it by the simulator's force.
 
@@ -94,7 +121,7 @@ class TaskWatch:
     def traces(self) -> list[TaskTrace]:
         """Play the task to its end, or until it has been stopped for `STOPPED`; what was seen of each force."""
         run, plant, period = self._run, self._run.driver.plant, self._timing.period
-        for _ in range(round(RELEASE / period)):
+        for _ in range(round(RANGES.release / period)):
             run.step()
         if self._task.conditions.is_tared:
             self._node.tare()

@@ -5,6 +5,7 @@ Swevers et al. 1997), within limits of joints and speed, away from obstacles.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,16 +23,24 @@ from wam_description.world import Obstacles
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 6  # random moves of which one is taken
-TRIALS = 400  # random postures without an allowed move, after which there is none
-MARGIN = 0.2  # rad, from the ends of the joints
-SPEED = 0.8  # of the force loop's joint speed limit, and of the driver's limits of the covers' starts and the tip
-SLOWEST = 0.25  # of that speed
-QUICKEST = 0.6  # s of a move
-CLEARANCE = 0.15  # m, from obstacles
-RATE = 0.05  # s, between the points of a move that are checked
-TORQUE_SD = 0.002  # N m, of a motor: what the parameters are worth
-PEAK = 1.875  # peak speed of a minimum-jerk move per mean speed
+
+@dataclass(frozen=True)
+class MoveLimits:
+    """How moves are drawn, and what is allowed of them."""
+
+    candidates: int = 6  # random moves of which one is taken
+    trials: int = 400  # random postures without an allowed move, after which there is none
+    margin: float = 0.2  # rad, from the ends of the joints
+    speed: float = 0.8  # of the force loop's joint speed limit, and of the driver's limits of covers' starts and tip
+    slowest: float = 0.25  # of that speed
+    quickest: float = 0.6  # s of a move
+    clearance: float = 0.15  # m, from obstacles
+    rate: float = 0.05  # s, between the points of a move that are checked
+    torque_sd: float = 0.002  # N m, of a motor: what the parameters are worth
+    peak: float = 1.875  # peak speed of a minimum-jerk move per mean speed
+
+
+MOVES = MoveLimits()
 
 
 class ExcitingMove(NamedTuple):
@@ -77,11 +86,11 @@ def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[E
     posture, spent = np.array(shared.arm.joints.start), 0.0
     while spent < seconds:
         found = []
-        for _ in range(TRIALS):
+        for _ in range(MOVES.trials):
             move = space.draw(random, posture)
             if move is not None:
                 found.append(move)
-            if len(found) == CANDIDATES:
+            if len(found) == MOVES.candidates:
                 break
         if not found:
             raise ParameterError(
@@ -105,7 +114,7 @@ class MovePoints(NamedTuple):
     qdd: Array
 
 
-def path(begin: Array, move: ExcitingMove, period: float = RATE) -> MovePoints:
+def path(begin: Array, move: ExcitingMove, period: float = MOVES.rate) -> MovePoints:
     """Points, each `period` seconds, of the minimum-jerk path that a scenario plays."""
     time = np.arange(0.5 * period, move.seconds, period)
     s = (time / move.seconds)[:, None]
@@ -126,16 +135,18 @@ class _Space:
         self._body = RigidBody(self._arm)
         driver = configuration.sections["driver"]
         self._obstacles = build_part(Obstacles, driver, "world.obstacles.")
-        self._speed = SPEED * float(configuration.sections["force_loop"]["joint_speed_limit"])
-        self._tip = SPEED * float(driver["tip_speed_limit"])
-        self._starts = SPEED * float(driver["cover_speed_limit"])
+        self._speed = MOVES.speed * float(configuration.sections["force_loop"]["joint_speed_limit"])
+        self._tip = MOVES.speed * float(driver["tip_speed_limit"])
+        self._starts = MOVES.speed * float(driver["cover_speed_limit"])
 
     def draw(self, random: np.random.Generator, begin: Array) -> ExcitingMove | None:
         """A random move, None if it is not allowed."""
         joints = self._arm.joints
-        posture = random.uniform(np.array(joints.lower) + MARGIN, np.array(joints.upper) - MARGIN)
-        speed = self._speed * random.uniform(SLOWEST, 1.0)
-        move = ExcitingMove(tuple(posture.tolist()), max(QUICKEST, PEAK * float(np.abs(posture - begin).max()) / speed))
+        posture = random.uniform(np.array(joints.lower) + MOVES.margin, np.array(joints.upper) - MOVES.margin)
+        speed = self._speed * random.uniform(MOVES.slowest, 1.0)
+        move = ExcitingMove(
+            tuple(posture.tolist()), max(MOVES.quickest, MOVES.peak * float(np.abs(posture - begin).max()) / speed)
+        )
         points = path(begin, move)
         allowed = all(self._allows(q, qd) for q, qd in zip(points.q, points.qd, strict=True))
         return move if allowed else None
@@ -150,7 +161,7 @@ class _Space:
             start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
             for share in (0.0, 0.25, 0.5, 0.75, 1.0):
                 point = self._body.point(q, name, start + share * (end - start))
-                if _distance(self._obstacles, point) < CLEARANCE + covers.radius[i]:
+                if _distance(self._obstacles, point) < MOVES.clearance + covers.radius[i]:
                     return False
         return True
 
@@ -180,5 +191,5 @@ def _information(shared: Shared, points: MovePoints) -> Array:
         sought.present
     )
     rows = equations.columns[equations.is_used]
-    found: Array = rows.T @ rows / TORQUE_SD**2
+    found: Array = rows.T @ rows / MOVES.torque_sd**2
     return found

@@ -1,6 +1,7 @@
 """Plants that differ from the model, and what an identification has to find of them."""
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,23 +11,59 @@ from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
-from wam_studies.identification.signals import EXACT, MeasuredSignals
 
 Array = NDArray[np.float64]
 
 KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors", "all, real signals")
-FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
-STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
-ASYMMETRY = 0.15
-LOAD = 0.06
-MASS = 0.03
-PRESLIDING = (4.0, 500.0)  # N m/rad, of motors and joints: a shape that the regression does not have
-COUNTS = 16384  # of the encoder per turn
-CURRENT_NOISE = 0.02  # A
-OFFSET = 0.004  # N m, largest of a motor's torque
-TORQUE_CONSTANT = 0.02
-COGGING, RIPPLE = 0.003, 0.02  # N m; per torque
-CENTRE = 0.003  # m, of the model's centres of mass
+
+
+class MeasuredSignals(NamedTuple):
+    """Errors of the measured torques.
+
+    Attributes
+    ----------
+    scale : measured over true torque, of each motor or one for all.
+    noise : sd of the measured torque, per torque.
+    delay : samples by which measured torques are late.
+    dropped : fraction of samples that do not arrive.
+    """
+
+    scale: tuple[float, ...] = (1.0,)
+    noise: float = 0.0
+    delay: int = 0
+    dropped: float = 0.0
+
+    def of(self, torque: Array, random: np.random.Generator) -> tuple[Array, NDArray[np.bool_]]:
+        """Measured torques, (k, n), N m, of true ones, and which samples arrive, (k,)."""
+        noise = 1.0 + self.noise * random.standard_normal(torque.shape)
+        late = np.concatenate((np.zeros((self.delay, torque.shape[1])), torque))[: len(torque)]
+        measured: Array = late * np.array(self.scale) * noise
+        return measured, random.random(len(torque)) >= self.dropped
+
+
+EXACT: Final = MeasuredSignals()
+
+
+@dataclass(frozen=True)
+class PlantRanges:
+    """What is drawn of a plant, uniformly distributed; a single number is the largest error."""
+
+    factor: tuple[float, float] = (0.8, 1.3)  # of the friction of each motor and joint
+    stribeck_velocity: tuple[float, float] = (0.5, 3.0)  # rad/s, of the motors
+    asymmetry: float = 0.15
+    load: float = 0.06
+    mass: float = 0.03
+    presliding: tuple[float, float] = (4.0, 500.0)  # N m/rad, of motors and joints: a shape the regression has not
+    counts: int = 16384  # of the encoder per turn
+    current_noise: float = 0.02  # A
+    offset: float = 0.004  # N m, of a motor's torque
+    torque_constant: float = 0.02
+    cogging: float = 0.003  # N m
+    ripple: float = 0.02  # per torque
+    centre: float = 0.003  # m, of the model's centres of mass
+
+
+RANGES = PlantRanges()
 SIGNALS = MeasuredSignals(noise=0.005, delay=1, dropped=0.02)
 
 
@@ -63,36 +100,36 @@ def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
     random = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
     values: dict[str, Any] = {
         "arm.joint_sensors": False,  # not used here
-        "driver:mismatch.motor_friction": random.uniform(*FACTOR, n).tolist(),
-        "driver:mismatch.joint_friction": random.uniform(*FACTOR, n).tolist(),
+        "driver:mismatch.motor_friction": random.uniform(*RANGES.factor, n).tolist(),
+        "driver:mismatch.joint_friction": random.uniform(*RANGES.factor, n).tolist(),
     }
     every = kind.startswith("all")
     if every or kind == "Stribeck":
         values["driver:friction.law"] = "stribeck"
-        values["driver:friction.motor_stribeck_velocity"] = random.uniform(*STRIBECK, n).tolist()
+        values["driver:friction.motor_stribeck_velocity"] = random.uniform(*RANGES.stribeck_velocity, n).tolist()
     if every or kind == "asymmetry":
-        values["driver:friction.motor_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
-        values["driver:friction.joint_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
+        values["driver:friction.motor_asymmetry"] = random.uniform(-RANGES.asymmetry, RANGES.asymmetry, n).tolist()
+        values["driver:friction.joint_asymmetry"] = random.uniform(-RANGES.asymmetry, RANGES.asymmetry, n).tolist()
     if every or kind == "load":
-        values["driver:friction.motor_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
-        values["driver:friction.joint_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
+        values["driver:friction.motor_load_factor"] = random.uniform(0.0, RANGES.load, n).tolist()
+        values["driver:friction.joint_load_factor"] = random.uniform(0.0, RANGES.load, n).tolist()
     if every:
-        values["driver:mismatch.mass"] = random.uniform(1.0 - MASS, 1.0 + MASS, n).tolist()
+        values["driver:mismatch.mass"] = random.uniform(1.0 - RANGES.mass, 1.0 + RANGES.mass, n).tolist()
     if kind == "all, presliding":
-        stiffness = zip(("motor", "joint"), PRESLIDING, strict=True)
+        stiffness = zip(("motor", "joint"), RANGES.presliding, strict=True)
         values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
     if kind in ("all, real sensors", "all, real signals"):
-        values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
-        values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
-        values["driver:amplifier.torque_offset"] = random.uniform(-OFFSET, OFFSET, n).tolist()
+        values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / RANGES.counts] * n
+        values["driver:amplifier.current_noise"] = [RANGES.current_noise] * n
+        values["driver:amplifier.torque_offset"] = random.uniform(-RANGES.offset, RANGES.offset, n).tolist()
     if kind == "all, real signals":
-        centre = np.array(configuration.shared.model.links.centre)
+        centre, constant = np.array(configuration.shared.model.links.centre), RANGES.torque_constant
         values |= {
-            "driver:mismatch.torque_constant": random.uniform(1.0 - TORQUE_CONSTANT, 1.0 + TORQUE_CONSTANT, n).tolist(),
-            "driver:amplifier.torque_ripple": [RIPPLE] * n,
-            "driver:effects.ripples.amplitude": [COGGING] * n,
+            "driver:mismatch.torque_constant": random.uniform(1.0 - constant, 1.0 + constant, n).tolist(),
+            "driver:amplifier.torque_ripple": [RANGES.ripple] * n,
+            "driver:effects.ripples.amplitude": [RANGES.cogging] * n,
             "driver:effects.ripples.phase": random.uniform(-np.pi, np.pi, n).tolist(),
-            "model.links.centre": (centre + random.uniform(-CENTRE, CENTRE, len(centre))).tolist(),
+            "model.links.centre": (centre + random.uniform(-RANGES.centre, RANGES.centre, len(centre))).tolist(),
         }
     return configuration.with_values(values)
 

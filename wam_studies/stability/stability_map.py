@@ -46,7 +46,7 @@ def stability_map(
     stiffness_ratio: float,
     stiction: float,
     executor: Executor,
-    folder: Path | None = None,
+    file: Path | None = None,
     report: Callable[[int, int], None] | None = None,
 ) -> StabilityMap:
     """Compute the map.
@@ -56,11 +56,11 @@ def stability_map(
     gamma, zeta : (gammas,) and (zetas,), axes of the map, above zero.
     stiffness_ratio : k_tr/k_c.
     stiction : F_static/F_dynamic.
-    executor, folder, report : as in `batch.results`.
+    executor, file, report : as in `batch.results`.
     """
     each = max(1, PIECE // len(gamma))
     pieces = [MapPiece(gamma, zeta[i : i + each], stiffness_ratio, stiction) for i in range(0, len(zeta), each)]
-    steps = np.concatenate(batch.results(steps_of, pieces, executor, folder, report))
+    steps = np.concatenate(batch.results(steps_of, pieces, executor, file, report))
     return StabilityMap(gamma, zeta, stiffness_ratio, stiction, steps)
 
 

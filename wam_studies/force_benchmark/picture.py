@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 
 from wam_analysis.drawing import BETWEEN, COMMANDED, REFUSED, RIGHT, WRONG
 from wam_studies.figures.style import GREY, panels
-from wam_studies.force_benchmark.evaluation import ForceTrial
-from wam_studies.force_benchmark.outcome import TOLERANCE, TaskEnd
-from wam_studies.force_benchmark.page import GROUPINGS, MOTORS, SENSORS, TaskGrouping, of_class
+from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd
+from wam_studies.force_benchmark.study import FEEDBACK, FORCE, MOTORS, POSE, SENSORS, STIFFNESS, TaskGrouping
+from wam_studies.force_benchmark.trial import ForceTrial
 
 COLOURS = {
     TaskEnd.DONE: RIGHT,
@@ -23,19 +23,19 @@ LEAST, MOST = 0.1, 10.0  # of the commanded force, drawn
 FORCES, RATIOS = (1, 2, 5, 10, 20, 40), (0.1, 0.2, 0.5, 1, 2, 5, 10)  # ticks, N and none
 
 
-def figure(trials: Sequence[ForceTrial], file: Path) -> None:
+def draw(trials: Sequence[ForceTrial], file: Path) -> None:
     """Draw the figure into a file, and create its folder."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with panels(file, 3, 2, 8.8, 10.4) as (_, flat):
-        _forces(flat[0], of_class(trials, GROUPINGS[0], SENSORS), SENSORS)
-        _forces(flat[1], of_class(trials, GROUPINGS[0], MOTORS), MOTORS)
+        _forces(flat[0], FEEDBACK.trials(trials, SENSORS), SENSORS)
+        _forces(flat[1], FEEDBACK.trials(trials, MOTORS), MOTORS)
         _peaks(flat[2], trials)
-        for axes, grouping in zip(flat[3:], GROUPINGS[1:4], strict=True):
+        for axes, grouping in zip(flat[3:], (STIFFNESS, POSE, FORCE), strict=True):
             _outcomes(axes, trials, grouping)
 
 
 def _forces(axes: Axes, trials: Sequence[ForceTrial], name: str) -> None:
-    axes.axhspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, color=GREY, alpha=0.2, lw=0)
+    axes.axhspan(1.0 - OUTCOME.tolerance, 1.0 + OUTCOME.tolerance, color=GREY, alpha=0.2, lw=0)
     for end, colour in COLOURS.items():
         own = [trial for trial in trials if trial.result.outcome is end]
         ratio = [trial.result.mean / trial.task.force for trial in own]
@@ -76,7 +76,7 @@ def _peaks(axes: Axes, trials: Sequence[ForceTrial]) -> None:
 
 def _outcomes(axes: Axes, trials: Sequence[ForceTrial], grouping: TaskGrouping) -> None:
     counts = [
-        [sum(t.result.outcome is end for t in of_class(trials, grouping, name)) for end in COLOURS]
+        [sum(t.result.outcome is end for t in grouping.trials(trials, name)) for end in COLOURS]
         for name in grouping.classes
     ]
     wholes = [max(sum(row), 1) for row in counts]

@@ -1,7 +1,5 @@
-"""Identified against true parameters: plants of several kinds and seeds, each played without ROS."""
+"""One identification: the motion on a plant that differs from the model, identified against true parameters."""
 
-import math
-from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +10,6 @@ from wam_analysis.identification.motion import MotionSamples, evenly, motion
 from wam_analysis.identification.overlay import model_values
 from wam_analysis.identification.parameters import DIRECTIONS
 from wam_analysis.identification.regressor import Regressor
-from wam_analysis.table import markdown
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
@@ -20,16 +17,13 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_studies.identification.excitation import moves, path
-from wam_studies.identification.plants import KINDS, measured_signals, plant, true_friction
-from wam_studies.identification.signals import EXACT, MeasuredSignals
+from wam_studies.identification.plants import EXACT, MeasuredSignals, measured_signals, plant, true_friction
 
 Array = NDArray[np.float64]
 
 SPEED = 10.0  # rad/s of a motor, at which friction is compared
 POSES = 50
 SIGNALS = 1  # stream of random numbers
-REQUIRED, TARGET = 0.04, 0.02  # error of a motor's friction
-WITHIN = 2.0  # factor between error and standard error
 
 
 class IdentificationTrial(NamedTuple):
@@ -45,6 +39,9 @@ class IdentificationTrial(NamedTuple):
     kind: str
     seed: int
     seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.kind}, seed {self.seed}"
 
 
 class IdentificationResult(NamedTuple):
@@ -162,65 +159,3 @@ def _gravity_errors(configuration: Configuration, found: Identification) -> tupl
         return float(np.sqrt(np.mean(np.square(left))))
 
     return error(RigidBody(identified.model_arm)), error(RigidBody(shared.model_arm))
-
-
-def trials(configuration: Configuration, seeds: Sequence[int], seconds: float) -> list[IdentificationTrial]:
-    """Every kind of plant with every seed."""
-    return [IdentificationTrial(configuration, kind, seed, seconds) for kind in KINDS for seed in seeds]
-
-
-def table(results: Sequence[IdentificationResult]) -> str:
-    """Errors by kind of plant, and of all."""
-    head = [
-        "plant", "runs", "friction before, rms", "friction, rms", "largest", "error / standard error, rms",
-        "beyond 2 of it", "Coulomb alone, rms", "largest", "its error / standard error, rms",
-        "gravity before, N m", "gravity, N m",
-    ]  # fmt: skip
-    kinds = [(kind, [r for r in results if r.kind == kind]) for kind in dict.fromkeys(r.kind for r in results)]
-    return markdown(head, [_row(name, some) for name, some in [*kinds, ("every plant", list(results))]])
-
-
-def _row(name: str, some: Sequence[IdentificationResult]) -> list[str]:
-    def of(get: Callable[[IdentificationResult], Array]) -> Array:
-        return np.concatenate([get(result) for result in some])
-
-    level, coulomb = of(lambda r: r.level), of(lambda r: r.coulomb)
-    scores = level / of(lambda r: r.level_sd)
-    coulomb_scores = coulomb / of(lambda r: r.coulomb_sd)
-    return [
-        name,
-        str(len(some)),
-        f"{_rms(of(lambda r: r.before)):.1%}",
-        f"{_rms(level):.2%}",
-        f"{np.abs(level).max():.2%}",
-        f"{_rms(scores):.2f}",
-        f"{np.mean(np.abs(scores) > 2.0):.0%}",
-        f"{_rms(coulomb):.2%}",
-        f"{np.abs(coulomb).max():.2%}",
-        f"{_rms(coulomb_scores):.2f}",
-        f"{_rms(np.array([r.gravity_before for r in some])):.3f}",
-        f"{_rms(np.array([r.gravity for r in some])):.3f}",
-    ]
-
-
-def missed(results: Sequence[IdentificationResult]) -> Iterator[str]:
-    """What the requirement demands and the results do not show."""
-    for name, error, sd in (
-        ("friction", "level", "level_sd"),
-        ("Coulomb friction alone", "coulomb", "coulomb_sd"),
-    ):
-        largest = max(float(np.abs(getattr(result, error)).max()) for result in results)
-        if largest > REQUIRED:
-            yield f"{name}: largest error {largest:.2%}, required {REQUIRED:.0%}"
-        for kind in dict.fromkeys(result.kind for result in results):
-            some = [getattr(result, error) / getattr(result, sd) for result in results if result.kind == kind]
-            score = _rms(np.concatenate(some))
-            if not 1.0 / WITHIN <= score <= WITHIN:
-                yield f"{name}, plant '{kind}': errors are {score:.2f} of the stated ones, required 1/2 to 2"
-    for result in results:
-        if result.failure:
-            yield f"{result.kind}, seed {result.seed}: {result.failure}"
-
-
-def _rms(values: Array) -> float:
-    return math.sqrt(float(np.mean(np.square(values))))

@@ -1,0 +1,227 @@
+"""The harness: seeds, resume, marks, the page, and a study of a newcomer in one file."""
+
+import importlib.util
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar, NamedTuple
+
+import pytest
+from arms import CONFIGURATION
+
+from wam_cli.main import main
+from wam_description.configuration import Configuration, packaged
+from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load, option
+from wam_studies.page import block, report, section_of, with_section
+from wam_studies.scores import (
+    ANY,
+    FEW,
+    MARGINAL,
+    MET,
+    MISSED,
+    MISSED_MARGINAL,
+    NONE_AT_ALL,
+    TARGET_MET,
+    TARGET_MISSED,
+    Bound,
+    FailedCase,
+    Interval,
+    Row,
+    Scores,
+    ScoreTable,
+    events,
+    exact,
+    quantile,
+    share,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+run_cases: list[tuple[int, int]] = []
+
+
+class Square(NamedTuple):
+    """A number of a seed, and its square."""
+
+    seed: int
+    number: int
+    value: float
+
+
+def squared(case: tuple[int, int]) -> Square:
+    run_cases.append(case)
+    return Square(*case, float(case[1]) ** 2)
+
+
+@dataclass(frozen=True)
+class SquareStudy(Study[tuple[int, int], Square]):
+    """Squares of the numbers from a seed on, without end."""
+
+    title: ClassVar[str] = "squares"
+    count: ClassVar[int | None] = 3
+    limit: float = option(5.0, "largest square allowed", 1.0)
+    run = staticmethod(squared)
+
+    def cases(self, seed: int) -> Iterator[tuple[int, int]]:
+        number = 0
+        while True:
+            yield seed, number
+            number += 1
+
+    def score(self, records: Sequence[Square]) -> Scores:
+        over = [FailedCase(r.seed, r.number, f"{r.value:g}") for r in records if r.value > self.limit]
+        largest = exact(max(r.value for r in records), len(records))
+        rows = [
+            Row("largest", largest, "m", required=(0.0, self.limit)),
+            Row("too large", exact(len(over), len(records))),
+        ]
+        return Scores(rows, [ScoreTable("Numbers", ("n",), [[str(r.number)] for r in records])], over)
+
+
+def measured(file: Path | None = None, seeds: Sequence[int] = (1, 2), count: int | None = None) -> Measurement:
+    study = SquareStudy(CONFIGURATION)
+    with ThreadPoolExecutor(1) as executor:
+        return evaluate(study, {seed: chosen_cases(study, seed, count) for seed in seeds}, executor, file)
+
+
+def test_records_are_by_seed_in_the_order_of_the_cases() -> None:
+    found = measured()
+    assert {seed: [r.number for r in own] for seed, own in found.records.items()} == {1: [0, 1, 2], 2: [0, 1, 2]}
+    assert [r.seed for r in found.total] == [1, 1, 1, 2, 2, 2]
+    study = SquareStudy(CONFIGURATION)
+    assert chosen_cases(study, 7, numbers=[5, 0]) == [(7, 5), (7, 0)]
+
+
+def test_a_study_that_was_stopped_goes_on_from_its_file(tmp_path: Path) -> None:
+    run_cases.clear()
+    first = measured(tmp_path / "r.jsonl", [1])
+    again = measured(tmp_path / "r.jsonl", [1, 2], 4)
+    assert again.records[1][:3] == first.records[1]
+    assert run_cases == [(1, 0), (1, 1), (1, 2), (1, 3), (2, 0), (2, 1), (2, 2), (2, 3)]
+
+
+def test_the_code_is_that_of_the_configuration_too() -> None:
+    other = SquareStudy(CONFIGURATION.with_values({"force_loop:force_gain": [0.01]}))
+    with ThreadPoolExecutor(1) as executor:
+        assert evaluate(other, {1: [(1, 0)]}, executor).code != measured().code
+
+
+def test_a_missed_value_and_each_failed_case_with_its_command_are_printed() -> None:
+    found = measured(count=4)
+    assert found.scores.missed == ["largest: 9 m, required 5"]
+    text = report(found, "wam evaluate square")
+    assert "| largest | m | 5 |  | 9 | 9 | 9 |  | 8 | **MISSED** (n=8: too few) |" in text
+    assert "* seed 2, case 3: 9\n  `wam evaluate square --seeds 2 --only 3`" in text
+    assert "## Numbers" in text
+
+
+def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
+    file = tmp_path / "page.md"
+    text = block(measured(), "wam evaluate square --write page.md", "wam evaluate square", "page/square.png")
+    file.write_text(with_section(file, "square", text, "Squares"))
+    assert file.read_text().startswith("# Squares\n")
+    file.write_text(file.read_text() + "\n## Method\n\nBy hand.\n")
+    file.write_text(with_section(file, "square", "nothing"))
+    assert section_of(file, "square") == "nothing\n"
+    assert file.read_text().endswith("## Method\n\nBy hand.\n")
+    with pytest.raises(ValueError, match="has no line '<!-- written: other -->'"):
+        with_section(file, "other", "")
+    for words in ("`wam evaluate square --write page.md`: 6 cases", "![squares](page/square.png)", "Every required"):
+        assert words in text
+
+
+def test_an_option_that_is_too_small_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"--limit is 0.5; it must be at least 1"):
+        SquareStudy(CONFIGURATION, 0.5)
+    with pytest.raises(ValueError, match=r"--limit is nan"):
+        SquareStudy(CONFIGURATION, math.nan)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_names_a_page_that_has_its_section(name: str) -> None:
+    kind = load(name)
+    assert kind.title
+    assert section_of(ROOT / kind.page, name)
+
+
+TO_TWO, TO_ONE = (0.0, 2.0), (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("required", "target", "found", "mark"),
+    [
+        (TO_TWO, TO_ONE, Interval(0.9, 0.8, 1.4, 50), TARGET_MET),
+        (TO_TWO, TO_ONE, Interval(1.5, 1.2, 1.9, 50), MET),
+        (TO_TWO, TO_ONE, Interval(1.5, 1.2, 2.1, 50), MARGINAL),
+        (TO_TWO, TO_ONE, Interval(2.5, 2.2, 3.1, 50), MISSED),
+        (TO_TWO, TO_ONE, Interval(2.5, 1.2, 3.1, 50), MISSED_MARGINAL),
+        (TO_TWO, TO_ONE, quantile([0.5], 0.5), FEW),
+        (TO_TWO, TO_ONE, Interval(math.nan, math.nan, math.nan, 0), "no data"),
+        (ANY, TO_ONE, Interval(1.5, 1.2, 1.9, 50), TARGET_MISSED),
+        (ANY, ANY, share(1, 2), ""),
+        (NONE_AT_ALL, NONE_AT_ALL, events(0, 60.0), FEW),
+        (NONE_AT_ALL, NONE_AT_ALL, events(0, 130.0), MET),
+        (NONE_AT_ALL, NONE_AT_ALL, events(0, 700.0), TARGET_MET),
+        (NONE_AT_ALL, NONE_AT_ALL, events(1, 700.0), MISSED),
+    ],
+)
+def test_a_mark_compares_value_and_interval_with_what_is_allowed(
+    required: Bound, target: Bound, found: Interval, mark: str
+) -> None:
+    assert Row("x", found, required=required, target=target, enough=(120.0, 600.0)).mark == mark
+
+
+@pytest.fixture
+def example(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The study of a newcomer."""
+    spec = importlib.util.spec_from_file_location("study", ROOT / "examples" / "study.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "study", module)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_a_newcomer_adds_a_study_of_three_cases_in_one_file_of_60_lines(example: ModuleType) -> None:
+    assert len((ROOT / "examples" / "study.py").read_text().splitlines()) <= 60
+    study = example.PressStudy(Configuration.load(packaged("testbed")))
+    with ThreadPoolExecutor(1) as executor:
+        found = evaluate(study, {1: chosen_cases(study, 1)}, executor)
+    assert len(found.total) == 3
+    assert found.scores.missed == []
+
+
+def test_the_options_of_a_study_are_those_of_the_harness_and_its_fields(
+    example: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from wam_cli.commands.evaluate import program
+
+    monkeypatch.setattr(sys, "argv", ["study.py", "--seconds", "0.5"])
+    with pytest.raises(SystemExit):
+        program("press", example.PressStudy)
+    assert "--seconds is 0.5; it must be at least 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("--cases 0", "--cases is 0; it must be at least 1"),
+        ("--only -3", "--only is -3"),
+        ("--seeds -1", "--seeds is -1; it must be at least 0"),
+        ("--write no/page.md", "is no directory; give another file as --write"),
+        ("--set timing.mode=realtime", "--set timing.mode has no effect: the runs are in Python"),
+        ("--set force_loop:contact_source=pinned", "has no effect here: each case sets it"),
+    ],
+)
+def test_a_wrong_option_is_refused_in_a_sentence(
+    words: str, reason: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", "force", "--results", str(tmp_path / "results.jsonl"), *words.split()])
+    assert end.value.code == 1
+    assert reason in capsys.readouterr().err

@@ -1,0 +1,163 @@
+"""One harness for every study: seeds, progress, resume, processes or a cluster, results, command line and page.
+
+A study is a frozen dataclass below `Study` with three pure methods; its fields are its options.  `wam evaluate NAME`
+runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
+"""
+
+import hashlib
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, fields
+from datetime import UTC, datetime
+from itertools import islice
+from pathlib import Path
+from time import monotonic
+from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
+
+from wam_description.configuration import Configuration
+from wam_sim.batch import Report, results
+from wam_sim.pieces import code_of
+from wam_studies.scores import Scores
+
+Case = TypeVar("Case")
+Record = TypeVar("Record")
+
+# name: where its class is
+STUDIES: Final = {
+    "force": "wam_studies.force_benchmark.study:ForceStudy",
+    "identify": "wam_studies.identification.study:IdentificationStudy",
+}
+
+
+def option(default: Any, text: str, least: float | None = None) -> Any:
+    """A field of a study that is an option: its default, what it is, and the least value allowed."""
+    return field(default=default, metadata={"text": text, "least": least})
+
+
+@dataclass(frozen=True)
+class Study(ABC, Generic[Case, Record]):
+    """What is drawn, what is measured of each case, and what is required of all.
+
+    Attributes
+    ----------
+    title : what is studied, in a line.
+    page : of the documentation that has its result.
+    seeds : by default.
+    count : cases of a seed by default; None for all that there are.
+    base : name of the configuration by default.
+    configuration : under test.
+    """
+
+    title: ClassVar[str]
+    page: ClassVar[str] = ""
+    seeds: ClassVar[tuple[int, ...]] = (1, 2, 3)
+    count: ClassVar[int | None] = None
+    base: ClassVar[str] = "wam"
+
+    configuration: Configuration
+
+    def __post_init__(self) -> None:
+        """Refuse an option that is too small.
+
+        Raises
+        ------
+        ValueError
+            which names the option, its value and what is allowed.
+        """
+        for one in fields(self):
+            value, least = getattr(self, one.name), one.metadata.get("least")
+            if least is not None and not value >= least:
+                raise ValueError(f"--{one.name.replace('_', '-')} is {value:g}; it must be at least {least:g}")
+
+    @abstractmethod
+    def cases(self, seed: int) -> Iterable[Case]:
+        """The cases of a seed, plain data; each depends on the options, the seed and its number alone."""
+
+    @staticmethod
+    @abstractmethod
+    def run(case: Case, /) -> Record:
+        """Measure a case; a record is plain data, see `wam_sim.pieces`."""
+
+    @abstractmethod
+    def score(self, records: Sequence[Record]) -> Scores:
+        """What follows from the records of all seeds, or of one."""
+
+    def picture(self, records: Sequence[Record], file: Path) -> bool:
+        """Draw the records into a file; False where the study has no picture."""
+        return False
+
+    def details(self, record: Record) -> str:
+        """One record in full."""
+        return str(record)
+
+    def sets(self, case: Case) -> Collection[str]:
+        """Parameters that a case sets itself, so that --set has no effect on them."""
+        return ()
+
+
+class Measurement(NamedTuple):
+    """What a study has measured, when, and on which code.
+
+    Attributes
+    ----------
+    study : with its options.
+    records : by seed, in order of their cases.
+    seconds : of this measurement, with what was kept of an earlier one left out.
+    date : of its end.
+    code : hash of code and configuration.
+    """
+
+    study: Study[Any, Any]
+    records: Mapping[int, Sequence[Any]]
+    seconds: float
+    date: str
+    code: str
+
+    @property
+    def total(self) -> list[Any]:
+        """The records of all seeds."""
+        return [record for own in self.records.values() for record in own]
+
+    @property
+    def scores(self) -> Scores:
+        """Of all seeds together."""
+        return self.study.score(self.total)
+
+    @property
+    def by_seed(self) -> dict[int, Scores]:
+        """Of each seed alone."""
+        return {seed: self.study.score(own) for seed, own in self.records.items()}
+
+
+def chosen_cases(
+    study: Study[Case, Any], seed: int, count: int | None = None, numbers: Sequence[int] = ()
+) -> list[Case]:
+    """The first cases of a seed, or those of some numbers."""
+    if not numbers:
+        return list(islice(study.cases(seed), count or study.count))
+    first = list(islice(study.cases(seed), max(numbers) + 1))
+    return [first[number] for number in numbers if number < len(first)]
+
+
+def evaluate(
+    study: Study[Case, Record],
+    cases: Mapping[int, Sequence[Case]],
+    executor: Executor,
+    file: Path | None = None,
+    report: Report | None = None,
+) -> Measurement:
+    """Run the cases of each seed; the other arguments are those of `wam_sim.batch.results`."""
+    begin = monotonic()
+    found = iter(results(study.run, [case for own in cases.values() for case in own], executor, file, report))
+    records = {seed: list(islice(found, len(own))) for seed, own in cases.items()}
+    code = hashlib.sha256(f"{code_of(study.run)} {study.configuration.text}".encode()).hexdigest()[:12]
+    return Measurement(study, records, monotonic() - begin, f"{datetime.now(UTC):%Y-%m-%d}", code)
+
+
+def load(name: str) -> type[Study[Any, Any]]:
+    """The class of a study."""
+    module, _, kind = STUDIES[name].partition(":")
+    found: type[Study[Any, Any]] = getattr(importlib.import_module(module), kind)
+    return found

@@ -1,0 +1,75 @@
+"""The result of a study as text: for a terminal, and between two marks of a page of the documentation."""
+
+import re
+from pathlib import Path
+
+from wam_studies.harness import Measurement
+from wam_studies.scores import rows_table
+
+LISTED = 40  # failed cases
+END = "<!-- end of what is written -->"
+
+
+def report(measured: Measurement, command: str) -> str:
+    """The tables, and each failed case with the command that repeats it.
+
+    Parameters
+    ----------
+    measured : records and their scores.
+    command : without seeds, which repeats a case with these and its number.
+    """
+    scores, by_seed = measured.scores, measured.by_seed
+    rows = rows_table(scores.rows, {seed: own.rows for seed, own in by_seed.items()}) if scores.rows else ""
+    parts = [rows, *(table.text() for table in scores.tables)]
+    lines = [
+        f"* seed {failed.seed}, case {failed.number}: {failed.reason}\n"
+        f"  `{command} --seeds {failed.seed} --only {failed.number}`"
+        for failed in scores.failures[:LISTED]
+    ]
+    if len(scores.failures) > LISTED:
+        lines.append(f"* {len(scores.failures) - LISTED} more")
+    if lines:
+        parts.append("## Failures\n\n" + "\n".join(lines) + "\n")
+    return "\n".join(filter(None, parts))
+
+
+def block(measured: Measurement, command: str, repeats: str, picture: str = "") -> str:
+    """What is written into a page: when and how it was measured, the picture, and the tables.
+
+    Parameters
+    ----------
+    command : that writes this.
+    repeats : as the command of `report`.
+    picture : its path relative to the page, '' for none.
+    """
+    count = len(measured.total)
+    head = (
+        f"Written by `{command}`: {count} cases on {measured.date}, {measured.seconds:.0f} s, "
+        f"code and configuration `{measured.code}`."
+    )
+    shown = f"![{measured.study.title}]({picture})" if picture else ""
+    missed = measured.scores.missed
+    verdict = f"Missed: {'; '.join(missed)}." if missed else "Every required value is met."
+    return "\n\n".join(filter(None, [head, shown, verdict, report(measured, repeats)]))
+
+
+def section_of(file: Path, name: str) -> str:
+    """What a section of the page holds, '' where there is no page."""
+    page = file.read_text(encoding="utf-8") if file.exists() else ""
+    return page.partition(f"<!-- written: {name} -->\n")[2].partition(END)[0]
+
+
+def with_section(file: Path, name: str, text: str, title: str = "") -> str:
+    """The page with one of its sections replaced; a new page of a title where there is none.
+
+    Raises
+    ------
+    ValueError
+        for a page without the section.
+    """
+    begin = f"<!-- written: {name} -->\n"
+    page = file.read_text(encoding="utf-8") if file.exists() else f"# {title}\n\n{begin}{END}\n"
+    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(END), re.DOTALL)
+    if not pattern.search(page):
+        raise ValueError(f"{file} has no line '{begin.strip()}'; remove the file, or write into another one")
+    return pattern.sub(lambda found: f"{begin}{text.rstrip()}\n{END}", page)

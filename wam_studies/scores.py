@@ -1,0 +1,245 @@
+"""What a study has measured: values with their 95 % intervals, compared with what is required and aimed at."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from wam_analysis.table import markdown
+
+Bound = tuple[float, float]  # least and greatest allowed value
+ANY: Final[Bound] = (-math.inf, math.inf)
+NONE_AT_ALL: Final[Bound] = (0.0, 0.0)  # a count that must be zero
+Z: Final = 1.96  # of a two-sided 95 % interval
+RESAMPLED: Final = 400  # bootstrap samples
+FEW: Final = "too few"
+FEWEST: Final = 20  # observations, below which a verdict is not one on the quantity
+MET, TARGET_MET, MARGINAL, MISSED = "met", "**target met**", "met, marginal", "**MISSED**"
+MISSED_MARGINAL, TARGET_MISSED = "**MISSED**, marginal", "target missed"
+
+
+class Interval(NamedTuple):
+    """A value, its 95 % interval and the number of observations.
+
+    NaN without observations; an end of the interval is NaN if there are too few.
+    """
+
+    value: float
+    low: float
+    high: float
+    observed: int
+
+
+NONE: Final = Interval(math.nan, math.nan, math.nan, 0)
+
+
+def exact(value: float, observed: int) -> Interval:
+    """A value that is no estimate, as a largest error or a count."""
+    return Interval(value, value, value, observed)
+
+
+def counted(mark: str, observed: int) -> str:
+    """A mark, with a remark where it is one on too few observations; '' stays ''."""
+    return f"{mark} (n={observed}: {FEW})" if mark and observed < FEWEST and FEW not in mark else mark
+
+
+def share(hits: int, count: int) -> Interval:
+    """Share of hits with its Wilson interval (1927)."""
+    if count == 0:
+        return NONE
+    p, z2 = hits / count, Z * Z
+    centre = (p + z2 / (2.0 * count)) / (1.0 + z2 / count)
+    half = Z * math.sqrt(p * (1.0 - p) / count + z2 / (4.0 * count * count)) / (1.0 + z2 / count)
+    return Interval(p, max(0.0, centre - half), min(1.0, centre + half), count)
+
+
+def quantile(values: Sequence[float], level: float) -> Interval:
+    """A quantile with its interval by order statistics; infinite values are the greatest."""
+    n = len(values)
+    if n == 0:
+        return NONE
+    ordered = sorted(values)
+    half = Z * math.sqrt(n * level * (1.0 - level))
+    ranks = (math.floor(n * level + side * half) for side in (-1.0, 1.0))
+    low, high = (ordered[rank] if 0 <= rank < n else math.nan for rank in ranks)
+    middle = n * level - 0.5
+    lower, upper = (ordered[min(max(k, 0), n - 1)] for k in (math.floor(middle), math.ceil(middle)))
+    value = lower if lower == upper else lower + (middle - math.floor(middle)) * (upper - lower)
+    return Interval(value, low, high, n)
+
+
+def rms(sums: Sequence[float], counts: Sequence[int]) -> Interval:
+    """Root mean square of observations in correlated groups; the interval is a bootstrap over the groups.
+
+    Parameters
+    ----------
+    sums : sum of squares of each group.
+    counts : observations of each group.
+    """
+    total = sum(counts)
+    if total == 0:
+        return NONE
+    squares, sizes = np.array(sums), np.array(counts, dtype=float)
+    chosen = np.random.default_rng(0).integers(0, len(squares), (RESAMPLED, len(squares)))
+    values = np.sqrt(squares[chosen].sum(axis=1) / np.maximum(sizes[chosen].sum(axis=1), 1.0))
+    low, high = np.quantile(values, (0.025, 0.975)).tolist()
+    return Interval(math.sqrt(float(squares.sum()) / total), low, high, total)
+
+
+def events(count: int, seconds: float) -> Interval:
+    """Number of events in a time, s, with its Poisson interval (Byar's approximation)."""
+    if seconds <= 0.0:
+        return NONE
+    low = count * (1.0 - 1.0 / (9.0 * count) - Z / (3.0 * math.sqrt(count))) ** 3 if count else 0.0
+    more = count + 1
+    high = more * (1.0 - 1.0 / (9.0 * more) + Z / (3.0 * math.sqrt(more))) ** 3
+    return Interval(float(count), low, high, round(seconds))
+
+
+class Row(NamedTuple):
+    """A quantity of the table.
+
+    Attributes
+    ----------
+    name : of the quantity, with what it is of.
+    found : in SI.
+    unit, scale : as text; of the value in that unit.
+    required, target : allowed values in SI; ANY for none.
+    enough : observations from which none of what must not happen counts as required and as the target.
+    """
+
+    name: str
+    found: Interval
+    unit: str = ""
+    scale: float = 1.0
+    required: Bound = ANY
+    target: Bound = ANY
+    enough: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def mark(self) -> str:
+        """Comparison with the required and the target values, '' without any."""
+        found, required, target = self.found, self.required, self.target
+        if required == ANY == target:
+            return ""
+        if math.isnan(found.value):
+            return "no data"
+        counts = required == NONE_AT_ALL  # the interval of a count never is zero
+        least, least_for_target = self.enough
+        if (counts and found.value == 0.0 and found.observed < least) or math.isnan(found.low + found.high):
+            return FEW
+        if target != ANY and holds(found.value, target) and not (counts and found.observed < least_for_target):
+            return TARGET_MET
+        if required == ANY:
+            return TARGET_MISSED
+        if not holds(found.value, required):
+            low, high = required
+            return MISSED if counts or found.high < low or found.low > high else MISSED_MARGINAL
+        return MET if counts or (holds(found.low, required) and holds(found.high, required)) else MARGINAL
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the required value is missed."""
+        return self.mark in (MISSED, MISSED_MARGINAL)
+
+    @property
+    def verdict(self) -> str:
+        """The mark, with a remark where it is one on too few observations."""
+        return counted(self.mark, self.found.observed)
+
+    @property
+    def cells(self) -> list[str]:
+        """Value, 95 % interval, number of observations and verdict as text."""
+        low, high = number(self.found.low, self.scale), number(self.found.high, self.scale)
+        span = "" if self.found.low == self.found.high else f"{low} to {high}"
+        return [number(self.found.value, self.scale), span, str(self.found.observed), self.verdict]
+
+
+class ScoreTable(NamedTuple):
+    """A table of a page: its title, the cells of its head and rows, and what a reader has to know."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+    def text(self) -> str:
+        """In Markdown, with its title."""
+        parts = [f"## {self.title}", self.note, markdown(self.head, self.rows)]
+        return "\n\n".join(filter(None, parts))
+
+
+class FailedCase(NamedTuple):
+    """A case that failed: its seed and number, which repeat it, and why."""
+
+    seed: int
+    number: int
+    reason: str
+
+
+class Scores(NamedTuple):
+    """What follows from the records of a study.
+
+    Attributes
+    ----------
+    rows : what is required, and other quantities.
+    tables : further tables.
+    failures : cases to be looked at, named with the command that repeats each.
+    """
+
+    rows: Sequence[Row]
+    tables: Sequence[ScoreTable] = ()
+    failures: Sequence[FailedCase] = ()
+
+    @property
+    def missed(self) -> list[str]:
+        """Each quantity whose required value is missed, with its value."""
+        return [
+            f"{row.name}: {row.cells[0]} {row.unit}".rstrip() + f", required {bound_text(row.required, row.scale)}"
+            for row in self.rows
+            if row.is_missed
+        ]
+
+
+def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]]) -> str:
+    """Quantities by row in Markdown: a column for each seed, then all seeds; rows that have nothing are left out.
+
+    Parameters
+    ----------
+    rows : of all seeds.
+    by_seed : the same of each; no columns of its own where there is one seed.
+    """
+    seeds = list(by_seed) if len(by_seed) > 1 else []
+    single = {(seed, row.name): number(row.found.value, row.scale) for seed in seeds for row in by_seed[seed]}
+    head = ["quantity", "unit", "required", "target", *(f"seed {seed}" for seed in seeds), "all", "95 %", "n", ""]
+    lines = []
+    for row in rows:
+        if row.found.observed or row.required != ANY or row.target != ANY:
+            bounds = [bound_text(row.required, row.scale), bound_text(row.target, row.scale)]
+            of_seeds = [single.get((seed, row.name), "–") for seed in seeds]
+            lines.append([row.name, row.unit, *bounds, *of_seeds, *row.cells])
+    return markdown(head, lines)
+
+
+def holds(value: float, bound: Bound) -> bool:
+    """Whether a value is allowed, apart from rounding."""
+    low, high = bound
+    return low - 1e-12 <= value <= high + 1e-12
+
+
+def number(value: float, scale: float) -> str:
+    """A measured value as text; none is infinite or could not be measured."""
+    if math.isnan(value):
+        return "–"
+    return "none" if math.isinf(value) else f"{scale * value:.3g}"
+
+
+def bound_text(bound: Bound, scale: float) -> str:
+    """Allowed values as text, '' for any."""
+    low, high = (f"{scale * end:.3g}" for end in bound)
+    if bound == ANY:
+        return ""
+    if bound[0] <= 0.0:
+        return high
+    return f"at least {low}" if bound[1] in (1.0, math.inf) else f"{low} to {high}"
