@@ -31,9 +31,10 @@ from wam_control.force.contact_position import pinned_position, torque_of_positi
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceCommand, ForceLoop
-from wam_control.force.given_way import LASTING, GivenWay
+from wam_control.force.given_way import GivenWay
 from wam_control.force.motion_limits import AT_COMMANDED, MotionLimits, WholeForce
 from wam_control.force.stability_guard import GuardedContact, StabilityGuard
+from wam_control.force.thresholds import FORCE
 from wam_description.configuration import Configuration, packaged
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
@@ -747,7 +748,7 @@ def test_what_pushes_moves_the_arm_no_further_than_it_may_go_for_nothing() -> No
         for k in range(60):  # and the arm goes back
             given.step((np.array(POSE) + (q - POSE) * (1.0 - k / 59.0)).tolist(), DT)
             free.append(bool(limits.step([0.0] * 4, POSE, pushed(np.zeros(4)), DT).contact_force))
-        assert free == [k * DT < LASTING - 1.5 * DT for k in range(60)], "for a while after the last time"
+        assert free == [k * DT < FORCE.lasting - 1.5 * DT for k in range(60)], "for a while after the last time"
     assert away == pytest.approx([0.1] * 2, rel=0.1)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from arms import WAM
 
-from wam_control.force.given_way import LASTING, GivenWay
+from wam_control.force.given_way import GivenWay
+from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 
 BODY = RigidBody(WAM)
@@ -77,7 +78,7 @@ def test_a_pause_of_the_push_renews_nothing_and_another_command_does() -> None:
 def test_what_the_arm_moves_by_itself_is_taken_off_and_not_that_on_which_it_runs() -> None:
     given = GivenWay(BODY)
     q = move(given, POSE, POSE + PUSHED, True)
-    q = move(given, q, q + 0.2 * PUSHED, False, round(0.5 * LASTING / DT))
+    q = move(given, q, q + 0.2 * PUSHED, False, round(0.5 * FORCE.lasting / DT))
     assert given.way == pytest.approx(tool_way(POSE, q), rel=1e-3), "the arm runs on"
     rest(given, q)
     q = move(given, q, POSE + 0.6 * PUSHED, False)

@@ -7,15 +7,15 @@ import pytest
 
 from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.force_measurement import REST
 from wam_control.force.motion_watch import MotionWatch
+from wam_control.thresholds import MOTION
 from wam_description.configuration import Configuration, packaged
 
 OWN = Configuration.load(packaged("wam")).node("force_loop", ForceLoopParameters)
 NONE, NOT_REACHED, NOT_FOLLOWED = ForceReaction.NONE, ForceReaction.NOT_REACHED, ForceReaction.NOT_FOLLOWED
 LASTING, RATE, FASTEST = OWN.limits.settling_time, OWN.task.largest_rate, OWN.task.speed_limit
 LEVER, DT, LAG = 0.5, 0.005, 0.05  # m, s, s
-ALLOWED = REST * LEVER / RATE  # m
+ALLOWED = MOTION.at_rest * LEVER / RATE  # m
 
 
 def position(

@@ -6,11 +6,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from wam_control.force.posture_watch import CAUGHT_UP, PostureWatch
+from wam_control.force.posture_watch import PostureWatch
+from wam_control.force.thresholds import FORCE
 from wam_control.task.motion import GoalMotion, Moving
 
 LIMIT, DT, WAY = 1.5, 0.005, 1.2
-LEAST = 1.875 * WAY / (CAUGHT_UP * LIMIT)  # s, in which a minimum-jerk path is caught up with
+LEAST = 1.875 * WAY / (FORCE.caught_up * LIMIT)  # s, in which a minimum-jerk path is caught up with
 
 
 def posture_watch() -> PostureWatch:
@@ -64,7 +65,7 @@ def test_a_slow_stream_is_judged_by_its_own_interval(rate: float) -> None:
     """Below 10 Hz each posture was another goal, and nothing was late."""
     for jitter in (0.0, 0.2):
         assert not streamed(0.9 * LIMIT, 1.0 / rate, jitter=jitter)
-        assert streamed(1.1 * CAUGHT_UP * LIMIT, 1.0 / rate, jitter=jitter)
+        assert streamed(1.1 * FORCE.caught_up * LIMIT, 1.0 / rate, jitter=jitter)
 
 
 def test_a_command_that_lapses_before_the_next_one_is_followed_for_its_age() -> None:

@@ -13,7 +13,8 @@ from wam_control.force.contact_position import ForceCase, ForcePoint
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.sensing_advice import EACH, Advice, OtherForces, Turnable
+from wam_control.force.sensing_advice import Advice, OtherForces, Turnable
+from wam_control.force.thresholds import FORCE
 from wam_description.signals import BASE, NO_CONTACT, ForceCommand, State
 
 LONG = 60  # periods, in which all is tried
@@ -177,7 +178,7 @@ def test_few_ways_are_tried_in_a_period() -> None:
         before = tried
         advice.step(2.0, "", lambda: OtherForces(q, joints, "here", at), lambda _: False)
         counts.append(tried - before)
-    assert max(counts) == EACH
+    assert max(counts) == FORCE.each
     assert tried > 50
     assert max(angles) == 1.8, "not at the end of the joint: the arm moves on as it presses"
     assert advice.ways == []

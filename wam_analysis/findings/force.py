@@ -15,7 +15,7 @@ from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
-from wam_control.force.stability_guard import LARGEST
+from wam_control.force.thresholds import GUARD
 from wam_description.signals import BASE
 from wam_sim.reactions import FAULT, STEADY, TOO_MUCH, UNREACHED, RecordedReaction, too_short, unassessed, unmet, within
 from wam_sim.reactions import sentences as reaction_sentences
@@ -353,8 +353,8 @@ def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
         return []
     scale = found.assessment.scale
     note = f"domain {found.assessment.domain}; stability guard, contact of {shown(found.surface, 'N/m')}"
-    sentences = [Finding(f"{name}: gain margin, up to {LARGEST:g}", "", math.nan, scale, note)]
-    if scale < LARGEST:
+    sentences = [Finding(f"{name}: gain margin, up to {GUARD.largest_scale:g}", "", math.nan, scale, note)]
+    if scale < GUARD.largest_scale:
         label = f"{name}: largest stable gain, real velocity loops, sampled"
         sentences.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
     return sentences

@@ -13,14 +13,8 @@ from wam_analysis.recorded import PredictionParameters
 from wam_control.force.force_loop_parameters import force_law, task_of
 from wam_control.force.friction_verdict import Domain
 from wam_control.force.guard import Supervision
-from wam_control.force.stability_guard import (
-    LARGEST,
-    GuardAssessment,
-    GuardedContact,
-    StabilityGuard,
-    posture_of,
-    rounded_down,
-)
+from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of, rounded_down
+from wam_control.force.thresholds import GUARD
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
@@ -97,7 +91,11 @@ def sentence(found: Guarded) -> str:
     text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture})"
     over = f"{shown(1.0 / assessment.scale)} times the largest linearly stable ones" if assessment.scale else ""
     if assessment.domain is Domain.I:
-        more = f"even with {LARGEST:g}" if assessment.scale >= LARGEST else f"with up to {shown(assessment.scale)}"
+        more = (
+            f"even with {GUARD.largest_scale:g}"
+            if assessment.scale >= GUARD.largest_scale
+            else f"with up to {shown(assessment.scale)}"
+        )
         return f"{text}: domain I, linearly stable {more} times these gains. {_accepted(found)}"
     if assessment.scale >= 1.0:
         return (

@@ -27,7 +27,7 @@ from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State
+from wam_description.signals import ZERO, State
 from wam_description.small_matrices import inverse
 
 Array = NDArray[np.float64]
@@ -101,7 +101,6 @@ class ContactEstimate(NamedTuple):
     warning: str = ""
 
 
-NOTHING = (0.0, 0.0, 0.0)
 TOO_EARLY = "too few samples yet"
 
 
@@ -316,8 +315,8 @@ def _nothing(
         position_sd=math.nan,
         probability=math.nan,
         direction_sd=math.nan,
-        force=NOTHING,
-        moment=NOTHING,
+        force=ZERO,
+        moment=ZERO,
         hypotheses=(),
         reason=reason,
         warning=warning,

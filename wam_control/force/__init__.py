@@ -30,6 +30,7 @@
 ``task``                   a task as data: axes of force, velocity, position, impedance; its limits
 ``task_control``           one task after the other: refuses, holds, watches
 ``task_frame``             its law: strict priority, posture in what the axes leave; what 4 joints cannot do
+``thresholds``             what no parameter sets: when a force is reached, kept, lost; what the guard takes as stable
 ``torque_watch``           the commanded torque of a joint: reached, and known well enough
 =========================  ================================================================================
 """

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-CERTAIN = 3.0  # standard deviations of the torques that are no push
-SHORTEST = 1e-6  # m, lever of a point on the joints
 
 
 class ArmPush(NamedTuple):
@@ -75,8 +74,8 @@ class ArmPush(NamedTuple):
     def _size(self) -> float:
         """Size of the torques, N m, less what is uncertain of them."""
         size, sd = math.sqrt(self.torques.dot(self.torques)), math.sqrt(self.torque_sd.dot(self.torque_sd))
-        return max(size - CERTAIN * sd, 0.0)
+        return max(size - FORCE.certain * sd, 0.0)
 
     def _lever(self, jacobian: Array) -> float:
         """Largest torque per force, m."""
-        return max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), SHORTEST)
+        return max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), FORCE.shortest_lever)

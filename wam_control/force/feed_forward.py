@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import LowPass
+from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
-COUNTERED = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
-SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 
 
 class FeedForward:
@@ -47,7 +46,7 @@ class FeedForward:
         dt : outer period, s.
         """
         if parameters.friction_feedforward and not parameters.is_estimated:
-            friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
+            friction, _ = self._countered.step(self._friction(velocity), FORCE.friction_time, dt)
             force = force + parameters.friction_feedforward * np.array(friction)
         result: list[float] = force.tolist()
         return result
@@ -60,6 +59,8 @@ class FeedForward:
         """
         motors, joints = self._arm.motors.dynamic_friction, self._arm.joints.dynamic_friction
         turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
-        turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
+        turned = self._map.joint_torques(
+            [friction * math.tanh(speed / FORCE.slow_motor) for friction, speed in turning]
+        )
         moved = zip(joints, velocity, turned, strict=True)
-        return [torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved]
+        return [torque + friction * math.tanh(speed / FORCE.slow_joint) for friction, speed, torque in moved]

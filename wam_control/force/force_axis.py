@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
@@ -21,11 +22,7 @@ from wam_description.small_matrices import inverse, solution
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
-REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
-STEEPEST = 0.5  # cosine of the lean of a force from the normal of the side of a link
-CERTAIN = 2.0  # standard deviations
-SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 
 
 @dataclass(frozen=True)
@@ -216,7 +213,7 @@ class ForceAxes:
         Arguments as those of `axis`.
         """
         cover, position, position_sd, direction, force = pressed
-        size = max(force, SMALLEST_FORCE)
+        size = max(force, FORCE.sized_force)
         jacobian, point = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         friction = max(self._parameters.friction, turned) * size * _across(direction, direction)
@@ -239,11 +236,11 @@ class ForceAxes:
         shift = position_sd * force * direction @ slide
         spread = np.diag(own.torque_sd**2 + (own.torque_fraction * torques) ** 2) + np.outer(shift, shift)
         weighted = np.linalg.solve(spread, jacobian.T)
-        precision = jacobian @ weighted + np.eye(3) / max(force, SMALLEST_FORCE) ** 2
+        precision = jacobian @ weighted + np.eye(3) / max(force, FORCE.sized_force) ** 2
         found = solution(precision, torques @ weighted)
         size = float(np.linalg.norm(found))
-        sd = math.sqrt(float(found @ solution(precision, found))) / max(size, SMALLEST_FORCE)
-        return size - CERTAIN * sd
+        sd = math.sqrt(float(found @ solution(precision, found))) / max(size, FORCE.sized_force)
+        return size - FORCE.axis_certain * sd
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
@@ -256,15 +253,15 @@ class ForceAxes:
         """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
 
         Friction up to `friction` holds the link, and the force is along the direction.  Where this is inclined further
-        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only
+        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `least_normal` only
         what holds the link gives such a force.
         """
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         aside = along * float(along @ direction)
         across: Array = direction - aside
         size, most = float(np.linalg.norm(across)), self._parameters.friction
-        slope = math.sqrt(max(1.0 - size * size, 0.0)) / max(size, STEEPEST)
-        if slope <= most or size < STEEPEST:
+        slope = math.sqrt(max(1.0 - size * size, 0.0)) / max(size, FORCE.least_normal)
+        if slope <= most or size < FORCE.least_normal:
             return direction
         force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
         return force / float(force @ direction)
@@ -286,13 +283,13 @@ class ForceAxes:
         jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction @ jacobian
         square = float(lever @ lever)
-        if square <= REACH * REACH:
+        if square <= FORCE.least_lever * FORCE.least_lever:
             zero = np.zeros(n)
             none = np.zeros((n, n))
             return ForceAxis(
                 lever, zero, zero, zero, math.inf, math.inf, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
-        size = max(force, SMALLEST_FORCE)
+        size = max(force, FORCE.sized_force)
         length = self._covers.length_of(cover)
         aside = self._push(q, cover, direction)
         # the end of a link is round, and other forces at the same position press the surface as well

@@ -7,13 +7,12 @@ from typing import NamedTuple
 from wam_control.force.contact_position import pinned_position, torque_of_position
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskCommand
+from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.arm import Covers
 from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
 
-ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a position on the cover
-NOTHING = 1e-6  # N; a smaller force is none: its direction is a rounding, and nothing can be divided by it
-ELSEWHERE = 0.02  # rad, of a posture from where the arm is, beyond which the arm would have to move
 NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
 
@@ -88,7 +87,7 @@ class CommandAdmission:
         refusals = {}
         pressed = self._force is not None and any(self._force.force)
         commanded = _size(force)
-        if force is not None and commanded < NOTHING and force.force != ZERO:
+        if force is not None and commanded < FORCE.smallest_force and force.force != ZERO:
             force = force._replace(force=ZERO)
         if commanded > parameters.force_limit:
             refusals["force_command"] = self._refusal(commanded, "force_limit", parameters.force_limit, "N")
@@ -174,7 +173,9 @@ class CommandAdmission:
 
     def _moves(self, posture: Sequence[float], q: Sequence[float]) -> bool:
         """Whether a posture is another one than before, and not where the arm is."""
-        return list(posture) != self.posture and any(abs(a - b) > ELSEWHERE for a, b in zip(posture, q, strict=True))
+        return list(posture) != self.posture and any(
+            abs(a - b) > MOTION.arrived for a, b in zip(posture, q, strict=True)
+        )
 
     def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
         return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"
@@ -194,7 +195,7 @@ class CommandAdmission:
         cover, place = pinned
         length = covers.length_of(cover)
         own = torque_of_position(command.force, place)
-        if math.dist(own, command.torque) > ASIDE * _size(command):
+        if math.dist(own, command.torque) > FORCE.cross_lever * _size(command):
             return (
                 f"torque {command.torque} N m is commanded; that of the force {command.force} N about the origin of "
                 f"{cover} is (0, -x fz, x fy), at the position x: send zero torque, or such a one; joint torques are "

@@ -11,47 +11,17 @@ from numpy.typing import NDArray
 from wam_control.force.contact_position import ForceCase, ForcePoint
 from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.force_measurement import STEADY, LowPass
+from wam_control.force.force_measurement import LowPass
 from wam_control.force.force_swing import Reversals, Shake
-from wam_control.force.sensing_advice import TURNS, Advice, OtherForces
+from wam_control.force.sensing_advice import Advice, OtherForces
+from wam_control.force.thresholds import FORCE
 from wam_description.number_text import brief
 
 Array = NDArray[np.float64]
-TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
-TOUCH = 0.2  # of the commanded force, from which something is touched
-UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
-TURNED, BACK_AGAIN = 3.0, 1.0  # chi^2 of a change of the torques at a settled force: something else acts, or no more
-CONFLICT = 0.1  # s, after which another contact counts
-DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
-IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
-DETECTED = 0.04  # s, until a touch is detected there
-LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
-BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
-FED = 0.3  # s, in which the torque of the force is fed forward after the touch
-CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
-SLOPE = 0.01  # of a surface that moves across the force, or of the link on it, against the direction of its motion
-TURNING = 0.3  # s, in which the friction of the arm turns round on a surface that moves
-SETTLED = 3.0  # time constants within the settling time
-LIKELY = 0.6  # of the errors that are stated of torques; those of friction on a surface are as large as stated
-CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
-FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
-FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
-SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
-LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
-BOUNCING = 0.1  # s after the first touch, in which an impact turns the force as often as a limit cycle
-FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
-FAINT = 0.5  # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
-SLOWED = 0.5  # of the speed along the force, from then on
-SHAKE_SAMPLES = 8  # outer periods, at least: a dither of 25 Hz
-RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
-WATCHED = 0.2  # s, for which the shaking is watched before the arm moves, or for a whole cycle of a slower dither
 SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
 SENSORS = "use joint sensors"
-RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
 UNLOAD = "the arm holds its position: declare what it carries (arm.payload), or end the command and tare in free space"
 STILL = [0.0]  # m/s
-NOT_SLOWED = 0.95  # of the speed along the force
-RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
 class ForceReaction(IntEnum):
@@ -130,7 +100,7 @@ class ForceHold:
     """
 
     def __init__(self) -> None:
-        self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
+        self._turns, self._shake, self._pattern = Reversals(), Shake(FORCE.shake_samples), LowPass()
         self._pace = LowPass()
         self._advice = Advice()
         self.reset()
@@ -166,7 +136,7 @@ class ForceHold:
     def _forget_swings(self) -> None:
         """What the force was before something was touched shows nothing of how it is held."""
         self._strayed = self._within = 0.0
-        self._report, self._returns = "", LEFT
+        self._report, self._returns = "", FORCE.left_after
         self._turns.reset()
 
     def approach_speed(
@@ -174,7 +144,7 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `BY_MOTORS`
+        Then the force rises to the commanded one in no less than `known_rise` on the stiffest surface, `motors_rise`
         from these, unless friction would move the arm in jerks.  At a position that is not known, slower: what is
         touched has to be identified before the force is too large.
         """
@@ -183,15 +153,17 @@ class ForceHold:
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
         is_known = point.is_pinned or point.is_certain
-        slowest = CREEP / parameters.limits.settling_time
+        slowest = FORCE.creep / parameters.limits.settling_time
         if self.is_touching:
-            is_stiff = desired * yielding < COARSE
-            is_slow = not is_known and not (is_stiff and self._identified >= DOUBTED)
-            rise = IDENTIFIED if is_slow else BY_MOTORS if parameters.is_estimated else LATE
+            is_stiff = desired * yielding < FORCE.coarse_way
+            is_slow = not is_known and not (is_stiff and self._identified >= FORCE.uncertain_time)
+            rise = (
+                FORCE.identified_rise if is_slow else FORCE.motors_rise if parameters.is_estimated else FORCE.known_rise
+            )
             return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
-            detected = BY_MOTORS if parameters.is_estimated else DETECTED
+            detected = FORCE.motors_rise if parameters.is_estimated else FORCE.detection_time
             fastest = min(fastest, max(desired * yielding / detected, slowest))
         return fastest / axis.speed_fraction
 
@@ -202,7 +174,7 @@ class ForceHold:
         surface.  Without dither it would only wind up the friction of the arm.
         """
         is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
-        self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
+        self.fed = min(self.fed + dt / FORCE.fed_time, 1.0) if is_fed else 0.0
         return max(parameters.force_feedforward, self.fed)
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
@@ -212,8 +184,8 @@ class ForceHold:
         changes the force by more than that error.
         """
         whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
-        band = (LEAVE if self._is_kept else SETTLE) * desired * min(FINE / whole, 1.0)
-        self._is_kept = self.is_touching and whole < COARSE and abs(desired - measured) < band
+        band = (FORCE.leave if self._is_kept else FORCE.settle) * desired * min(FORCE.fine_way / whole, 1.0)
+        self._is_kept = self.is_touching and whole < FORCE.coarse_way and abs(desired - measured) < band
         return self._is_kept
 
     def travel(self, distance: float, dt: float, is_led: bool) -> None:
@@ -222,7 +194,7 @@ class ForceHold:
         `is_led`: another motion is commanded besides, which may lead the arm along a slope of what it presses.
         """
         self._travel += distance
-        self._pace.step([distance / dt], STEADY, dt)
+        self._pace.step([distance / dt], FORCE.steady_time, dt)
         self._is_led = is_led
 
     def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
@@ -237,10 +209,10 @@ class ForceHold:
 
         It is watched before the arm moves: what is touched would add its own motion.
         """
-        samples = max(SHAKE_SAMPLES, round(2.0 * math.pi / (frequency * dt)))
+        samples = max(FORCE.shake_samples, round(2.0 * math.pi / (frequency * dt)))
         if samples != self._shake.samples:
             self._shake = Shake(samples)
-        self._is_watching = self._watched < max(WATCHED, (samples + 1) * dt)
+        self._is_watching = self._watched < max(FORCE.watched_time, (samples + 1) * dt)
         if not self._is_watching:
             return False
         self._shake.step(moved)
@@ -267,7 +239,7 @@ class ForceHold:
         if self.is_touching or least <= 0.0:
             return None
         apart = 1.0 / self._blocked - yielding / self._shaking
-        force = 1.0 / math.hypot(apart, 1.0 / (RESONANCE * least))
+        force = 1.0 / math.hypot(apart, 1.0 / (FORCE.resonance * least))
         if force <= parameters.limits.shake_force * desired:
             return None
         return Refusal(
@@ -305,19 +277,19 @@ class ForceHold:
         axis, point, desired = case.axis, case.point, case.desired
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         blind = self._not_sensed(case, parameters)
-        is_loaded = not self._has_begun and abs(case.unknown) > TOLERANCE * desired
+        is_loaded = not self._has_begun and abs(case.unknown) > FORCE.tolerance * desired
         pushed = measured if pushed is None else pushed
-        self.is_touching = pushed >= TOUCH * desired and not is_loaded
+        self.is_touching = pushed >= FORCE.touch * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
         if self.is_touching and not self.has_touched:
-            self.has_touched, self._bouncing = True, BOUNCING
+            self.has_touched, self._bouncing = True, FORCE.bouncing_time
             self._forget_swings()
         self._count(measured, desired, given_way, parameters, dt)
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
-        is_strange = self._is_sensed and unexplained > UNEXPLAINED
+        is_strange = self._is_sensed and unexplained > FORCE.unexplained
         self._conflict = max(self._conflict + dt * self._against(point, is_strange), 0.0)
-        if self._conflict > CONFLICT and not self._other:
+        if self._conflict > FORCE.conflict_time and not self._other:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
         weak = self._too_weak(case, parameters)
@@ -331,14 +303,14 @@ class ForceHold:
         self._advice.reset()
         is_double = not point.is_single and (is_strange or not point.is_pinned)
         self._double = self._double + dt if is_double else 0.0
-        if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
+        if self._double > FORCE.conflict_time:  # an impact looks like one for a moment, and a sudden hold is a jerk
             why = (
                 f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
             )
             return [(ForceReaction.SECOND_CONTACT, why)]
         # what is off already leaves less of the tolerance to what is not known
-        left = max(1.0 - abs(desired - measured) / (TOLERANCE * desired), 0.0)
+        left = max(1.0 - abs(desired - measured) / (FORCE.tolerance * desired), 0.0)
         is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
@@ -346,14 +318,14 @@ class ForceHold:
         force_sd = math.hypot(_likely_sd(axis, case.torque_error, parameters), case.unknown)
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
-        is_late, limits = parameters.is_estimated and self.share > SLOWED, parameters.limits
+        is_late, limits = parameters.is_estimated and self.share > FORCE.slowed, parameters.limits
         is_faint = is_late and not (limits.surface_speed or limits.slide_speed)  # such a surface swings the force, too
-        swing = limits.cycle_force * desired * (FAINT if is_faint else 1.0)
+        swing = limits.cycle_force * desired * (FORCE.faint_swing if is_faint else 1.0)
         is_cycling = self._turns_again(measured, swing, limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         turned = self._has_turned(axis, external, measured, desired, parameters, dt)
-        if is_late and is_touching and self._turns.count > FEW:
-            self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
+        if is_late and is_touching and self._turns.count > FORCE.few_turns:
+            self.share = FORCE.slowed  # less would let the force creep away: motors at rest do not show it
             self._turns.reset()
             is_cycling = False
         found = [(ForceReaction.CYCLE, _cycle(self._turns, desired, parameters))] if is_cycling else []
@@ -377,7 +349,7 @@ class ForceHold:
         axis, point, desired, sensing = case.axis, case.point, case.desired, parameters.sensing
         limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, case.torque_error)
         is_known = self._is_sensed or not case.torque_error or stated <= sensing.stated_fraction * desired
-        self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else FORCE.resume * limit)
         if self._is_sensed:
             return None
         if not is_known:
@@ -391,7 +363,8 @@ class ForceHold:
         return Refusal(
             ForceReaction.NOT_SENSED,
             f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-            f"of {point.cover}; to start, it must be below {RESUME * limit:.3g} N, {RESUME:.0%} of the limit "
+            f"of {point.cover}; to start, it must be below {FORCE.resume * limit:.3g} N, {FORCE.resume:.0%} of the "
+            "limit "
             "(sensing.force_sd_limit, force_sd_fraction)",
         )
 
@@ -417,7 +390,8 @@ class ForceHold:
             return f": {', or '.join(self._advice.ways)}{besides}"
         pinned = "" if case.point.is_pinned else ", with a pinned position or without"
         return (
-            f"; no force up to 5 times and no angle of one joint up to {TURNS[-1]:g} rad away was found that would be "
+            f"; no force up to 5 times and no angle of one joint up to {FORCE.turns[-1]:g} rad away was found that "
+            "would be "
             f"accepted with a margin{pinned}: command another direction or position{besides}"
         )
 
@@ -426,7 +400,7 @@ class ForceHold:
         hold, still = ForceHold(), np.zeros(len(case.axis.lever))
         hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
         largest = min(parameters.force_limit, parameters.limits.contact_force)
-        found = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
+        found = hold.step(case.worse(FORCE.reserve), still, 0.0, parameters, 0.0)
         return case.desired <= largest and not any(reaction.holds for reaction, _ in found)
 
     def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
@@ -435,7 +409,7 @@ class ForceHold:
         name, least = ("least_signal", sensing.least_signal)
         if not point.is_pinned:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
-        begins = RESUME if self._is_detectable else 1.0
+        begins = FORCE.resume if self._is_detectable else 1.0
         is_weak, is_unseen = case.signal < begins * least, case.elsewhere < begins * sensing.least_signal
         self._is_detectable = self.has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
@@ -457,11 +431,11 @@ class ForceHold:
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
-        """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
+        """How fast it counts that another link is touched: `conflict_time` is full after so many s at 1."""
         # at a pinned position the estimated link counts only where the torques are not those of the force
         if point.conflict and (is_strange or not point.is_pinned):
             return 1.0
-        return CONFLICT / DOUBTED if point.is_doubtful else -FADING
+        return FORCE.conflict_time / FORCE.uncertain_time if point.is_doubtful else -FORCE.free_rate
 
     def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> Found | None:
         """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
@@ -478,7 +452,11 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        if not self.has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+        if (
+            not self.has_touched
+            and self._missed > FORCE.crept * parameters.limits.settling_time
+            and self._travel < FORCE.little_way
+        ):
             return ForceReaction.NOTHING_TOUCHED, (
                 f"nothing was touched {brief(self._missed)} s after the command: the arm creeps, and has moved "
                 f"{brief(1e3 * self._travel)} mm; it holds its position: go nearer, or pin the "
@@ -497,11 +475,13 @@ class ForceHold:
         limits, tolerated = parameters.limits, tolerance(desired, parameters)
         is_unloading = self._unloads(measured, desired, limits.settling_time, dt)
         # where it neither has the force nor takes more of it, it may be gone, or go away
-        if self.is_touching and (self._is_led or measured >= min(desired - tolerated, self._most + SETTLE * desired)):
+        if self.is_touching and (
+            self._is_led or measured >= min(desired - tolerated, self._most + FORCE.settle * desired)
+        ):
             self._most = max(self._most, measured)
             if self._travel <= limits.free_travel:
                 self._travel = 0.0
-        slowest = limits.surface_speed + CREEP / limits.settling_time
+        slowest = limits.surface_speed + FORCE.creep / limits.settling_time
         is_pushed = measured > desired + tolerated or (self._pace.value or STILL)[0] < -slowest
         self.goes_back = self.is_touching and is_pushed and not (self._is_led or is_unloading)
         if self.goes_back and given_way > limits.free_travel and not self._gone:
@@ -512,7 +492,7 @@ class ForceHold:
         self._unloading = max(self._unloading - dt, 0.0)
         if desired < self._wanted:
             self._unloading, self._least = lasting, math.inf
-        if self._unloading and measured < self._least - SETTLE * desired:
+        if self._unloading and measured < self._least - FORCE.settle * desired:
             self._unloading, self._least = lasting, measured
         self._wanted = desired
         if self._unloading:
@@ -526,30 +506,34 @@ class ForceHold:
             return None
         stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
-        self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
+        self._is_slow = pace * parameters.limits.settling_time < FORCE.settled / (
+            FORCE.resume if self._is_slow else 1.0
+        )
         if self._is_slow:
             return Refusal(
                 ForceReaction.TOO_SLOW,
                 f"the force would settle with a time constant of {brief(1.0 / pace)} s{_slowed(axis)}; allowed: "
-                f"1/{SETTLED:g} of limits.settling_time",
+                f"1/{FORCE.settled:g} of limits.settling_time",
             )
         way = desired / parameters.guard.contact_stiffness
-        if parameters.is_estimated and not point.is_pinned and way < COARSE:
+        if parameters.is_estimated and not point.is_pinned and way < FORCE.coarse_way:
             return Refusal(
                 ForceReaction.TOO_SLOW,
                 f"the whole force is {brief(1e3 * way)} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
-                f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
+                f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * FORCE.coarse_way:g} mm "
+                "is the "
                 "least, as the velocity loops wind up through friction for longer than limits.settling_time",
                 SENSORS,
             )
         if moves := _left_behind(axis, desired, parameters):
             return moves
         speed = self.approach_speed(axis, point, desired, parameters)
-        if speed * parameters.limits.settling_time < CREEP:
+        if speed * parameters.limits.settling_time < FORCE.creep:
             return Refusal(
                 ForceReaction.TOO_SLOW,
                 f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
-                f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm "
+                f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * FORCE.creep:g} "
+                "mm "
                 "within limits.settling_time, in which friction moves the arm in jerks",
                 SOFTER,
             )
@@ -561,7 +545,7 @@ class ForceHold:
         if self._strange > lasting:
             return ForceReaction.NOT_EXPLAINED, (
                 f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
-                f"{point.cover} ({_deviation(unexplained, UNEXPLAINED)}): it acts elsewhere or on another "
+                f"{point.cover} ({_deviation(unexplained, FORCE.unexplained)}): it acts elsewhere or on another "
                 "link, or is not the only one; pin it where it acts, or free the arm"
             )
         if self._assumed > lasting:
@@ -590,24 +574,27 @@ class ForceHold:
 
         The torques of one contact keep their proportions while the arm rests, unless its friction turns.
         """
-        if not self.is_touching or (desired != self._desired and self._turned <= CONFLICT):
+        if not self.is_touching or (desired != self._desired and self._turned <= FORCE.conflict_time):
             self._settled, self._turned = None, 0.0
             self._pattern.reset()
         self._desired = desired
         if not self.is_touching:
             return ""
         if self._settled is None:
-            pattern, _ = self._pattern.step((external / measured).tolist(), STEADY, dt)
-            self._settled = np.array(pattern) if self._within >= LEFT * parameters.limits.settling_time else None
+            pattern, _ = self._pattern.step((external / measured).tolist(), FORCE.steady_time, dt)
+            self._settled = (
+                np.array(pattern) if self._within >= FORCE.left_after * parameters.limits.settling_time else None
+            )
             return ""
         change = axis.turned(external - measured * self._settled)
-        lasts = change > (BACK_AGAIN if self._turned > CONFLICT else TURNED)
+        lasts = change > (FORCE.turned_back if self._turned > FORCE.conflict_time else FORCE.turned)
         self._turned = self._turned + dt if lasts else 0.0
-        if self._turned <= CONFLICT:
+        if self._turned <= FORCE.conflict_time:
             return ""
         return (
             f"the torques are no longer those with which the force of {desired:.3g} N has settled "
-            f"({_deviation(change, TURNED)}): something else acts on the arm, and the measured force is that of both "
+            f"({_deviation(change, FORCE.turned)}): something else acts on the arm, and the measured force is that of "
+            "both "
             "together, or the friction of the surface has turned; free the arm, or command the force again"
         )
 
@@ -617,7 +604,7 @@ class ForceHold:
         A force that had been right before has to be right for the whole settling time: what takes it away comes again.
         """
         if missed:
-            self._returns = 1.0 if self._has_settled else LEFT
+            self._returns = 1.0 if self._has_settled else FORCE.left_after
         if missed or self._within >= self._returns * parameters.limits.settling_time:
             self._report = missed
         return self._report
@@ -636,7 +623,7 @@ class ForceHold:
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
-        has_rested = not self._has_settled or self._within >= LEFT * lasting
+        has_rested = not self._has_settled or self._within >= FORCE.left_after * lasting
         self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
         if not self.has_touched and abs(self._missed) > lasting:
             return (
@@ -644,13 +631,13 @@ class ForceHold:
                 f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position, or, {SOFTER}"
             )
         is_late = self._missed > 0.0 and not self._has_settled
-        if abs(self._missed) > (lasting if is_late else LEFT * lasting):
+        if abs(self._missed) > (lasting if is_late else FORCE.left_after * lasting):
             return (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded; the force has been too "
                 f"{'small' if error > 0.0 else 'large'} for {brief(abs(self._missed))} s{_slowed(axis)}: command what "
                 "can be reached, another direction, or bend the arm"
             )
-        if self._strayed > LEFT * lasting:
+        if self._strayed > FORCE.left_after * lasting:
             return (
                 f"the force was reached, and leaves {desired:.3g} N again and again by more than "
                 f"{brief(tolerance(desired, parameters))} N: the surface moves, something else pushes, friction turns, "
@@ -662,7 +649,7 @@ class ForceHold:
 
 def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
     """Error, N, up to which a force counts as reached."""
-    return max(TOLERANCE * desired, parameters.limits.least_tolerance)
+    return max(FORCE.tolerance * desired, parameters.limits.least_tolerance)
 
 
 def _deviation(unexplained: float, most: float) -> str:
@@ -672,7 +659,7 @@ def _deviation(unexplained: float, most: float) -> str:
 
 def _slowed(axis: ForceAxis) -> str:
     """Why the arm is slow along the force, '' where it is not."""
-    if axis.speed_fraction > NOT_SLOWED:
+    if axis.speed_fraction > FORCE.not_slowed:
         return ""
     return (
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
@@ -681,20 +668,20 @@ def _slowed(axis: ForceAxis) -> str:
 
 
 def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParameters) -> float:
-    """Standard deviation of the measured force, N, with `LIKELY` of what is stated of the torques themselves."""
+    """Standard deviation of the measured force, N, with `likely` of what is stated of the torques themselves."""
     sensing = parameters.sensing
     each = sensing.estimated_torque_sd if parameters.is_estimated else sensing.torque_sd
     stated = math.hypot(each * float(np.linalg.norm(axis.sense)), torque_error)
     whole = math.hypot(axis.force_sd, torque_error)
-    return math.sqrt(max(whole * whole - (1.0 - LIKELY * LIKELY) * stated * stated, 0.0))
+    return math.sqrt(max(whole * whole - (1.0 - FORCE.likely * FORCE.likely) * stated * stated, 0.0))
 
 
 def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
     """Why a surface that moves would keep the force off, None where it would not.
 
-    Along the force the integral law is v/G_I behind, and the force rises in no less than `LATE`.  A surface that moves
-    across it comes nearer by a slope that nobody knows, if it is stiff by more than the force allows before the
-    friction of the arm has turned round.
+    Along the force the integral law is v/G_I behind, and the force rises in no less than `known_rise`.
+    A surface that moves across it comes nearer by a slope that nobody knows, if it is stiff by more than the force
+    allows before the friction of the arm has turned round.
     """
     limits, yielding = parameters.limits, 1.0 / parameters.guard.contact_stiffness + axis.compliance
     lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
@@ -706,7 +693,7 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
             f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction)",
             "set a larger force_gain, or let the surface move more slowly",
         )
-    fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
+    fastest = desired * yielding / (FORCE.motors_rise if parameters.is_estimated else FORCE.known_rise)
     if limits.impact and limits.surface_speed > fastest:
         return Refusal(
             ForceReaction.TOO_SLOW,
@@ -715,7 +702,7 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
             f"{brief(fastest)} m/s",
             "let the surface move more slowly",
         )
-    nearer = TURNING * SLOPE * limits.slide_speed
+    nearer = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed
     off = nearer / yielding
     if off > tolerance(desired, parameters):
         return Refusal(
@@ -741,7 +728,7 @@ def _gone(way: float, measured: float, desired: float, parameters: ForceLoopPara
 def _loaded(force: float, meaning: str, desired: float) -> str:
     return (
         f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
-        f"{TOLERANCE:g} of the commanded; {UNLOAD}"
+        f"{FORCE.tolerance:g} of the commanded; {UNLOAD}"
     )
 
 

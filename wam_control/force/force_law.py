@@ -11,9 +11,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from wam_control.force.thresholds import FORCE
 from wam_description.parameters import require
-
-NEGLIGIBLE = 1e-12  # square of a component of a direction that counts as zero
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ class ForceLaw:
             return sum(a * b for a, b in zip(squares, values, strict=True))
 
         def radius(values: Sequence[float]) -> float:
-            used = [(square, value) for square, value in zip(squares, values, strict=True) if square > NEGLIGIBLE]
+            used = [(square, value) for square, value in zip(squares, values, strict=True) if square > FORCE.negligible]
             if not all(value for _, value in used):
                 return 0.0
             first = used[0][1]

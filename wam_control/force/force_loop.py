@@ -14,27 +14,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.arm_push import CERTAIN, ArmPush
+from wam_control.force.arm_push import ArmPush
 from wam_control.force.contact_position import ContactPosition, ForceCase, ForcePoint
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force.force_command import CommandAdmission, Commands
-from wam_control.force.force_hold import UNEXPLAINED, ForceHold, ForceReaction, Found, by_seriousness
+from wam_control.force.force_hold import ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force.force_law import BumplessTransfer, DelayLine
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
-from wam_control.force.force_measurement import REST, STEADY, ForceMeasurement, LowPass
+from wam_control.force.force_measurement import ForceMeasurement, LowPass
 from wam_control.force.given_way import GivenWay, has_left
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.held_arm import HeldArm, RetreatForce
 from wam_control.force.hybrid_velocity import followed, hybrid_velocity, posture_velocity
-from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, BEGIN, MotionLimits, WholeForce
+from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, MotionLimits, WholeForce
 from wam_control.force.motion_watch import MotionWatch
-from wam_control.force.posture_watch import BEHIND, PostureWatch, ShortfallWatch
+from wam_control.force.posture_watch import PostureWatch, ShortfallWatch
 from wam_control.force.sensing_advice import OtherForces, Turnable
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.force.task_control import AxisRow, TaskControl
+from wam_control.force.thresholds import FORCE
 from wam_control.force.torque_watch import TorqueWatch
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
@@ -44,16 +46,9 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
-FAST = 0.3  # rad/s, above which a payload is not known from the torques of the motion
-RESTED = 3.0 * STEADY  # s at rest, after which it is
-SHORTEST = 1e-12  # m^2, square of a lever
-SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
-BACK = 3e-3  # m, way back from another link than commanded
-NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
-FAINT = 0.25  # of a link that may be touched, where its force has to be detected
-VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+RESTED = 3.0 * FORCE.steady_time  # s at rest, after which it is
+SHORTEST = FORCE.shortest_lever**2  # m^2, square of a lever
 TAKEN = "the task leaves the posture too little: command a posture that its axes leave, or end one of them"
-ALIKE = 0.05  # of the torques at rest: what a payload may leave of them, as the masses are not known better
 
 
 class ForceOutput(NamedTuple):
@@ -233,7 +228,7 @@ class ForceLoop:
 
     @property
     def _is_at_rest(self) -> bool:
-        return self._speed < REST
+        return self._speed < MOTION.at_rest
 
     @property
     def _speed(self) -> float:
@@ -292,7 +287,7 @@ class ForceLoop:
                 command = torque = None  # a force that is not measured would grow without bounds
         self._is_free = contact is not None and not contact.cover
         self._given.step(joints.position, dt)
-        self._motion.step(joints.velocity, STEADY, dt)
+        self._motion.step(joints.velocity, FORCE.steady_time, dt)
         self._rested = self._rested + dt if self._is_at_rest else 0.0
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
@@ -363,7 +358,7 @@ class ForceLoop:
         """React to a posture that has moved next to a task, and that the task does not leave to the arm."""
         before = self._posture_before
         if not self._has_posture:
-            if posture == before or not any(abs(a - b) > BEHIND for a, b in zip(posture, before, strict=True)):
+            if posture == before or not any(abs(a - b) > MOTION.arrived for a, b in zip(posture, before, strict=True)):
                 return
             self._has_posture = True
             for watch in self._posture_motions:
@@ -388,14 +383,14 @@ class ForceLoop:
         """
         q, torques, axes = self._joints, self._external[0], self._force_axes
         size = axes.whole(q, pressed, torques)
-        if size <= BEGIN * self.parameters.limits.whole_force * pressed.force:
+        if size <= FORCE.slow_from * self.parameters.limits.whole_force * pressed.force:
             return size, AT_COMMANDED
         axis = axes.axis(q, pressed)
-        if axis.unexplained(torques) <= UNEXPLAINED * max(-float(axis.sense @ torques) / pressed.force, 1.0) ** 2:
+        if axis.unexplained(torques) <= FORCE.unexplained * max(-float(axis.sense @ torques) / pressed.force, 1.0) ** 2:
             return size, AT_COMMANDED
         here = self._push(q, pressed[:2]).least(self._body, q), AT_LEAST
         others = [
-            (self._push(q, (cover, MIDDLE * length)).least(self._body, q), AT_OTHER.format(cover))
+            (self._push(q, (cover, FORCE.middle * length)).least(self._body, q), AT_OTHER.format(cover))
             for cover, length in self._other_covers(pressed)
         ]
         return min((size, AT_COMMANDED), max([here, *others]))
@@ -441,7 +436,7 @@ class ForceLoop:
         self._is_moving, self._is_fast = not self._is_at_rest, False
         if not (axes and limit and self._has_left):
             return
-        self._is_fast = self._speed > FAST and axes != TASK
+        self._is_fast = self._speed > FORCE.fast and axes != TASK
         if self._is_moving:
             self._resting = self._external[0]
             if self.parameters.feedback == "joint_sensors":
@@ -556,7 +551,8 @@ class ForceLoop:
         """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
         if self._is_fast:
             why = (
-                f"the arm moved faster than {FAST:g} rad/s as the force began, and it is not known what it carries: it "
+                f"the arm moved faster than {FORCE.fast:g} rad/s as the force began, and it is not known what it "
+                "carries: it "
                 "comes to rest first"
             )
             return [(ForceReaction.NOT_SENSED, why)]
@@ -623,7 +619,7 @@ class ForceLoop:
         force = -float(self._force_axes.axis(q, pressed).sense @ resting)
         axis = self._force_axes.axis(q, pressed._replace(force=abs(force)))
         carried = self._carried(q, resting)
-        is_pressed = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED
+        is_pressed = force > 0.0 and axis.unexplained(resting) <= FORCE.unexplained
         is_contact = (is_pressed or self._is_moving) and not carried
         meaning = carried or "not the force of a surface that is touched there"
         self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
@@ -636,9 +632,9 @@ class ForceLoop:
 
     def _carried(self, q: Sequence[float], resting: Array) -> str:
         """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
-        sd = math.hypot(sensing_of(self.parameters).torque_sd, ALIKE * float(np.abs(resting).max()))
+        sd = math.hypot(sensing_of(self.parameters).torque_sd, FORCE.payload_rest * float(np.abs(resting).max()))
         mass, left = self._measurement.payload(q, resting, sd)
-        return f"as with {brief(mass)} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
+        return f"as with {brief(mass)} kg at the tool" if mass > 0.0 and left <= FORCE.unexplained else ""
 
     def _hold_still(
         self,
@@ -679,7 +675,7 @@ class ForceLoop:
         if where is not None or not contact.cover or not contact.probability >= probable:
             return self._push(q, where)
         length = self._arm.covers.length_of(contact.cover)
-        farthest = contact.position + CERTAIN * contact.position_sd
+        farthest = contact.position + FORCE.certain * contact.position_sd
         where = contact.cover, min(length if math.isnan(farthest) else farthest, length)
         return self._push(q, where)._replace(is_estimated=True)
 
@@ -691,7 +687,7 @@ class ForceLoop:
     def _pushed_position(self, contact: Contact, where: tuple[str, float] | None) -> tuple[str, float] | None:
         """Where an arm that holds is pushed: estimated, if on another cover than that of the known position."""
         if contact.cover and (where is None or where[0] != contact.cover):
-            middle = MIDDLE * self._arm.covers.length_of(contact.cover)
+            middle = FORCE.middle * self._arm.covers.length_of(contact.cover)
             where = contact.cover, middle if math.isnan(contact.position) else contact.position
         return where
 
@@ -729,31 +725,34 @@ class ForceLoop:
 
     def _at_rest(self, held: list[float]) -> list[float]:
         """Velocities of the posture, without those of a small error: they would wind up friction across the force."""
-        is_small = self._rate is None and max(map(abs, held)) < SMALL
+        is_small = self._rate is None and max(map(abs, held)) < FORCE.slow_posture
         return [0.0] * self._n if is_small else held
 
     def _free_of(self, axis: ForceAxis) -> list[float]:
-        """Where the arm was free, and `BACK` further against the force: friction would hold it in less."""
-        away = axis.lever * (BACK / float(axis.lever @ axis.lever))
+        """Where the arm was free, and `way_back` further against the force: friction would hold it in less."""
+        away = axis.lever * (FORCE.way_back / float(axis.lever @ axis.lever))
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
 
     def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Torques of the commanded force, N, on another cover, `FAINT` its base, in sd of the estimated torques."""
+        """Torques of the commanded force on another cover, near its base, in sd of the estimated torques."""
         if not self._external_sd:
             return math.inf
         sd = np.array(self._external_sd)
         found = [
-            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, FAINT * length, direction) / sd))
+            desired
+            * float(np.linalg.norm(self._force_axes.lever(q, cover, FORCE.faint_position * length, direction) / sd))
             for cover, length in self._other_covers(point)
         ]
         return min(found, default=math.inf)
 
     def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
         """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""
-        middle = self._largest_force(q, point, direction, desired, MIDDLE)
+        middle = self._largest_force(q, point, direction, desired, FORCE.middle)
         if self.parameters.is_estimated:
             return desired - middle  # the motors identify a link only by a large force
-        return max(desired - self._largest_force(q, point, direction, desired, NEAR), min(desired - middle, 0.0))
+        return max(
+            desired - self._largest_force(q, point, direction, desired, FORCE.near_end), min(desired - middle, 0.0)
+        )
 
     def _largest_force(
         self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float, part: float
@@ -762,7 +761,7 @@ class ForceLoop:
         found = -math.inf
         for cover, length in self._other_covers(point):
             axis = self._force_axes.axis(q, PressedForce(cover, part * length, 0.0, direction, desired))
-            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired, is_pinned=False):
+            if axis.force_sd <= FORCE.vague * self.parameters.sensing.sd_limit(desired, is_pinned=False):
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found
 

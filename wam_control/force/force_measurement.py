@@ -7,14 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
 Array = NDArray[np.float64]
-STEADY = 0.1  # s, time constant of the torques that are taken as zero
-REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
-
-TINY = 1e-12  # 1/kg^2, of a weight that no joint carries
 
 
 class ForceMeasurement:
@@ -57,7 +54,7 @@ class ForceMeasurement:
         """
         weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q)[:3] / torque_sd
         scaled = torques / torque_sd
-        mass = float(weight @ scaled) / max(float(weight @ weight), TINY)
+        mass = float(weight @ scaled) / max(float(weight @ weight), FORCE.least_weight)
         left = scaled - mass * weight
         return mass, float(left @ left)
 
@@ -92,7 +89,7 @@ class ForceMeasurement:
         velocity = [0.0] * self._n if sensors is None else sensors.velocity
         self.acceleration = [change / dt for change in map(sub, velocity, self._velocity)]
         self._velocity = velocity
-        self._steady.step(torque, STEADY, dt)
+        self._steady.step(torque, FORCE.steady_time, dt)
         self.external = self._beyond_zero(torque)
 
     def _torque(

@@ -5,9 +5,9 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wam_control.force.thresholds import FORCE
 
-CYCLES = 2  # that have to be seen
+Array = NDArray[np.float64]
 
 
 class Reversals:
@@ -23,7 +23,7 @@ class Reversals:
         self._turns: deque[tuple[float, float]] = deque()
 
     def step(self, value: float, least: float, window: float, dt: float) -> bool:
-        """Whether the signal has turned back by at least `least` for `CYCLES` cycles within `window`, s.
+        """Whether the signal has turned back by at least `least` for `swing_cycles` cycles within `window`, s.
 
         Afterwards `peak_to_peak` and `period` are the means of these cycles.
         """
@@ -37,7 +37,7 @@ class Reversals:
             self._before, self._extreme, self._sense = self._extreme, value, -self._sense
         while self._turns and self._turns[0][0] < self._time - window:
             self._turns.popleft()
-        return len(self._turns) > 2 * CYCLES
+        return len(self._turns) > 2 * FORCE.swing_cycles
 
     @property
     def count(self) -> int:

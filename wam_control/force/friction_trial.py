@@ -12,17 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.friction_verdict import CYCLE_EXCESS, STEPS, SURE
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
+from wam_control.force.thresholds import GUARD
 from wam_theory.stick_slip import FrictionNode
 from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
-PARTS = 2  # steps in an inner period
-SHARE = 0.2  # of the saturation: peak to peak at the end of a response that counts as rest
-RISES = 1.5  # duration of a trial, in times that the largest step takes at the saturated speed
-OSCILLATIONS = 60.0  # of the node, added to that duration
-CANDIDATES = (60.0, 30.0, 15.0, 8.0, 5.0, 3.5, 2.5, 1.7, 1.2, 0.8, 0.5)  # saturations, in F_static
 
 
 class FrictionTrial(NamedTuple):
@@ -50,20 +45,20 @@ class FrictionTrial(NamedTuple):
         ----------
         cycle : peak to peak of the stiction limit cycle, N or N m.
         """
-        limits = np.array([part * self.node.static_friction for part in CANDIDATES])
-        limits = limits[limits > self.deadband / SURE]
+        limits = np.array([part * self.node.static_friction for part in GUARD.trial_candidates])
+        limits = limits[limits > self.deadband / GUARD.sure]
         if not limits.size:
             return 0.0
-        tried, steps = np.repeat(limits, len(STEPS)), np.outer(limits, STEPS).ravel()
+        tried, steps = np.repeat(limits, len(GUARD.steps)), np.outer(limits, GUARD.steps).ravel()
         last = self._rest(tried, steps)
         settles: list[bool] = np.all(
-            (last <= SHARE * tried + CYCLE_EXCESS * cycle).reshape(limits.size, -1), axis=1
+            (last <= GUARD.rest_fraction * tried + GUARD.cycle_excess * cycle).reshape(limits.size, -1), axis=1
         ).tolist()
         error = 0.0
         for limit, good in zip(limits[::-1].tolist(), settles[::-1], strict=True):
             if not good:
                 break  # every smaller one has to be good as well
-            error = SURE * limit
+            error = GUARD.sure * limit
         return error
 
     def _rest(self, limits: Array, steps: Array) -> Array:
@@ -72,7 +67,7 @@ class FrictionTrial(NamedTuple):
         free, shown = loop.plant(q, contact, feedback)
         inertia = loop.body.mass_matrix(q) + loop.armature
         push = np.array([[0.0], [0.0], [0.0], [1.0 / float(inertia[0, 0])]])
-        drift, drive = zero_order_hold(free, np.hstack([loop.inlet, push]), loop.tick / PARTS)
+        drift, drive = zero_order_hold(free, np.hstack([loop.inlet, push]), loop.tick / GUARD.parts)
         motor, joint = drive[:, :1], drive[:, 1:]
         row = (axes.sense @ shown)[0]
         share = (
@@ -102,7 +97,7 @@ class FrictionTrial(NamedTuple):
                 e = reduction * (commanded if tick < late else command) - x[1]
                 integral = integral + float(loop.ki[0, 0]) * loop.tick * e
                 torque = float(loop.kp[0, 0]) * e + integral
-                for _ in range(PARTS):
+                for _ in range(GUARD.parts):
                     ahead = drift @ x + motor * torque
                     needed = -ahead[3] / joint[3, 0]
                     sticks = np.abs(needed) <= np.where(sticks, static, dynamic)
@@ -120,4 +115,6 @@ def _duration(node: FrictionNode, gain: float) -> float:
     """Duration of a trial, s."""
     ktr, kc = node.transmission_stiffness, node.contact_stiffness
     frequency = math.sqrt((ktr + kc) / node.inertia)
-    return RISES * max(STEPS) * (ktr + kc) / (ktr * kc * gain) + OSCILLATIONS * 2.0 * math.pi / frequency
+    return (
+        GUARD.rises * max(GUARD.steps) * (ktr + kc) / (ktr * kc * gain) + GUARD.oscillations * 2.0 * math.pi / frequency
+    )

@@ -9,19 +9,10 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import NamedTuple
 
+from wam_control.force.thresholds import GUARD
 from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 from wam_theory.stiction import deadband_against_stiction, stiction_cycle_force, stiction_cycle_period
-
-SOFTER = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)  # fractions of the largest contact stiffness that are considered
-STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, which have to come to rest
-CANDIDATES = (100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)  # saturations, in F_static
-SURE = 0.7  # accepted fraction of the largest saturation found good: between the candidates tried, worse ones may be
-EVENTS = 4000  # of the exact integrator, after which a response counts as not settled
-CONTINUOUS = (
-    0.1  # rad of the node's own frequency per sample: a faster loop without delay is examined as a continuous one
-)
-CYCLE_EXCESS = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
 
 
 class Domain(StrEnum):
@@ -67,20 +58,20 @@ class FrictionVerdict(NamedTuple):
     saturated_cycle: float
 
 
-def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> FrictionVerdict:
+def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = GUARD.events) -> FrictionVerdict:
     """Verdict on a node under a loop, with its contact and every softer one.
 
     The saturation of the loop counts for `saturated_cycle` only.  A response that has neither settled nor failed
     after `events` of the integrator, samples among them, is undecided, and its saturation is not accepted.
     """
-    nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in SOFTER]
+    nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in GUARD.softer]
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
     if loop.gain <= min(margins):
         return FrictionVerdict(Domain.I, min(margins), math.inf, math.inf, cycle, _saturated_cycle(node, loop))
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
-    if not loop.delay_samples and frequency * loop.sample_period < CONTINUOUS:
+    if not loop.delay_samples and frequency * loop.sample_period < GUARD.continuous:
         loop = replace(loop, sample_period=0.0)
     errors = [stable_errors(each, loop, events) for each in beyond]
     error, undecided = min(each.stable for each in errors), min(each.undecided for each in errors)
@@ -117,7 +108,7 @@ class StableErrors(NamedTuple):
     undecided: float
 
 
-def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> StableErrors:
+def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = GUARD.events) -> StableErrors:
     """Largest saturation of F_error with which every response ends at rest or in the stiction cycle.
 
     Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
@@ -127,23 +118,23 @@ def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) 
     if not node.static_friction:
         return StableErrors(0.0, 0.0)
     undecided = 0.0
-    cycle = CYCLE_EXCESS * stiction_cycle(node, loop.gain).peak_to_peak
-    for part in CANDIDATES:
+    cycle = GUARD.cycle_excess * stiction_cycle(node, loop.gain).peak_to_peak
+    for part in GUARD.candidates:
         limit = part * node.static_friction
-        if limit <= loop.deadband / SURE:
+        if limit <= loop.deadband / GUARD.sure:
             break
         comes_to_rest = _comes_to_rest(node, replace(loop, error_limit=limit), cycle, events)
         if comes_to_rest is not False:
-            undecided = undecided or SURE * limit
+            undecided = undecided or GUARD.sure * limit
         if comes_to_rest:
-            return StableErrors(SURE * limit, undecided)
+            return StableErrors(GUARD.sure * limit, undecided)
     return StableErrors(0.0, undecided)
 
 
 def _saturated_cycle(node: FrictionNode, loop: IntegralLoop) -> float:
     if math.isinf(loop.error_limit) or not loop.sample_period:
         return 0.0
-    ends = [assess(node, loop, force, start, max_events=EVENTS) for force, start in _responses(node, loop)]
+    ends = [assess(node, loop, force, start, max_events=GUARD.events) for force, start in _responses(node, loop)]
     return max([0.0, *(end.peak_to_peak for end in ends if end.verdict is Verdict.LIMIT_CYCLE)])
 
 
@@ -152,7 +143,7 @@ def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tupl
     limit = loop.error_limit
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     thrown = 3.0 * limit / node.contact_stiffness * frequency
-    tries = [(part * limit, (0.0, 0.0, 0.0)) for part in STEPS]
+    tries = [(part * limit, (0.0, 0.0, 0.0)) for part in GUARD.steps]
     return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
 
 

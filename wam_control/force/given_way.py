@@ -1,16 +1,14 @@
 """How far an arm has given way to what pushes it: one count, whatever the arm does meanwhile."""
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.force.thresholds import FORCE
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-LASTING: Final = 0.2  # s, for which a push counts after the last time: a swing is one, and the arm runs on
-LEFT: Final = 0.05  # rad, motion of a joint by which it has left what it pressed on
 
 
 class GivenWay:
@@ -54,7 +52,7 @@ class GivenWay:
 
     def step(self, q: Sequence[float], dt: float) -> None:
         """Begin a period of dt, s, with the joints at (n,), rad."""
-        self._lasting = LASTING if self._gives else max(self._lasting - dt, 0.0)
+        self._lasting = FORCE.lasting if self._gives else max(self._lasting - dt, 0.0)
         is_pushed, self._gives = self._lasting > 0.0, False
         kind = (is_pushed, is_pushed and self._is_anywhere)
         if kind != self._kind:
@@ -75,5 +73,5 @@ class GivenWay:
 
 
 def has_left(pressed_at: Sequence[float], q: Sequence[float]) -> bool:
-    """Whether a joint has moved by `LEFT` from the pose (n,), rad, in which the arm pressed last."""
-    return any(abs(a - b) > LEFT for a, b in zip(pressed_at, q, strict=True))
+    """Whether a joint has moved by `left_angle` from the pose (n,), rad, in which the arm pressed last."""
+    return any(abs(a - b) > FORCE.left_angle for a, b in zip(pressed_at, q, strict=True))

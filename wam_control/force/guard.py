@@ -14,7 +14,6 @@ import numpy as np
 from wam_control.force.contact_position import ForcePoint
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.force.stability_guard import (
-    LARGEST,
     GuardAssessment,
     Guarded,
     GuardedContact,
@@ -22,14 +21,10 @@ from wam_control.force.stability_guard import (
     StabilityGuard,
     posture_of,
 )
+from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 
-TURN = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
-SHIFT = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
-GROWTH = 1.5  # of the commanded force, after which it is assessed again
-PARTS = (0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0)  # of the required scale, all of which have to be stable
-POSITIONS = (0.25, 0.5, 0.75, 1.0)  # of a cover's length, at which an uncertain contact may be
 UNKNOWN: Final = "not assessed yet: it is while a force is commanded; the margin is that of guard.posture"
 Triple = tuple[float, float, float]
 
@@ -209,8 +204,8 @@ class Watch:
         return self.factor != before
 
     def _tried(self) -> list[float]:
-        top = LARGEST if self._is_scheduled else self._needed
-        return [part * top for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else PARTS)]
+        top = GUARD.largest_scale if self._is_scheduled else self._needed
+        return [part * top for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else GUARD.scales)]
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
@@ -218,14 +213,14 @@ class Watch:
 
 def possible_contacts(guard: StabilityGuard, q: Sequence[float], cover: str, length: float) -> list[GuardedContact]:
     """Contacts at an unknown position: along the whole cover, `length` m, along both axes across it."""
-    return [contact for part in POSITIONS for contact in guard.contacts(q, cover, part * length, 0.0)]
+    return [contact for part in GUARD.positions for contact in guard.contacts(q, cover, part * length, 0.0)]
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
-    turned = any(abs(a - b) > TURN for a, b in zip(one.q, other.q, strict=True))
-    bent = any(abs(a - b) > TURN for a, b in zip(one.direction, other.direction, strict=True))
-    shifted = max(abs(one.position - other.position), abs(one.position_sd - other.position_sd)) > SHIFT
-    grown = not one.force / GROWTH <= other.force <= one.force * GROWTH
+    turned = any(abs(a - b) > GUARD.turn for a, b in zip(one.q, other.q, strict=True))
+    bent = any(abs(a - b) > GUARD.turn for a, b in zip(one.direction, other.direction, strict=True))
+    shifted = max(abs(one.position - other.position), abs(one.position_sd - other.position_sd)) > GUARD.shift
+    grown = not one.force / GUARD.growth <= other.force <= one.force * GUARD.growth
     return turned or bent or shifted or grown or one.cover != other.cover
 
 
@@ -279,4 +274,4 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
 
 def _margin(scale: float) -> str:
     """Factor by which the gains may be larger."""
-    return f"more than {LARGEST:g}" if scale >= LARGEST else f"{scale:.4g}"
+    return f"more than {GUARD.largest_scale:g}" if scale >= GUARD.largest_scale else f"{scale:.4g}"

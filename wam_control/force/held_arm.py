@@ -12,12 +12,12 @@ from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.given_way import GivenWay
 from wam_control.force.hybrid_velocity import posture_velocity
+from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-ARRIVED = 0.02  # rad, of each joint from the posture that is held
-SLOWEST = 1e-9  # rad/s
 
 
 class RetreatForce(NamedTuple):
@@ -88,7 +88,9 @@ class HeldArm:
         limit = parameters.joint_speed_limit
         energy = parameters.impact_energy(push.allowed)
         back = _slowed(posture_velocity(self._at, q, parameters.posture_gain, limit), inertia, energy)
-        self._has_arrived = self._has_arrived or max(abs(a - b) for a, b in zip(self._at, q, strict=True)) < ARRIVED
+        self._has_arrived = (
+            self._has_arrived or max(abs(a - b) for a, b in zip(self._at, q, strict=True)) < MOTION.arrived
+        )
         least = push.least(self._body, q)
         is_yielding = least > push.allowed or any(force.speed for force in forces)
         if is_yielding:
@@ -107,7 +109,7 @@ class HeldArm:
                 velocity -= row * (float(row @ velocity) / float(row @ row))
         for force in forces:
             velocity += force.axis.move * force.speed
-        velocity *= min(limit / max(float(np.abs(velocity).max()), SLOWEST), 1.0)
+        velocity *= min(limit / max(float(np.abs(velocity).max()), FORCE.slowest), 1.0)
         if self._has_arrived:
             self._at = list(q)
         return velocity.tolist(), True

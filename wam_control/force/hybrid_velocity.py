@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.force_axis import ForceAxis
+from wam_control.force.thresholds import FORCE
 
 Array = NDArray[np.float64]
-SLOPE = 0.3  # of a surface to the force: as fast as this times the link slides on it, it comes towards the link
-ALLOWED = 0.1  # of the commanded force, error while it does
 
 
 def posture_velocity(
@@ -52,6 +51,6 @@ def followed(posture: Array, jacobian: Array, force: float, gain: float) -> Arra
     jacobian : (3, n), m/rad, of where the link presses.
     force, gain : commanded, N, and speed along it per error, m/s/N.
     """
-    slide = SLOPE * float(np.linalg.norm(jacobian @ posture))
-    most = gain * ALLOWED * force
+    slide = FORCE.slide_slope * float(np.linalg.norm(jacobian @ posture))
+    most = gain * FORCE.tolerance * force
     return posture * (most / slide) if slide > most else posture

@@ -8,14 +8,12 @@ import numpy as np
 
 from wam_control.force.friction_verdict import Domain, FrictionVerdict, friction_verdict
 from wam_control.force.stability_guard import rounded_down
+from wam_control.force.thresholds import GUARD
 from wam_theory.linear_loop import damping_ratio, gain_ratio
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
-LONGEST = 50  # periods of delay
 EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
-CLOSE = 0.9  # of the margin; no plant is known better
 ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop leaves another margin"
-ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
 
 
 class LoopDesign(NamedTuple):
@@ -63,13 +61,13 @@ class LoopDesign(NamedTuple):
             )
         if verdict.saturated_cycle:
             lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
-        lower = f"lower the gain to {rounded_down(CLOSE * verdict.margin):g}, {CLOSE:g} of the margin"
+        lower = f"lower the gain to {rounded_down(GUARD.close * verdict.margin):g}, {GUARD.close:g} of the margin"
         if not self.is_safe:
             error = rounded_down(verdict.stable_error)
             saturate = f", or saturate the error at {error:g}" if error else ""
             finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
             lines.append(f"{finding}: {lower}{saturate}")
-        elif CLOSE < part <= 1.0:
+        elif GUARD.close < part <= 1.0:
             lines.append(f"close to the margin: a plant a little other than the one given may be unstable; {lower}")
         return "\n".join(lines)
 
@@ -95,8 +93,8 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     Raises
     ------
     ValueError
-        where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `LONGEST` periods, or
-        a number is `ABSURD`.
+        where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `longest_delay` periods,
+        or a number is `absurd`.
     """
     if not node.damping > 0.0:
         raise ValueError(f"damping is {node.damping:g}; without damping no gain is stable, give one above 0")
@@ -105,13 +103,16 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
             raise ValueError(f"{name} is {value:g}; it must be 0 or more")
     given = {f.name: getattr(one, f.name) for one in (node, loop) for f in fields(one)} | {"rate": rate, "delay": delay}
     for name, value in given.items():
-        if 0.0 < abs(value) < 1.0 / ABSURD or ABSURD < abs(value) < math.inf:
-            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / ABSURD:g} and {ABSURD:g}")
+        if 0.0 < abs(value) < 1.0 / GUARD.absurd or GUARD.absurd < abs(value) < math.inf:
+            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / GUARD.absurd:g} and {GUARD.absurd:g}")
     if delay and not rate:
         raise ValueError(f"delay is {delay:g} s and rate is 0; give the rate of the samples, Hz")
     samples = math.ceil(delay * rate - 1e-9)
-    if samples > LONGEST:
-        raise ValueError(f"delay is {delay:g} s, {samples} periods; allowed: {LONGEST} periods, {LONGEST / rate:g} s")
+    if samples > GUARD.longest_delay:
+        raise ValueError(
+            f"delay is {delay:g} s, {samples} periods; allowed: {GUARD.longest_delay} periods, "
+            f"{GUARD.longest_delay / rate:g} s"
+        )
     sampled = replace(loop, sample_period=1.0 / rate if rate else 0.0, delay_samples=samples)
     plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     zeta = float(damping_ratio(*plant))

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.arm_push import ArmPush
-from wam_control.force.given_way import LASTING, GivenWay
+from wam_control.force.given_way import GivenWay
+from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.number_text import brief
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-PUSH_BACK = 0.3  # rad/s, at which a joint beyond its end is brought back, at most
-BEGIN = 0.9  # of the largest contact force, from which motion against it is slowed down
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ class MotionLimits:
         slowed, force = self._against_the_world(list(velocity), q, push, whole)
         stopped, end = self._before_the_ends(slowed, q)
         if force:
-            self._reason, self._reported = force, LASTING
+            self._reason, self._reported = force, FORCE.lasting
         else:
             self._reported = max(self._reported - dt, 0.0)
         return Limited(stopped, end, self._reason if self._reported else "")
@@ -172,13 +171,13 @@ class MotionLimits:
         if on != self._on:
             self._on, self._pushed = on, 0.0  # what pushes elsewhere was not this
         force, allowed, how_known = self._push(q, push, whole)
-        if not self._pushed and force <= BEGIN * allowed:
+        if not self._pushed and force <= FORCE.slow_from * allowed:
             return velocity, ""
         has_room = self._given.way < self._parameters.free_travel
         push = push._replace(allowed=allowed, gain=push.gain if has_room or force < allowed else 0.0)
         missing = push.correction(self._body, q, velocity, force, self._fastest)
         is_bound = bool(missing.any())
-        if not is_bound and force <= BEGIN * allowed:
+        if not is_bound and force <= FORCE.slow_from * allowed:
             self._pushed = 0.0
             return velocity, ""
         if force > self._pushed:
@@ -190,7 +189,8 @@ class MotionLimits:
             return limited, ""  # by itself, the arm gives way fast enough
         limit = self._in_words(allowed, whole)
         return limited, (
-            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; from {BEGIN:g} of "
+            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; from "
+            f"{FORCE.slow_from:g} of "
             "that on the arm is slow against it, above it gives way by limits.free_travel at most, unless that "
             "overpowers its motors: command a direction or a posture away from it, or less force"
         )
@@ -199,7 +199,7 @@ class MotionLimits:
         """Force, N, the largest one allowed, of those that count here the one that is nearest to it, and its words."""
         own = self._parameters
         most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
-        least = push.least(self._body, q, BEGIN * min(most, allowed))
+        least = push.least(self._body, q, FORCE.slow_from * min(most, allowed))
         if whole and allowed < most:
             force, words = whole.measured() or (least, AT_LEAST)
             if force * most >= least * allowed:
@@ -224,7 +224,7 @@ class MotionLimits:
                 continue
             limited.append(min(max(speed, slowest), fastest))
             end = low if speed < slowest else high
-            if limited[-1] != speed and abs(angle - end) <= margin + PUSH_BACK / gain:
+            if limited[-1] != speed and abs(angle - end) <= margin + FORCE.push_back / gain:
                 reason = (
                     f"{name} is at {angle:.4g} rad, its end is {end:.4g} rad and limits.joint_margin {margin:g} rad: "
                     "it does not move on; command another posture or direction"
@@ -235,5 +235,5 @@ class MotionLimits:
 def _approach(distance: float, gain: float, margin: float) -> float:
     """Largest speed towards an end at this distance, rad/s; beyond the end negative, back from it."""
     if distance < 0.0:
-        return max(gain * distance, -PUSH_BACK)
+        return max(gain * distance, -FORCE.push_back)
     return gain * max(distance - margin, 0.0)

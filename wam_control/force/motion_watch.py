@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from wam_control.force.force_hold import LEFT, SETTLED, TOLERANCE, ForceReaction, Found
+from wam_control.force.force_hold import ForceReaction, Found
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.force_measurement import REST
-from wam_control.force.posture_watch import PAUSE
+from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.number_text import brief
 
 IN_THE_WAY: Final = (
@@ -21,11 +21,11 @@ OBEYS: Final[Found] = (ForceReaction.NONE, "")
 class MotionWatch:
     """Watches one axis of a task, or a joint of the posture, next to an ideal arm that does what its law commands.
 
-    An axis counts as behind from where its law commands a joint speed at which the arm is not at rest, REST:
-    e > REST |r| / k, with the lever r and the velocity per error k.  On the way to a position, at the velocity v of
-    the ideal arm, it may be late by the time constant of its law, v/k, too.  A velocity may be off by `TOLERANCE`, too,
-    in the mean over `limits.settling_time` T, e' = v - r.qd - e/T, or over `LEFT` of T.  What is behind for `LEFT` of T
-    is reported.
+    An axis counts as behind from where its law commands a joint speed at which the arm is not at rest, w:
+    e > w |r| / k, with the lever r and the velocity per error k.  On the way to a position, at the velocity v of
+    the ideal arm, it may be late by the time constant of its law, v/k, too.  A velocity may be off by `tolerance`, too,
+    in the mean over `limits.settling_time` T, e' = v - r.qd - e/T, or over `left_after` of T.  What is behind for
+    `left_after` of T is reported.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ class MotionWatch:
             self._mean = abs(speed)
         self._mean += (abs(speed) - self._mean) * dt / lasting
         self._behind += speed * dt - moved - self._behind * dt / lasting
-        brief_time = max(LEFT * lasting, dt)
+        brief_time = max(FORCE.left_after * lasting, dt)
         self._error += (speed * dt - moved - self._error * dt) / brief_time
         self._made += (moved - self._made * dt) / brief_time
-        allowed = _allowed(lever, parameters.task.largest_rate, lasting) + TOLERANCE * self._mean * lasting
+        allowed = _allowed(lever, parameters.task.largest_rate, lasting) + FORCE.tolerance * self._mean * lasting
         return self._reported(
             min(self._behind, self._error * lasting, key=abs),  # a push that is over does not count for all of T
             allowed,
-            LEFT * lasting,
+            FORCE.left_after * lasting,
             dt,
             share < 1.0,
             lambda: f"{speed:.4g} {self._unit}/s are commanded, and it moves with {brief(self._made)} {self._unit}/s",
@@ -97,10 +97,10 @@ class MotionWatch:
         law : velocity per error, 1/s, and largest velocity, m/s or rad/s.
         """
         lasting = max(parameters.limits.settling_time, dt)
-        gain, fastest = max(law[0], SETTLED / lasting), law[1]  # slower, no position would be reached in time
-        was_at_rest = self._rested > PAUSE
+        gain, fastest = max(law[0], FORCE.settled / lasting), law[1]  # slower, no position would be reached in time
+        was_at_rest = self._rested > FORCE.pause
         self._goal, self._rested = goal, self._rested + dt if goal == self._goal else dt
-        if is_at_rest := self._rested > PAUSE:
+        if is_at_rest := self._rested > FORCE.pause:
             rate = 0.0
         if math.isnan(self._ideal) or (is_at_rest and not was_at_rest):
             self._ideal = at  # the joints may go there more slowly
@@ -110,7 +110,7 @@ class MotionWatch:
         return self._reported(
             self._ideal - at,
             _allowed(lever, law[0], lasting) + abs(speed) / gain,
-            LEFT * lasting,
+            FORCE.left_after * lasting,
             dt,
             share < 1.0 and not is_at_rest,
             lambda: f"{goal:.4g} {self._unit} is commanded, and it is at {at:.4g} {self._unit}",
@@ -145,4 +145,4 @@ class MotionWatch:
 
 def _allowed(lever: float, gain: float, lasting: float) -> float:
     """Way, m or rad, that may be missing."""
-    return REST * lever / max(gain, SETTLED / lasting)
+    return MOTION.at_rest * lever / max(gain, FORCE.settled / lasting)

@@ -4,14 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-CAUGHT_UP: Final = 1.25  # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
-PAUSE: Final = 0.1  # s, after which a posture that changes is another goal, to which the arm goes as fast as it may,
-RHYTHM: Final = 1.5  # unless it changes at intervals that are alike by this factor
-BEHIND: Final = 0.02  # rad, of an axis m, from where the posture is as it moves on, from which the arm is late
-ROUNDING: Final = 1e-9  # s, rad
-PACE: Final = 5.0  # 1/s, velocity per posture error of an arm that arrives in time
-SHORT, LATE = 0.05, 0.1  # rad, s, by which an arm may be behind that one
-SHORT_FOR: Final = 0.1  # s, after which it is reported
+from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
+
 STILL: Final = [0.0]
 
 
@@ -43,7 +38,7 @@ class PostureWatch:
     @property
     def is_moving(self) -> bool:
         """Whether the commanded posture moves."""
-        return not self._is_goal and self._rested <= max(PAUSE, RHYTHM * self._interval) + ROUNDING
+        return not self._is_goal and self._rested <= max(FORCE.pause, FORCE.rhythm * self._interval) + FORCE.rounding
 
     def wait(self, dt: float) -> str:
         """Why the arm is late, while no posture is commanded for a period of dt, s, as before."""
@@ -71,31 +66,31 @@ class PostureWatch:
         if self._follower == self._before:
             self._behind, self._late = STILL, ""
             return ""
-        most = (1.0 if has_rate or self._late else CAUGHT_UP) * limit * dt
+        most = (1.0 if has_rate or self._late else FORCE.caught_up) * limit * dt
         pairs = zip(posture, self._follower, q, strict=True)
         self._follower = [_nearer(goal, at + min(max(goal - at, -most), most), arm) for goal, at, arm in pairs]
         self._behind = [abs(a - b) for a, b in zip(posture, self._follower, strict=True)]
-        if max(self._behind) <= ROUNDING:
+        if max(self._behind) <= FORCE.rounding:
             self._late = ""
         return self._late
 
     def _change(self, before: list[float], limit: float) -> None:
         """Take another posture, which goes on with a motion or is another goal."""
         time, held = self._rested, self._held
-        is_soon = time <= PAUSE + ROUNDING
-        goes_on = is_soon or self._interval <= RHYTHM * time <= RHYTHM * RHYTHM * self._interval
+        is_soon = time <= FORCE.pause + FORCE.rounding
+        goes_on = is_soon or self._interval <= FORCE.rhythm * time <= FORCE.rhythm * FORCE.rhythm * self._interval
         if is_soon and self._is_goal:  # a motion begins, there
             self._follower, self._behind = before, STILL
         if not goes_on:
             self._late = ""
-        elif max(self._behind) > BEHIND and not self._late:
+        elif max(self._behind) > MOTION.arrived and not self._late:
             k = self._behind.index(max(self._behind))
             way = self._before[k] - before[k]
             moves_on = way * (before[k] - self._follower[k]) > 0.0  # and was not set elsewhere at once, before
             if moves_on and (speed := abs(way) / held) > limit:
                 advice = (
                     f"give the motion more time, or raise force_loop:{self._limit}"
-                    if held > time - ROUNDING
+                    if held > time - FORCE.rounding
                     else "a command lasts ages.command: stream it at shorter intervals than that"
                 )
                 self._late = (
@@ -107,9 +102,9 @@ class PostureWatch:
 
 
 class ShortfallWatch:
-    """Compares how far the arm is from a commanded posture with an arm of `PACE`, which goes no faster than it may.
+    """Compares how far the arm is from a commanded posture with an arm of `pace`, which goes no faster than it may.
 
-    It may be further away by `SHORT`, and by the way of that arm in `LATE`.
+    It may be further away by `behind_angle`, and by the way of that arm in `behind_time`.
 
     Parameters
     ----------
@@ -137,11 +132,11 @@ class ShortfallWatch:
         """
         at = self._follower or list(q)
         speeds = [
-            min(max(min(PACE, 1.0 / dt) * (goal - a), -limit), limit) for goal, a in zip(posture, at, strict=True)
+            min(max(min(FORCE.pace, 1.0 / dt) * (goal - a), -limit), limit) for goal, a in zip(posture, at, strict=True)
         ]
         self._follower = [a + speed * dt for a, speed in zip(at, speeds, strict=True)]
         allowed = [
-            abs(goal - a) + SHORT + LATE * abs(speed)
+            abs(goal - a) + FORCE.behind_angle + FORCE.behind_time * abs(speed)
             for goal, a, speed in zip(posture, self._follower, speeds, strict=True)
         ]
         short = [abs(goal - angle) for goal, angle in zip(posture, q, strict=True)]
@@ -149,10 +144,11 @@ class ShortfallWatch:
         self._lasts = self._lasts + dt if short[k] > allowed[k] else 0.0
         if not self._lasts:
             self._report = ""
-        elif self._lasts > SHORT_FOR and not self._report:
+        elif self._lasts > FORCE.short_for and not self._report:
             self._report = (
                 f"{self._names[k]} is {short[k]:.3g} rad away from the commanded posture; allowed: {allowed[k]:.3g} "
-                f"rad, {SHORT:g} rad at rest; raise force_loop:posture_gain, {gain:g} 1/s, if it is too low for this "
+                f"rad, {FORCE.behind_angle:g} rad at rest; raise force_loop:posture_gain, {gain:g} 1/s, if it is too "
+                "low for this "
                 "motion, or give the motion more time; or something is in the way: free the arm"
             )
         return self._report

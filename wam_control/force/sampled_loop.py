@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
-ON_THE_CIRCLE = 1e-7  # growth of a mode in one period that counts as none
 
 
 class Feedback(NamedTuple):
@@ -177,4 +177,4 @@ class SampledLoop:
 
 def _grows(period: Array) -> bool:
     """Whether a mode of the map grows."""
-    return bool(np.abs(np.linalg.eigvals(period)).max() > 1.0 + ON_THE_CIRCLE)
+    return bool(np.abs(np.linalg.eigvals(period)).max() > 1.0 + GUARD.on_the_circle)

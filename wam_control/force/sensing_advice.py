@@ -8,12 +8,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import NamedTuple
 
 from wam_control.force.contact_position import ForceCase
-
-MORE = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
-TURNS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned, to both sides
-SPARE = 0.1  # rad, from where a joint may be no further: the arm moves on as it presses
-EACH = 5  # ways that are tried in a period
-ANOTHER = 0.1  # of a force, by which another one differs that has an advice of its own
+from wam_control.force.thresholds import FORCE
 
 
 class Turnable(NamedTuple):
@@ -77,10 +72,10 @@ class Advice:
         is_accepted : whether a force would be accepted.
         """
         before = self._refused
-        if before is None or before[1] != refused or abs(force - before[0]) > ANOTHER * force:
+        if before is None or before[1] != refused or abs(force - before[0]) > FORCE.another * force:
             self.reset()
             self._refused, self._search = (force, refused), _search(others(), force, is_accepted)
-        for _ in range(0 if self.is_complete else EACH):
+        for _ in range(0 if self.is_complete else FORCE.each):
             way = next(self._search, None)
             if way is None:
                 self.is_complete = True
@@ -110,15 +105,15 @@ def _search(others: OtherForces, force: float, is_accepted: Callable[[ForceCase]
 
 
 def _larger(force: float) -> list[float]:
-    return [float(f"{factor * force:.2g}") for factor in MORE]
+    return [float(f"{factor * force:.2g}") for factor in FORCE.more]
 
 
 def _turned(others: OtherForces, force: float) -> Iterator[tuple[Sequence[float], float, str]]:
     """Poses in which one joint is turned, the force, and how to get there; the nearest first."""
     q = others.q
-    for by in TURNS:
+    for by in FORCE.turns:
         for joint, name, lower, upper in others.turnable:
             for angle in (round(q[joint] + by, 1) + 0.0, round(q[joint] - by, 1) + 0.0):  # no -0
-                if lower + SPARE <= angle <= upper - SPARE:
+                if lower + FORCE.spare <= angle <= upper - FORCE.spare:
                     pose = [*q[:joint], angle, *q[joint + 1 :]]
                     yield pose, force, f"turn {name} from {q[joint]:.2f} to {angle:.1f} rad"

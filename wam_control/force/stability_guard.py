@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.force_axis import REACH, ForceAxes, ForceAxis, PressedForce, SensingParameters
+from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.friction_trial import FrictionTrial
-from wam_control.force.friction_verdict import SOFTER, Domain, PredictedCycle, stiction_cycle
+from wam_control.force.friction_verdict import Domain, PredictedCycle, stiction_cycle
 from wam_control.force.sampled_loop import Axes, Feedback, SampledLoop
+from wam_control.force.thresholds import FORCE, GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import lengths, parameter, tunable
 from wam_theory.linear_loop import series_stiffness
@@ -28,10 +29,7 @@ from wam_theory.stick_slip import FrictionNode
 
 Array = NDArray[np.float64]
 ESTIMATE = "contact_estimate"
-LARGEST = 10.0  # scale of the gains up to which a margin is searched
-SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, LARGEST, 19).tolist())
-SLACK = 0.003  # the search for a margin ends within 0.2 %
-FORCES = (1.0, 40.0)  # N, of commands at which parameters are assessed: the sensed force depends on them
+SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, GUARD.largest_scale, 19).tolist())
 
 
 @dataclass(frozen=True)
@@ -142,7 +140,7 @@ class GuardAssessment(NamedTuple):
     Attributes
     ----------
     domain : of figure 5.8; below `stability_fraction` of the linear margin counts as I.
-    scale : factor of the gains at which the loop becomes linearly unstable, up to `LARGEST`.
+    scale : factor of the gains at which the loop becomes linearly unstable, up to `largest_scale`.
     stable_error : largest saturation accepted, N or N m; infinite in domain I, 0 where none is.
     stiffness : k_tr k_c/(k_tr + k_c) at the contact or the joint, N/m or N m/rad.
     cycle : stiction limit cycle by (5.8) and (5.9).
@@ -193,14 +191,14 @@ class StabilityGuard:
         candidates = [
             GuardedContact(tuple(q), cover, position, position_sd, _triple(rotation[:, axis]), force)
             for axis in (1, 2)
-            for force in FORCES
+            for force in GUARD.forces
         ]
         return [contact for each in candidates for contact in self.with_lever(each)]
 
     def with_lever(self, contact: GuardedContact) -> list[GuardedContact]:
         """The contact itself; nothing where its force has no lever on any joint."""
         lever = self.axis(contact).lever
-        return [contact] if float(lever @ lever) > REACH * REACH else []
+        return [contact] if float(lever @ lever) > FORCE.least_lever * FORCE.least_lever else []
 
     def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
         """Those contacts whose force is known well enough to be controlled, pinned or not."""
@@ -244,7 +242,7 @@ class StabilityGuard:
         law = task.law
         if not contacts or not any((*law.gain, *law.proportional_gain)):
             return GuardAssessment(
-                Domain.I, LARGEST, math.inf, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
+                Domain.I, GUARD.largest_scale, math.inf, 0.0, PredictedCycle(0.0, 0.0, 0.0), "nothing is controlled", ""
             )
         scale, contact = min((min(self.scales(task, [each])), each) for each in contacts)
         nodes = {name: self.node(task, contact, i) for i, name in enumerate(law.names)}
@@ -302,7 +300,7 @@ class StabilityGuard:
         found = found._replace(domain=domain, stable_error=error)
         if max(law.error_limit) <= error:
             return found
-        most = (1.0 - SLACK) * share * found.scale
+        most = (1.0 - GUARD.slack) * share * found.scale
         allowed = f"{group}_gain up to {_list([rounded_down(most * gain) for gain in law.gain])}"
         if error:
             allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
@@ -343,7 +341,7 @@ class StabilityGuard:
 
     def _parts(self, task: GuardedTask) -> tuple[float, ...]:
         """Fractions of the stiffness to consider; a known spring has its own alone."""
-        return SOFTER[:1] if task.feedback.kind == "joint_position" else SOFTER
+        return GUARD.softer[:1] if task.feedback.kind == "joint_position" else GUARD.softer
 
     def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
         timing = self._timing

@@ -21,7 +21,8 @@ from wam_control.force.motion_watch import MotionWatch
 from wam_control.force.posture_watch import PostureWatch
 from wam_control.force.stability_guard import GuardedContact, GuardedForces
 from wam_control.force.task import AxisKind, TaskCommand
-from wam_control.force.task_frame import HAND, AxisState, TaskFrame, force_speed
+from wam_control.force.task_frame import AxisState, TaskFrame, force_speed
+from wam_control.force.thresholds import FORCE
 from wam_control.force.torque_watch import TorqueWatch
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
@@ -29,7 +30,6 @@ from wam_description.signals import Contact
 
 Array = NDArray[np.float64]
 AxisRow = tuple[float, float, float, float, float, float]  # under TASK_AXIS_COLUMNS
-LOST = 0.5  # s without a touch, after which another one begins
 
 
 class TaskOutput(NamedTuple):
@@ -233,7 +233,7 @@ class TaskControl:
         for at, is_pressed in pressed.items():
             slid, lost = before.get(at, (0.0, math.inf))
             lost = 0.0 if is_pressed else lost + dt
-            if lost < LOST:
+            if lost < FORCE.lost_touch:
                 self._slid[at] = slid + self._force_axes.slide(q, *at, moved), lost
         return moved
 
@@ -370,7 +370,7 @@ class TaskControl:
         for state in states:
             if state.point and state.force_sd < math.inf:
                 x, y, z = state.direction.tolist()
-                point, force = state.point, _desired(state) or HAND
+                point, force = state.point, _desired(state) or FORCE.hand
                 where = (point.cover, point.position, point.position_sd)
                 contacts.append(GuardedContact(tuple(q), *where, (x, y, z), force))
         laws = self._supervision.force_law, self._supervision.torque_law

@@ -4,7 +4,7 @@ For each axis in turn, with its row r (velocity along it per joint velocity) and
 axes before it leave: a = N r, qd += a (v - r.qd)/(|a|^2 + lambda^2), N -= a a'/|a|^2; at the end qd += N qd_posture.
 A force axis is sensed by its own generalised least squares (`force_axis`), with the forces of the other
 axes as unknowns.  lambda is zero except near singular poses: for a force it limits the mass of the arm that
-appears in the measured force, for a motion it begins where the lever is shorter than `SHORT`.
+appears in the measured force, for a motion it begins where the lever is shorter than `short_lever`.
 """
 
 import math
@@ -18,16 +18,13 @@ from wam_control.force.contact_position import ForcePoint
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, TaskParameters
+from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 
 Array = NDArray[np.float64]
-SHORT = 0.05  # m or 1, lever below which a motion along an axis is slowed down
-LOST = 1e-3  # part of an axis that the others have to leave it
-LEAST_FRICTION = 0.01  # of surfaces that two forces press on
-HAND = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
 
 
 class AxisState(NamedTuple):
@@ -147,7 +144,7 @@ class TaskFrame:
     ) -> list[Array]:
         """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
         if axis.kind is AxisKind.IMPEDANCE:
-            return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
+            return [FORCE.hand * self._axes.lever(q, axis.cover, point.position, direction)]
         pressed = PressedForce(axis.cover, point.position, point.position_sd, direction, _size(axis))
         return self._axes.disturbance(q, pressed, self._turned(q, begun, axis.cover, direction))
 
@@ -156,17 +153,19 @@ class TaskFrame:
         own, joints = self._parameters, len(self._arm.joints.names)
         for state in states:
             lever = float(np.linalg.norm(state.row))
-            if lever < SHORT:
+            if lever < FORCE.short_lever:
                 return (
-                    f"{state.axis.name}: its lever on the joints is {brief(lever)} m; allowed: {SHORT:g} m and above; "
+                    f"{state.axis.name}: its lever on the joints is {brief(lever)} m; allowed: {FORCE.short_lever:g} "
+                    "m and above; "
                     "bend the arm, or command another axis"
                 )
         forces = [state.axis for state in states if state.sensed and state.axis.kind is AxisKind.FORCE]
         positions = {(axis.cover, axis.position) for axis in forces}
-        if len(positions) > 1 and self._sensing.friction < LEAST_FRICTION:
+        if len(positions) > 1 and self._sensing.friction < FORCE.least_friction:
             return (
                 f"{len(positions)} forces at once: the friction of each is measured as a part of the others, and "
-                f"sensing.friction is {self._sensing.friction:g}; allowed: {LEAST_FRICTION:g} and above; declare it"
+                f"sensing.friction is {self._sensing.friction:g}; allowed: {FORCE.least_friction:g} and above; "
+                "declare it"
             )
         limit = own.condition_limit
         rank, condition = rank_and_condition([state.row for state in states], limit)
@@ -239,10 +238,10 @@ class TaskFrame:
             a = left @ state.row
             square, whole = float(a @ a), float(state.row @ state.row)
             independence.append(math.sqrt(square / whole) if whole else 0.0)
-            if square <= (LOST * LOST) * max(whole, SHORT * SHORT):
+            if square <= (FORCE.lost_axis * FORCE.lost_axis) * max(whole, FORCE.short_lever * FORCE.short_lever):
                 fractions.append(0.0)
                 continue
-            damped = max(square, SHORT * SHORT)
+            damped = max(square, FORCE.short_lever * FORCE.short_lever)
             if state.sensed is not None:
                 damped = max(square, abs(float(state.sensed.sense @ inertia @ a)) / most if most else 0.0)
             velocity += a * ((speed - float(state.row @ velocity)) / damped)
@@ -320,4 +319,4 @@ def _pulls(axis: TaskAxis) -> bool:
 
 def _size(axis: TaskAxis) -> float:
     """Size of the force along an axis, N, as an unknown of the others."""
-    return abs(axis.value or 0.0) if axis.kind is AxisKind.FORCE else HAND
+    return abs(axis.value or 0.0) if axis.kind is AxisKind.FORCE else FORCE.hand

@@ -2,12 +2,10 @@
 
 import math
 
-from wam_control.force.force_hold import LEFT, TOLERANCE, UNLOAD, ForceReaction, Found
+from wam_control.force.force_hold import UNLOAD, ForceReaction, Found
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.thresholds import FORCE
 from wam_description.number_text import brief
-
-UNSURE = 3.0  # standard deviations of the measured torque, by which it may be off besides
-ONE_SIDED = 0.5  # of the time in which it is off, above which it is off to one side
 
 
 class TorqueWatch:
@@ -44,7 +42,7 @@ class TorqueWatch:
         dt : outer period, s.
         unknown, meaning : torque at rest before that no touched surface gives, N m, and what it means.
         """
-        allowed = max(TOLERANCE * abs(desired), UNSURE * sd)
+        allowed = max(FORCE.tolerance * abs(desired), FORCE.certain * sd)
         if abs(unknown) > allowed:
             return ForceReaction.NOT_SENSED, (
                 f"{self._name}: the arm at rest already measures {brief(unknown)} N m, {meaning}; allowed: "
@@ -55,7 +53,7 @@ class TorqueWatch:
             return ForceReaction.NOT_REACHED, missed
         known = parameters.sensing.reported_fraction
         self._uncertain = self._uncertain + dt if sd > known * abs(desired) > 0.0 else 0.0
-        if self._uncertain > LEFT * lasting:
+        if self._uncertain > FORCE.left_after * lasting:
             return ForceReaction.UNCERTAIN, (
                 f"{self._name}: the torque is known to +-{brief(sd)} N m, {sd / abs(desired):.0%} of the commanded "
                 f"{brief(desired)} N m; sensing.reported_fraction, {known:.0%}, is to be known: use joint sensors, or "
@@ -71,14 +69,14 @@ class TorqueWatch:
         error = desired - measured
         if abs(error) <= allowed:
             self._within += dt
-            if self._within >= LEFT * lasting:
+            if self._within >= FORCE.left_after * lasting:
                 self._off, self._side, self._report = 0.0, 0.0, ""
             return self._report
         self._within = 0.0
         self._off += dt
         self._side += math.copysign(dt, error)
         if self._off > lasting:
-            swings = "" if abs(self._side) > ONE_SIDED * self._off else ", to both sides"
+            swings = "" if abs(self._side) > FORCE.one_sided * self._off else ", to both sides"
             self._report = (
                 f"{self._name}: {brief(measured)} N m are measured and {brief(desired)} N m commanded; the "
                 f"torque has been off by more than {brief(allowed)} N m{swings} for {brief(self._off)} s: command what "
