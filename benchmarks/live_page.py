@@ -19,7 +19,7 @@ from wam_cli.commands.live import PageProcess
 from wam_description.configuration import Configuration, packaged
 from wam_live.page import HOST, port_is_free
 from wam_ros.bring_up import Composition
-from wam_ros.run import NAMESPACE
+from wam_ros.topics import NAMESPACE
 
 FIRST_PORT = 8190
 LONGEST_START, SETTLING = 300.0, 3.0  # s

@@ -20,7 +20,7 @@ from wam_bag.bag_writer import BagWriter
 from wam_bag.message_layout import stamp_reader
 from wam_description.configuration import Configuration, packaged
 from wam_description.topics import TOPICS
-from wam_ros.qos import qos
+from wam_ros.topics import qos
 
 MINUTES, QUICK_MINUTES = 10.0, 0.2
 ROWS = ("reading", "analysis", "page")

@@ -23,7 +23,7 @@ from wam_bag.mcap_writer import McapWriter
 from wam_description.configuration import Configuration, packaged
 from wam_description.topics import TOPICS
 from wam_ros.bring_up import Composition
-from wam_ros.run import NAMESPACE
+from wam_ros.topics import NAMESPACE
 
 SECONDS, QUICK_SECONDS = 60.0, 2.0
 MESSAGES = 20_000  # written in one measurement

@@ -27,10 +27,9 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.signals import State
 from wam_description.topics import BY_NAME
 from wam_ros.bring_up import Composition, Processes
-from wam_ros.header import stamp_of
 from wam_ros.messages import joint_state
-from wam_ros.qos import qos
 from wam_ros.run import Connection, spin
+from wam_ros.topics import qos, stamp_of
 
 PERIOD = 0.001  # s
 PROCESSORS = os.sched_getaffinity(0)

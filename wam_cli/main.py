@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
-from wam_ros.program import SIGNALS, end_at_once_on_signals, ignore_signals
+from wam_ros.process_signals import SIGNALS, end_at_once_on_signals, ignore_signals
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
 COMMANDS = {

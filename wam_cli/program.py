@@ -1,6 +1,6 @@
 """The program `wam`: Ctrl-C ends it silently from its first import on."""
 
-from wam_ros.program import end_at_once_on_signals
+from wam_ros.process_signals import end_at_once_on_signals
 
 
 def main() -> None:

@@ -11,10 +11,8 @@ from tf2_msgs.msg import TFMessage
 from wam_description.arm import Shared
 from wam_description.frames import ArmFrames, FramePlacement
 from wam_description.topics import BY_NAME
-from wam_ros.header import header, stamp_of
 from wam_ros.messages import Refused, read_joint_state
-from wam_ros.qos import qos
-from wam_ros.run import NAMESPACE
+from wam_ros.topics import NAMESPACE, header, qos, stamp_of
 
 DEPTH: Final = 100  # of /tf, as tf2_ros has it
 

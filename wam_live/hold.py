@@ -9,7 +9,7 @@ from wam_description.arm import Shared
 from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
 from wam_ros.messages import message_type
-from wam_ros.qos import qos
+from wam_ros.topics import qos
 from wam_ros.wire import encoder
 
 KEYS: Final = {"sim/disturbance": "key push", "force_command": "key force"}

@@ -25,10 +25,10 @@ from wam_live.scene import Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
 from wam_ros.messages import message_type
-from wam_ros.qos import qos
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import Connection
+from wam_ros.topics import qos
 from wam_ros.wire import stamp_of
 
 RATE: Final = 30.0  # Hz, of the picture

@@ -8,7 +8,7 @@ from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.status import PAUSED
 from wam_live.hold import HeldTopic
 from wam_ros.call import SILENCE, CalledStack
-from wam_ros.header import stamp_of
+from wam_ros.topics import stamp_of
 
 NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 

@@ -24,7 +24,7 @@ from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.stack_client import run_next_to
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
-from wam_ros.qos import qos
+from wam_ros.topics import qos
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"

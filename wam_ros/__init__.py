@@ -1,20 +1,19 @@
 """ROS around the nodes of the stack: the adapter, messages, parameters, recorder and bring-up.
 
 - node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
-- ports: publishers, subscriptions, status and diagnostics of a node; qos: quality of service
+- ports: publishers, subscriptions, status and diagnostics of a node
+- topics: a topic of the table on ROS: name, quality of service, header
 - local_bus: messages between nodes of one process, without the middleware
 - display: copies of topics for a viewer, few a second
 - claims: one publisher for each topic that a node works on
-- messages: ROS messages to values and back; message_text: to plain data, to print
-- header: stamps and frames; markers: what viewers draw
+- messages: ROS messages to values and back; markers: what viewers draw
 - wire: the same from and to bytes, faster, for the types that carry numbers
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - processors: those that the processes of one lockstep keep to
-- leaving: the system ends a process that the middleware would hold up indefinitely at its end
-- program: ends a program quietly whose imports are interrupted
+- process_signals: signals from the imports of a program to its end; program: that of a node
 - requests: requests to services and their answers; call: one request from a shell
 - conformance: a running driver tested against its contract; driver_probe: the node that does it
 - driver_bench: states and currents of that driver; message_checks, stop_checks: a function for each row

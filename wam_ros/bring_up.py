@@ -18,13 +18,13 @@ from rclpy.node import Node
 from wam_description.configuration import Configuration
 from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
-from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
+from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
-from wam_ros.program import LISTENER_GONE
-from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
+from wam_ros.run import FIRST, LAST, PARENT, Connection, prepare_logging_directory, spin
+from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
 PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one

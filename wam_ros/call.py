@@ -20,10 +20,10 @@ from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
 from wam_ros.messages import read_status
-from wam_ros.qos import qos
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import answer_of, refusal_of, service_request
 from wam_ros.run import Connection
+from wam_ros.topics import qos
 
 PATIENCE: Final = 10.0  # s
 SILENCE: Final = 2.0  # s, after which a topic that comes in every period of the arm has stopped

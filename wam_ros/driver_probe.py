@@ -19,10 +19,9 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import Level, NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_description.transmission_map import TransmissionMap
-from wam_ros.header import stamp_of
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
-from wam_ros.ports import READY, topic_name
-from wam_ros.qos import qos
+from wam_ros.ports import READY
+from wam_ros.topics import qos, stamp_of, topic_name
 
 KEPT = 20_000  # messages of a topic
 SWING = 50  # periods, after which the test current changes its sign

@@ -21,6 +21,7 @@ from wam_description.signals import BASE, NodeStatus, PathPoint, Point, PostureP
 from wam_description.status import pairs, parse
 from wam_description.topics import (
     BOOL,
+    BY_NAME,
     JOINT_STATE,
     LARGEST,
     POINT,
@@ -31,8 +32,8 @@ from wam_description.topics import (
     WRENCH,
     Topic,
 )  # fmt: skip
-from wam_ros.header import header
 from wam_ros.markers import contact_markers
+from wam_ros.topics import header, stamp_of
 
 LONGEST_TRAJECTORY: Final = 1000  # points
 LONGEST_REASON: Final = 400  # characters; a message may hold a name of any length
@@ -283,3 +284,19 @@ def message_type(topic: Topic) -> Any:
 
 def _names(topic: Topic, shared: Shared) -> list[str]:
     return list(shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names)
+
+
+def plain(message: Any, topic: str = "") -> Any:
+    """A message as mappings, lists and numbers; a table of the stack as its rows."""
+    row = BY_NAME.get(topic)
+    if row is not None and row.type == TABLE:
+        table = read_table(message, row.columns, [message.header.frame_id, *[""] * 100])
+        return {
+            "stamp": stamp_of(message),
+            "rows": [dict(zip(row.columns, found, strict=True)) for found in table.rows],
+        }
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, bytes) or hasattr(message, "tolist"):
+        return list(message)
+    return [plain(item) for item in message] if isinstance(message, list) else message

@@ -29,10 +29,11 @@ from wam_description.wiring import Call, Declaration, Followed, Outputs, SetPara
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import Follower, declare, follow_together
-from wam_ros.ports import SECOND, Ports
+from wam_ros.ports import Ports
 from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
+from wam_ros.topics import SECOND
 
 REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
 OUT_OF_TIME = "out of time"  # on a loaded machine all topics of other nodes are, at once

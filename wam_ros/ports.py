@@ -8,7 +8,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
@@ -20,41 +19,27 @@ from wam_description.nodes import NODES
 from wam_description.parameters import listed
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
-from wam_description.topics import STATUS, Topic
+from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
 from wam_ros.display import COPIED, DisplayCopy
-from wam_ros.header import header
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.priority import PRIORITY, set_priority
-from wam_ros.qos import DEPTH, qos
-from wam_ros.run import NAMESPACE, end_of_delivery
+from wam_ros.run import end_of_delivery
 from wam_ros.tolerance import TolerantNode
+from wam_ros.topics import DEPTH, DIAGNOSTICS, SECOND, header, qos, topic_name
 from wam_ros.wire import decoder, encoder, stamp_of
 
-DIAGNOSTICS = "/diagnostics"
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
-CLOCK = "/clock"
 STALE_AFTER = 5  # s without a step, as long as aggregators of diagnostics wait
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
-SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
 LONGEST_ON_ITS_WAY = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
 LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
-
-
-def topic_name(node: Node, topic: Topic) -> str:
-    """The name of a topic at a node: two arms have two clocks, and tools know only one as /clock.
-
-    It is that of the arm in the default namespace; another arm's is 'clock' in its own.
-    """
-    if topic.name == CLOCK and node.get_namespace() != f"/{NAMESPACE}":
-        return CLOCK.strip("/")
-    return topic.name
 
 
 class Ports:

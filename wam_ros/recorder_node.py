@@ -22,12 +22,12 @@ from wam_description.yaml_text import parameter_text
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
-from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY, topic_name
-from wam_ros.qos import DEPTH, qos
+from wam_ros.ports import ENDED, NODE, PUBLISHED, READY
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
+from wam_ros.topics import DEPTH, DIAGNOSTICS, qos, topic_name
 
 DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
 LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced

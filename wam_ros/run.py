@@ -24,15 +24,14 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
-from wam_ros.leaving import bound_leaving
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
+from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
 from wam_ros.processors import keep_to_processors
-from wam_ros.program import LISTENER_GONE, Stop
+from wam_ros.topics import NAMESPACE
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag
-NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
 LONGEST_END = 0.5  # s, for what has arrived before the end
 # s, for the last messages of all nodes of this process together; only a listener that is frozen needs it

@@ -16,7 +16,7 @@ from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
 from wam_description.parameters import meant
 from wam_description.wiring import raised
-from wam_ros.leaving import leaving
+from wam_ros.process_signals import leaving
 
 HELD: Final = 1.0  # s without a further exception, after which a fault is over
 LONGEST: Final = 300  # characters of an exception that are reported

@@ -18,7 +18,7 @@ from wam_cli.main import main
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.topics import BY_NAME
 from wam_description.yaml_text import parameter_text
-from wam_ros.qos import qos
+from wam_ros.topics import qos
 from wam_sim.recorded_parameters import recorded_parameters
 
 MESSAGES = {"/left": 30, "/right": 40}

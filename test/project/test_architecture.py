@@ -137,6 +137,23 @@ def complaints(root: Path) -> list[str]:
     return found
 
 
+def circles(root: Path) -> list[str]:
+    """Modules of one package that import each other in a circle."""
+    modules = modules_under(root)
+    below: dict[str, set[str]] = {}
+    for name, tree in modules.items():
+        is_package = (root / name.replace(".", "/") / "__init__.py").is_file()
+        targets = {target for target, _ in imports_of(name, tree, is_package)}
+        targets |= {target.rpartition(".")[0] for target in targets}  # what is imported may be a name in a module
+        own = name.split(".")[0]
+        below[name] = {to for to in targets & modules.keys() - {name} if to.split(".")[0] == own}
+    while ends := {name for name, targets in below.items() if not targets & below.keys()}:
+        below = {name: targets for name, targets in below.items() if name not in ends}
+    while tops := below.keys() - {to for targets in below.values() for to in targets}:
+        below = {name: targets for name, targets in below.items() if name not in tops}
+    return sorted(below)
+
+
 def source_lines(root: Path) -> Counter[str]:
     """Lines of each package."""
     paths = [path for package in ARROWS for path in root.glob(f"{package}/**/*.py")]
@@ -149,6 +166,18 @@ def source_lines(root: Path) -> Counter[str]:
 @pytest.mark.slow
 def test_every_module_obeys_the_architecture():
     assert complaints(ROOT) == []
+
+
+@pytest.mark.slow
+def test_no_module_of_a_package_imports_itself_through_others():
+    assert circles(ROOT) == []
+
+
+def test_a_planted_circle_is_found(tmp_path):
+    plant_a_sound_tree(tmp_path)
+    assert circles(tmp_path) == []
+    (tmp_path / "wam_driver" / "amplifier.py").write_text("def step():\n    from wam_driver import plant")
+    assert circles(tmp_path) == ["wam_driver.amplifier", "wam_driver.plant"]
 
 
 def test_no_package_holds_more_than_a_third_of_the_source():

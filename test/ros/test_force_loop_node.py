@@ -14,9 +14,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO, State, Wrench
 from wam_description.topics import BY_NAME
-from wam_ros.header import stamp_of
 from wam_ros.messages import joint_state, message_type, wrench_stamped
-from wam_ros.qos import qos
+from wam_ros.topics import qos, stamp_of
 
 MS = 1_000_000
 NAMES = list(ARM.joints.names)

@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME
 from wam_ros.messages import diagnostic_status
-from wam_ros.qos import qos
+from wam_ros.topics import qos
 
 
 def answered(request: Any, response: Any) -> Any:

@@ -10,9 +10,8 @@ from test_nodes import ARM, MS, SIX, changed, make
 from wam_description.signals import Level, NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
-from wam_ros.header import stamp_of
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.qos import qos
+from wam_ros.topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
 LIMIT = 50 * MS  # ns of the arm's time, from the last answer of a node to zero current

@@ -13,7 +13,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState, PointCloud2
 
 from wam_description.signals import Level, NodeStatus, Point, State, Table, Wrench
-from wam_ros.header import header, stamp_of
 from wam_ros.messages import (
     Refused,
     diagnostic_status,
@@ -27,6 +26,7 @@ from wam_ros.messages import (
     table,
     wrench_stamped,
 )
+from wam_ros.topics import header, stamp_of
 
 NAMES = ["motor1", "motor2", "motor3", "motor4"]
 FRAMES = ("base", "inner_link", "outer_link")

@@ -26,11 +26,10 @@ from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
 from wam_ros.display import COPIED, copy_name
-from wam_ros.header import stamp_of
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status, wrench_stamped
 from wam_ros.node import make_node
 from wam_ros.ports import READY
-from wam_ros.qos import DEPTH, qos
+from wam_ros.topics import DEPTH, qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
 WAM = Configuration.load(packaged("wam"))

@@ -22,9 +22,9 @@ from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
 from wam_ros.bring_up import Processes
-from wam_ros.leaving import HELD_UP as HELD_UP_BY
-from wam_ros.leaving import bound_leaving, leaving
-from wam_ros.qos import qos
+from wam_ros.process_signals import HELD_UP as HELD_UP_BY
+from wam_ros.process_signals import bound_leaving, leaving
+from wam_ros.topics import qos
 
 ROOT = Path(__file__).parents[2]
 NODES = 7  # six and the recorder
@@ -474,7 +474,7 @@ def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any
     from sensor_msgs.msg import JointState
 
     from wam_description.topics import BY_NAME
-    from wam_ros.qos import qos
+    from wam_ros.topics import qos
 
     said: list[str] = []
     states: list[Any] = []
@@ -743,7 +743,7 @@ run({"sender": Sender})
 def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
     listener_gone: bool, started: Any, domain_id: int
 ) -> None:
-    from wam_ros.program import LISTENER_GONE
+    from wam_ros.process_signals import LISTENER_GONE
 
     stack = started("-c", REPORT_THE_DELIVERY)
     wait(lambda: "made" in stack.said() or stack.process.poll() is not None, "the node")
@@ -759,7 +759,7 @@ def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
 def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
     number: signal.Signals, is_announced: bool, recording: Processes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wam_ros.program import LISTENER_GONE
+    from wam_ros.process_signals import LISTENER_GONE
 
     sent: list[int] = []
     monkeypatch.setattr(subprocess.Popen, "send_signal", lambda process, number: sent.append(number))

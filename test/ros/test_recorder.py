@@ -44,11 +44,10 @@ from wam_description.parameters import ParameterError, flatten
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.bring_up import Composition
-from wam_ros.header import header
 from wam_ros.messages import diagnostic_status, message_type, read_status
-from wam_ros.qos import qos
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
+from wam_ros.topics import header, qos
 
 CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
 ROOT = Path(__file__).parents[2]

@@ -25,11 +25,10 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
-from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type
 from wam_ros.node import make_node
-from wam_ros.qos import qos
 from wam_ros.tolerance import HELD, TolerantNode
+from wam_ros.topics import header, qos
 
 WAM = Configuration.load(packaged("wam"))
 SEED = 20261120

@@ -18,7 +18,7 @@ from wam_cli.commands.replay import other_values, reasons, stated
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
-from wam_ros.header import stamp_of
+from wam_ros.topics import stamp_of
 from wam_sim.recording import recorded_run
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 

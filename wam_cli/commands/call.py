@@ -24,7 +24,7 @@ from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
 from wam_ros.call import SILENCE, START, CalledStack, Reply
-from wam_ros.message_text import plain
+from wam_ros.messages import plain
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "enable": ("release the brakes", (Call("driver", "enable", True),)),

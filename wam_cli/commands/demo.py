@@ -25,7 +25,7 @@ from wam_control.task.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, require_parameters
 from wam_description.status import DONE
-from wam_ros.program import end_at_once_on_signals
+from wam_ros.process_signals import end_at_once_on_signals
 from wam_sim.recording import recorded_run
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 

@@ -11,7 +11,7 @@ from wam_cli.commands import is_paced, processes_of
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_description.nodes import ONE
-from wam_ros.program import Stop, end_at_once_on_signals
+from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_sim.simulated_bag import record
 
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
@@ -68,7 +68,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
     from wam_cli.commands.up import import_nodes
     from wam_ros.bring_up import start
     from wam_ros.network import move_to_free_domain
-    from wam_ros.run import NAMESPACE
+    from wam_ros.topics import NAMESPACE
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     import_nodes(configuration, given)

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from wam_cli.commands import PAGE, writable_directory, writable_file
-from wam_ros.program import Stop
+from wam_ros.process_signals import Stop
 from wam_studies.experiment_runs import record
 from wam_studies.thesis.definition import Experiment, Run, load, names
 from wam_studies.thesis.evaluation import evaluate, text

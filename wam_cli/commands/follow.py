@@ -3,8 +3,9 @@
 import argparse
 
 from wam_cli.commands import namespace, of_installation
-from wam_ros.program import Stop, end_at_once_on_signals
-from wam_ros.run import NAMESPACE, die_with_parent
+from wam_ros.process_signals import Stop, end_at_once_on_signals
+from wam_ros.run import die_with_parent
+from wam_ros.topics import NAMESPACE
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -31,8 +31,8 @@ from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_ros.bring_up import Composition
 from wam_ros.network import move_to_free_domain
-from wam_ros.program import Stop
-from wam_ros.run import NAMESPACE
+from wam_ros.process_signals import Stop
+from wam_ros.topics import NAMESPACE
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
 from wam_studies.identification.excitation import scenario

@@ -12,8 +12,9 @@ from typing import Final
 from wam_cli.commands import namespace, take_port
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
-from wam_ros.program import Stop, end_at_once_on_signals
-from wam_ros.run import NAMESPACE, PARENT, die_with_parent
+from wam_ros.process_signals import Stop, end_at_once_on_signals
+from wam_ros.run import PARENT, die_with_parent
+from wam_ros.topics import NAMESPACE
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 5.0  # s, after which a page that is not there yet is reported

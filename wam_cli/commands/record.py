@@ -12,8 +12,8 @@ from wam_ros.bring_up import parameter_file
 from wam_ros.call import CalledStack
 from wam_ros.node import node_makers
 from wam_ros.recorder_interface import RecorderInterface
-from wam_ros.run import NAMESPACE
 from wam_ros.run import run as run_node
+from wam_ros.topics import NAMESPACE
 
 RECORDER = RecorderInterface.name
 

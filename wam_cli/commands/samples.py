@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from wam_cli.commands.experiment import play
-from wam_ros.program import Stop
+from wam_ros.process_signals import Stop
 from wam_studies.thesis.definition import Experiment, load, names, tasks
 from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 

@@ -20,8 +20,9 @@ from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_ros.bring_up import start
 from wam_ros.node import node_factory
-from wam_ros.program import Stop, end_at_once_on_signals
-from wam_ros.run import NAMESPACE, die_with_parent
+from wam_ros.process_signals import Stop, end_at_once_on_signals
+from wam_ros.run import die_with_parent
+from wam_ros.topics import NAMESPACE
 
 WHERE = {
     ONE: "this process",

@@ -8,7 +8,7 @@ from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
 from wam_cli.commands import RERUN, take_arm, take_port, writable_file
 from wam_live.page import free_port, needing_viser
-from wam_ros.program import Stop
+from wam_ros.process_signals import Stop
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -20,9 +20,9 @@ from wam_description.interface import Interface
 from wam_description.signals import NodeStatus, State, Wrench
 from wam_ros.bring_up import parameter_file
 from wam_ros.messages import message_type, read_status
-from wam_ros.qos import qos
 from wam_ros.requests import answer_of, switch_request
-from wam_ros.run import NAMESPACE, Connection
+from wam_ros.run import Connection
+from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import Decode, decoder, encoder, stamp_of
 
 ANSWERS: Final = {  # a topic that each node publishes in every outer period or more often

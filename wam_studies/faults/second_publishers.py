@@ -13,7 +13,7 @@ from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
 from wam_description.configuration import Configuration
-from wam_ros.run import NAMESPACE
+from wam_ros.topics import NAMESPACE
 from wam_ros.wire import LITTLE_ENDIAN, stamp_of
 from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
 from wam_studies.faults.trials import FaultTrial

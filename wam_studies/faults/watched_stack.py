@@ -17,9 +17,8 @@ from wam_description.signals import State, Wrench
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type
-from wam_ros.qos import qos
 from wam_ros.requests import answer_of, switch_request
-from wam_ros.run import NAMESPACE
+from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import Encode, encoder, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves

@@ -4,6 +4,7 @@ tasks          what is commanded on what: pose, surface, force, ramp, feedback a
 surfaces       the plane or rod of a task: where it is, and whether the arm is clear of it at the start
 trial          one task in simulation: true force, motion, impact (3.1), and what the loop reports
 outcome        done, refused, ended with a reason, or silent; cycles and overshoot
+groupings      the classes into which tasks are divided
 study          many tasks in the harness; picture draws them
 usual_tasks    the tasks by which the loop was first measured, position estimated and pinned (docs/force.md)
 elbow          a wall ahead and a rod at the side of a nearly straight arm (docs/force.md)

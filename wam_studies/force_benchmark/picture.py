@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 
 from wam_analysis.drawing import BETWEEN, COMMANDED, REFUSED, RIGHT, WRONG
 from wam_studies.figures.style import GREY, panels
+from wam_studies.force_benchmark.groupings import FEEDBACK, FORCE, MOTORS, POSE, SENSORS, STIFFNESS, TaskGrouping
 from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd
-from wam_studies.force_benchmark.study import FEEDBACK, FORCE, MOTORS, POSE, SENSORS, STIFFNESS, TaskGrouping
 from wam_studies.force_benchmark.trial import ForceTrial
 
 COLOURS = {

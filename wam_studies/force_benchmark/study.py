@@ -2,89 +2,32 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
+from wam_studies.force_benchmark.groupings import (
+    FEEDBACK,
+    GROUPINGS,
+    MOTORS,
+    POSE,
+    POSITION,
+    SENSORS,
+    TARE,
+    contact_of,
+    course_of,
+    unknown_of,
+)  # fmt: skip
 from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd
-from wam_studies.force_benchmark.tasks import RANGES, Task, draw, task_values
+from wam_studies.force_benchmark.tasks import RANGES, draw, task_values
 from wam_studies.force_benchmark.trial import ForceTaskCase, ForceTrial, play
 from wam_studies.harness import Study, option
 from wam_studies.scores import NONE_AT_ALL, FailedCase, Row, Scores, ScoreTable, exact, share
 
-SENSORS, MOTORS = "joint sensors", "motors with dither"
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
-STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000": 4e5}  # N/m
-FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
-MOTIONS = ("at rest", "moves along the force", "moves across it")
-UNKNOWNS = ("masses, friction, cables, constants", "a payload, too", "the law of friction, too")
-COURSES = ("one force", "another force first", "small force for long")
 NUMBER = re.compile(r"(?:(?<!\+)[-+])?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-
-
-class TaskGrouping(NamedTuple):
-    """A way to divide the tasks: its title, its classes in order, and the class of a task."""
-
-    title: str
-    classes: Sequence[str]
-    of: Callable[[Task], str]
-
-    def trials(self, every: Sequence[ForceTrial], name: str) -> list[ForceTrial]:
-        """Those of a class."""
-        return [trial for trial in every if self.of(trial.task) == name]
-
-
-def _below(ends: dict[str, float], value: float) -> str:
-    return next((name for name, end in ends.items() if value <= end), list(ends)[-1])
-
-
-def _contact(task: Task) -> str:
-    if task.surface.is_plane:
-        return "plane at the tip"
-    return f"rod across the {task.surface.cover.replace('_', ' ')}"
-
-
-def _motion(task: Task) -> str:
-    surface = task.surface
-    is_across = surface.speed <= 1e-6 * surface.slide_speed  # apart from rounding
-    return MOTIONS[0] if not surface.frequency else MOTIONS[2] if is_across else MOTIONS[1]
-
-
-def _unknown(task: Task) -> str:
-    conditions = task.conditions
-    return UNKNOWNS[1] if conditions.payload else UNKNOWNS[2] if conditions.asymmetry else UNKNOWNS[0]
-
-
-def _course(task: Task) -> str:
-    return COURSES[2] if task.longer > 1.0 else COURSES[bool(task.before)]
-
-
-FEEDBACK = TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.conditions.is_dithered else SENSORS)
-STIFFNESS = TaskGrouping(
-    "stiffness [N/m]", tuple(STIFFNESS_ENDS), lambda task: _below(STIFFNESS_ENDS, task.surface.stiffness)
-)
-POSE = TaskGrouping("pose", tuple(RANGES.poses), lambda task: task.pose)
-FORCE = TaskGrouping("force [N]", tuple(FORCE_ENDS), lambda task: _below(FORCE_ENDS, task.force))
-POSITION = TaskGrouping(
-    "contact position", ("pinned", "estimated"), lambda task: "pinned" if task.conditions.is_pinned else "estimated"
-)
-TARE = TaskGrouping("tare", ("tared", "not tared"), lambda task: "tared" if task.conditions.is_tared else "not tared")
-GROUPINGS = (
-    FEEDBACK,
-    STIFFNESS,
-    POSE,
-    FORCE,
-    TaskGrouping("contact", ("plane at the tip", "rod across the outer link", "rod across the inner link"), _contact),
-    POSITION,
-    TARE,
-    TaskGrouping("surface", MOTIONS, _motion),
-    TaskGrouping("forces", ("one", "two at once"), lambda task: "two at once" if task.second else "one"),
-    TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.conditions.ramp else "step"),
-    TaskGrouping("course", COURSES, _course),
-    TaskGrouping("not known", UNKNOWNS, _unknown),
-)
 
 
 @dataclass(frozen=True)
@@ -133,9 +76,9 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
         lines = [
             f"task {record.number} of seed {record.seed}: {result.outcome.value}; {_numbers(record)}",
             f"  pose ({', '.join(f'{angle:.3f}' for angle in task.q)}) rad, {task.pose}",
-            f"  {_contact(task)}: {surface.position:.3f} m of {surface.cover}, along ({along})",
+            f"  {contact_of(task)}: {surface.position:.3f} m of {surface.cover}, along ({along})",
             f"  surface of {surface.stiffness:.4g} N/m, friction {surface.friction:.2f}; ramp of {ramp:.2g} s",
-            f"  {_course(task)}{first}; not known: {_unknown(task)}",
+            f"  {course_of(task)}{first}; not known: {unknown_of(task)}",
             f"  feedback from {FEEDBACK.of(task)}; contact position {POSITION.of(task)}; {TARE.of(task)}",
             f"  force gain {result.gain:.3g} m/s/N",
         ]
