@@ -785,6 +785,7 @@ def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     assert "FAILED: step 'lower onto nothing'" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_during_the_report_of_a_demo_leaves_where_the_recording_is_and_how_to_report_it(number):
     """The signal comes where the report begins, as it imports its modules."""
@@ -1491,6 +1492,7 @@ def test_broken_opengl_falls_back_to_a_drawing(tmp_path):
     assert (tmp_path / "demo.png").stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_each_position():
     """A force of 8.4 N at 0.25 m, measured at the configured 0.28 m: less there, 8.4 N at the true position."""
     sample = read(Path(__file__).parents[2] / "bags" / "sample" / "wam-touch", ["status"], may_lack=True)

@@ -480,6 +480,7 @@ OTHER_CLOCKS: dict[str, Callable[[float], float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clock", list(OTHER_CLOCKS))
 @pytest.mark.parametrize("whose", ["state", "command"])
 def test_a_command_by_another_clock_is_that_of_the_motion(clock: str, whose: str, tmp_path: Path) -> None:
@@ -635,6 +636,7 @@ GOES_OVER = (
 NOT_COMPARED = "/ft/wrench (tool), in the frame tool, is not compared with the command /ft/command, in the frame base."
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("frame_at", "measured_at", "doubt"),
     [(12.0, 99.0, GOES_OVER), (99.0, 9.0, NOT_COMPARED), (12.0, 12.0, GOES_OVER)],
@@ -708,6 +710,7 @@ def test_a_mapped_mcap_of_json_is_read(tmp_path: Path) -> None:
         found((tmp_path / "bag.mcap", wrong))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
 def test_a_stamp_in_another_unit_is_refused_until_the_unit_is_given(unit: str, factor: float, tmp_path: Path) -> None:
     """Taken as seconds, an inertia of 0.5 kg m2 became one of 5e5."""
@@ -900,6 +903,7 @@ def test_corners_of_a_cycle_are_not_cut_off(shape: str, jitter: float, tmp_path:
     assert found.measured == pytest.approx(0.01, rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "at"), [(2.7, 9.68), (3.83, 7.53), (6.1, 12.0)])
 def test_a_cycle_is_found_on_both_sides_of_a_jump(frequency: float, at: float, tmp_path: Path) -> None:
     time = times(20.0, 200.0)
@@ -909,6 +913,7 @@ def test_a_cycle_is_found_on_both_sides_of_a_jump(frequency: float, at: float, t
     assert sizes == pytest.approx([0.01, 0.01], rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [3.0, 6.0, 10.0])
 def test_a_slow_ring_down_is_no_limit_cycle_in_any_of_its_parts(tau: float, tmp_path: Path) -> None:
     time = times(20.0)

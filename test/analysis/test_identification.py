@@ -297,6 +297,7 @@ def test_states_that_are_missing_or_braked_are_not_used() -> None:
     assert not ((samples.time > 8.95) & (samples.time < 9.55)).any()
 
 
+@pytest.mark.slow
 def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_have(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -669,6 +669,7 @@ def test_a_cycle_in_a_part_of_a_recording_is_found_with_its_ends(length, frequen
     assert [1.0 / one.cycle.period for one in found] == pytest.approx([frequency] * len(spans), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.02, 0.1325, 0.1766])
 def test_a_swept_frequency_is_no_cycle(rate):
     time = np.arange(10000) / 250.0
@@ -677,6 +678,7 @@ def test_a_swept_frequency_is_no_cycle(rate):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("decay", "frequency"), [(1.5, 6.0), (5.0, 6.0), (-5.0, 6.0), (-10.0, 2.0)])
 def test_what_decays_or_grows_in_a_part_of_a_recording_is_no_cycle(decay, frequency):
     time = np.arange(10000) / 250.0

@@ -117,6 +117,7 @@ def merged(parts: list[Path], file: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: Path) -> None:
     """The parameters and the counts of the arm that came first were lost."""
     sections, files = Configuration.load(packaged("wam")).sections, []

@@ -1,11 +1,14 @@
 """What would help a refused force is in the status of the force loop, which looks for it in several periods."""
 
+import pytest
+
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import BASE, ForceCommand, NodeStatus
 from wam_sim.simulation import Simulation
 
 
+@pytest.mark.slow
 def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     steps = [
         ScenarioStep("release", 0.05, request="enable"),
@@ -33,6 +36,7 @@ def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
     assert refusals == [f"{newtons} N is commanded" for newtons in (70, 90)]
 
 
+@pytest.mark.slow
 def test_a_force_that_began_while_the_arm_moved_has_the_reason_of_the_arm_at_rest() -> None:
     heavy = Configuration.load(packaged("wam")).with_values({"driver:mismatch.payload": 0.3})
     steps = [

@@ -155,6 +155,7 @@ def test_a_push_on_the_inner_link_whose_torques_are_those_of_one_along_the_outer
     assert inner.moment[1] == pytest.approx(-2.4, rel=0.05)
 
 
+@pytest.mark.slow
 def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
     """In the pose of now, 20 ms later than that of the torques, the place was off by 17 mm."""
     arm, estimator = RigidArm(ARM, (0.2, -1.05, 0.3, 0.5), friction=0.0), ContactEstimator(ARM, TIMING, SENSORS)
@@ -212,6 +213,7 @@ def test_a_second_contact_is_noticed_by_the_change_of_the_torques(
     assert not any(estimate.contacts > 1 for estimate in after_steady_contact(cover, x, force, 0.0))
 
 
+@pytest.mark.slow
 def test_a_second_contact_is_reported_once_in_a_contact_if_it_lasts() -> None:
     arm, node = plant(TILTED), ContactEstimatorNode(CONFIGURATION.shared, SENSORS)
     reported = []
@@ -236,6 +238,7 @@ def test_a_second_contact_is_reported_once_in_a_contact_if_it_lasts() -> None:
     assert end > 2000
 
 
+@pytest.mark.slow
 def test_a_second_contact_is_certain_where_friction_of_the_first_could_not_be_it() -> None:
     """Of 8 N, friction with a coefficient of 0.8 that turns back is 12.8 N at 0.3 m, as 38 N at 0.1 m across it."""
     for force, share in (((0.0, 6.0, 0.0), 0.0), ((0.0, 18.0, 0.0), 0.0), ((0.0, 0.0, 18.0), 0.5)):
@@ -285,6 +288,7 @@ def test_a_force_along_the_link_is_no_second_contact_when_the_arm_turns(
     assert {estimate.contacts for estimate in found[30:]} == {1}
 
 
+@pytest.mark.slow
 def test_vibration_after_a_contact_is_no_new_one() -> None:
     """At 60 Hz, which passes the faster filter: after a contact it is that of the cables, later a contact."""
     transmission, body = TransmissionMap.of(ARM), RigidBody(ARM, MOTORS.observer.mass_scale)

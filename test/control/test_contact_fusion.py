@@ -87,6 +87,7 @@ def errors(stays: float) -> np.ndarray:
     return np.array([[(one.position - PLACE, one.position_sd) for one in (found[0], found[-1])] for found in ends])
 
 
+@pytest.mark.slow
 def test_errors_that_change_average_out_and_the_stated_ones_with_them() -> None:
     found = errors(0.0)
     error = np.quantile(np.abs(found[:, :, 0]), 0.68, axis=0)
@@ -96,6 +97,7 @@ def test_errors_that_change_average_out_and_the_stated_ones_with_them() -> None:
     assert np.mean(ratio < 2.0) > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.2, 0.8])
 def test_a_contact_that_slides_along_the_link_is_where_it_has_come_to(speed: float) -> None:
     """And one that stays there is known as well as stated, too."""
@@ -126,6 +128,7 @@ def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> No
         assert probability_of_slide(torques, covariance, slide) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_errors_that_stay_are_not_taken_for_new_knowledge() -> None:
     found = errors(0.9)
     stated = np.median(found[:, :, 1], axis=0)

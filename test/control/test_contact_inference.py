@@ -497,6 +497,7 @@ def payload_rows() -> list[str]:
     return rows
 
 
+@pytest.mark.slow
 def test_the_odds_of_a_payload_are_those_of_the_table_in_the_page() -> None:
     page = (Path(__file__).parents[2] / "docs" / "estimator.md").read_text(encoding="utf-8")
     missing = [row for row in payload_rows() if row not in page]

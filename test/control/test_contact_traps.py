@@ -42,6 +42,7 @@ def felt_while_sliding(arm: Arm, observer: MomentumObserver, ticks: int, frictio
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_truth_does_not_share_masses_and_friction_with_the_estimator() -> None:
     """With shared ones the residual is zero and every error looks like 0.00 cm."""
     assert set(PARAMETERS.observer.mass_scale) != {1.0}
@@ -54,6 +55,7 @@ def test_truth_does_not_share_masses_and_friction_with_the_estimator() -> None:
         assert len({*scenario.values["driver:mismatch.mass"], *scenario.values["driver:mismatch.motor_friction"]}) == 8
 
 
+@pytest.mark.slow
 def test_a_textbook_differential_mistakes_gravity_for_a_push() -> None:
     """Motors averaged, (m2 + m3)/2 and (m3 - m2)/2, without the 2:1 of (A.5)."""
     matrix = np.array(ARM.joint_from_motor).reshape(4, 4)

@@ -72,6 +72,7 @@ def on_the_inner_link() -> Iterator[Period]:
         yield turned(0.3), 8.0, "inner_link", ON_INNER, True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "before", "after", "reaction"),
     [

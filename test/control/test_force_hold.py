@@ -300,6 +300,7 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     assert loop.reaction is not ForceReaction.OTHER_LINK
 
 
+@pytest.mark.slow
 def test_a_force_is_not_controlled_while_a_second_contact_is_suspected() -> None:
     """At a pinned position the torques decide: those of the commanded force alone are no second contact's."""
     one = Contact("outer_link", 0.28, (0.0, 1.0, 0.0), 0.001, 0.99)
@@ -346,6 +347,7 @@ def other_link(newtons: float) -> Contact:
     return Contact("inner_link", math.nan, (0.0, newtons, 0.0), math.nan, 0.99)
 
 
+@pytest.mark.slow
 def test_a_contact_of_which_the_link_stays_unknown_ends_the_command() -> None:
     """Pressed on, the force could be many times the commanded one."""
     vague = Contact("outer_link", 0.0, (0.0, 1.0, 0.0), 0.001, 0.55)
@@ -501,6 +503,7 @@ DOWNWARDS = (0.0, 0.0, -1.0)
 
 
 # -------------------------------------------------------------------------------------- limits
+@pytest.mark.slow
 def test_a_way_through_free_space_ends_with_a_reason() -> None:
     own = replace(PINNED, limits=replace(GIVEN.limits, free_travel=0.05), posture_gain=0.0)
     loop, world = force_loop(ARM, own), World(1e-9)
@@ -520,6 +523,7 @@ def test_a_way_through_free_space_ends_with_a_reason() -> None:
     assert "along the force since the force last was right, or rose" in loop.reason
 
 
+@pytest.mark.slow
 def test_pressing_is_no_free_travel() -> None:
     own = replace(PINNED, limits=replace(GIVEN.limits, free_travel=0.01))
     loop, world = force_loop(ARM, own), World(400.0, force=2.0)
@@ -529,6 +533,7 @@ def test_pressing_is_no_free_travel() -> None:
     assert world.force == pytest.approx(9.0, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("presses", "surface_speed", "back"),
     [(9.0, 0.0, True), (5.25, 0.0, True), (5.25, 2.5e-3, False), (2.0, 0.0, False)],
@@ -556,6 +561,7 @@ def test_what_presses_against_the_force_or_goes_away_is_followed_no_further_than
     assert ("gone back by" if back else "since the force last was right, or rose") in loop.reason
 
 
+@pytest.mark.slow
 def test_a_posture_that_leads_along_a_slope_is_no_push() -> None:
     """The force is right, and the arm goes back against it, as on a slope that rises."""
     limits = replace(GIVEN.limits, free_travel=0.01)
@@ -982,6 +988,7 @@ def test_a_force_that_was_reached_and_is_lost_is_reported_soon() -> None:
     assert loop.reaction is ForceReaction.NOT_REACHED
 
 
+@pytest.mark.slow
 def test_an_approach_that_takes_long_is_called_so() -> None:
     loop, world = force_loop(ARM, STIFF), World(1e-9)
     for _ in range(410):
@@ -1159,6 +1166,7 @@ def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded(p
     assert (speeds[1] < 0.0) if pushed > 5.0 else speeds[1] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "free_travel", "forces"), [(400.0, 0.05, (5, 30, 5, 30)), (4000.0, 0.01, (50, 5))]
 )

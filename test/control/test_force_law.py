@@ -178,6 +178,7 @@ def test_a_force_that_turns_or_flips_is_measured_with_the_right_sign_at_once() -
     assert ask(loop, World(400.0, force=5.0), down(-5.0)).measured == pytest.approx(down(5.0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_another_frame_begins_without_the_answers_still_delayed() -> None:
     speeds = {}
     for frame in ("base", "inner_link"):
@@ -213,6 +214,7 @@ def measured_across(torque: list[float]) -> ForceOutput:
     return loop.step(State(POSE, STILL, torque), world.sensors, NO_CONTACT, None, command, None, None, DT)
 
 
+@pytest.mark.slow
 def test_brakes_and_faults_make_the_loop_forget_filter_and_delayed_answers() -> None:
     braked, driven = measured_across(STILL), measured_across(DRIVEN)
     assert braked.measured == pytest.approx(down(3.0), abs=1e-6)

@@ -267,6 +267,7 @@ def test_a_share_of_the_dry_friction_is_fed_forward_along_the_commanded_motion(s
     assert not any(ask(force_loop(ARM, dithered), World(400.0), down(8.0), external=STILL).effort)
 
 
+@pytest.mark.slow
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
     loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
     stiffness, commanded = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
@@ -448,6 +449,7 @@ def test_a_posture_that_moves_faster_than_the_arm_follows_is_reported(speed: flo
     assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in loop.reason) is is_late
 
 
+@pytest.mark.slow
 def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported() -> None:
     limits = replace(OWN.limits, settling_time=0.5)
     loop, world = force_loop(ARM, replace(OWN, limits=limits, force_rate_limit=2.0)), World(400.0)

@@ -103,6 +103,7 @@ def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
     assert result.mean == pytest.approx(5.0, rel=0.06)
 
 
+@pytest.mark.slow
 def test_the_guard_counts_a_payload() -> None:
     """Its margin is that of the loaded arm."""
     own = CONFIGURATION.node("force_loop", ForceLoopParameters)

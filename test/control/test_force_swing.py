@@ -69,6 +69,7 @@ def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     assert loop.reaction is ForceReaction.NONE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("feedback", "swing", "surface_speed", "share"),
     [
@@ -125,6 +126,7 @@ def test_errors_of_torques_count_less_than_friction_in_what_is_reported() -> Non
         assert loop.reaction is reaction, out.axis.force_sd
 
 
+@pytest.mark.slow
 def test_an_error_of_the_measured_force_leaves_less_to_what_is_not_known() -> None:
     """8 % are measured, and 7 % are not known: the true force may well be off by more than 10 %."""
     loop = force_loop(ARM, PINNED)

@@ -57,6 +57,7 @@ def test_dynamics_between_motor_and_sensor_limit_the_torque_loop_and_not_the_vel
     assert largest_gain(period_map(bare), torque.gain(bare)) < 0.05 * largest_gain(period_map(arm), torque.gain(arm))
 
 
+@pytest.mark.slow
 def test_torque_loop_of_a_rotor_on_a_held_cable_by_hand() -> None:
     """U = -g (k theta + e theta'), late by half a period of the hold, on J theta'' + (d + b) theta' + k theta.
 
@@ -110,6 +111,7 @@ def test_reference_of_the_position_loop_is_no_further_than_peak_torque_holds_and
     assert abs(torque(0.0, 0.0)) < 1e-9, "brakes"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torque-loop", "position-loop"])
 def test_either_loop_presses_in_the_stack_and_is_replayed_bit_for_bit(name: str, tmp_path: Path) -> None:
     configuration = Configuration.load(packaged(name)).with_values({"timing.outer_divisor": 5})

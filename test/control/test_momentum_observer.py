@@ -77,6 +77,7 @@ def test_residual_reaches_63_percent_of_a_step_after_the_time_constant() -> None
         np.testing.assert_allclose(rows[99 + ticks], expected, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensors", "cycle"), [(True, 0), (False, 0), (False, 40)])
 def test_the_pose_is_as_late_as_the_torques(sensors: bool, cycle: int) -> None:
     """In the pose of now the same force has other torques: a contact would be found elsewhere."""
@@ -344,6 +345,7 @@ def test_motors_without_current_at_rest_give_no_estimate() -> None:
     assert not observer.is_ready
 
 
+@pytest.mark.slow
 def test_same_samples_give_the_same_bits() -> None:
     runs = [swing(MomentumObserver(ARM, NOMINAL, False), RigidArm(ARM, POSE, 1.0), 0.2) for _ in range(2)]
     assert np.array_equal(*runs)
@@ -362,6 +364,7 @@ def test_finite_values_whose_sum_overflows_are_refused_and_do_not_end_the_node()
     assert not observer.observe(State(huge, huge, huge), DT)
 
 
+@pytest.mark.slow
 def test_errors_that_are_larger_than_stated_widen_what_is_published_detected_and_compared() -> None:
     """The same signals with errors in free motion of three times the variance: so has every covariance of torques."""
     covariances = []

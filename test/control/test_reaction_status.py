@@ -118,6 +118,7 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     assert math.isnan(settling_time_in([], steps[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "torques", "seconds", "failure", "unassessed"),
     [
@@ -140,6 +141,7 @@ def test_a_sweep_states_each_torque_that_is_not_reached_or_too_short(
         assert bool(given) == bool(words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "value", "failure"),
     [
@@ -160,6 +162,7 @@ def test_a_sweep_states_each_motion_that_is_not_reached(kind: AxisKind, value: f
     assert not found.unassessed
 
 
+@pytest.mark.slow
 def test_a_posture_that_the_force_loop_refuses_is_a_failure_of_a_sweep() -> None:
     step = ScenarioStep("go", 1.0, posture=(0.1, -1.2, 0.0, 1.0))
     found = swept([0.0, -1.2, 0.0, 1.0], step, {"force_loop:mode": "joint_torque"})

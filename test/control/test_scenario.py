@@ -391,6 +391,7 @@ def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) ->
 FOR_NOTHING = "step 'go': it commanded the arm, and the brakes were on; give it, or a step before it, 'request: enable'"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [ScenarioStep("go", 0.2, tuple(GOAL)), ScenarioStep("go", 0.1, force=PRESS)])
 def test_a_scenario_that_commands_an_arm_which_nobody_has_enabled_fails(step: ScenarioStep) -> None:
     run = Simulation(CONFIGURATION, [ScenarioStep("wait", 0.05), step, ScenarioStep("never", 1.0)])
@@ -399,6 +400,7 @@ def test_a_scenario_that_commands_an_arm_which_nobody_has_enabled_fails(step: Sc
     assert Simulation(CONFIGURATION, [step]).play().startswith(FOR_NOTHING), "the last step, too"
 
 
+@pytest.mark.slow
 def test_whoever_enables_the_arm_a_scenario_may_command_it() -> None:
     steps = [ScenarioStep("go", 0.1, tuple(START)), ScenarioStep("stop", 0.02, request="disable")]
     assert Simulation(CONFIGURATION, [ScenarioStep("on", 0.05, request="enable"), *steps]).play() == ""
@@ -408,6 +410,7 @@ def test_whoever_enables_the_arm_a_scenario_may_command_it() -> None:
     assert run.play() == ""
 
 
+@pytest.mark.slow
 def test_a_braked_arm_may_be_pushed() -> None:
     push = Push("outer_link", 0.3, (0.0, 5.0, 0.0), 0.0, 0.1)
     assert Simulation(CONFIGURATION, [ScenarioStep("push", 0.1, push=push)]).play() == ""
@@ -616,6 +619,7 @@ def test_where_the_arm_begins_is_known_only_of_a_simulated_one(tmp_path: Path) -
     assert len(load_for(CONFIGURATION.with_values({"nodes": others}), str(path))) == 1
 
 
+@pytest.mark.slow
 def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_limit() -> None:
     least, short = 1.2, 0.8
     pose, goal = (0.0, -1.8, 0.0, 1.45), (0.0, -1.8, 0.0, 0.25)
@@ -651,6 +655,7 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
     return ScenarioStep("go", 1.0, settings=(Setting(node, name, value),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "text"),
     [
@@ -838,6 +843,7 @@ def test_numbers_of_a_step_made_in_python_are_those_of_a_file(
     assert repr(taken) == repr(read), "equal, and of the same types"
 
 
+@pytest.mark.slow
 def test_a_trajectory_of_lists_is_played() -> None:
     lists = PosturePath(cast(Any, [PathPoint(cast(Any, GOAL), cast(Any, [0] * 4), cast(Any, Fraction(2)))]))
     run = Simulation(

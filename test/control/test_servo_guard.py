@@ -129,6 +129,7 @@ def guard_of(configuration: Configuration) -> ServoGuard:
     return ServoGuard(shared.arm, shared.timing, configuration.node("velocity_loop", VelocityLoopParameters).guard)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["realtime", "lockstep"])
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
 @pytest.mark.parametrize(("proportional", "integral"), [(8.0, 1.0), (1.0, 500.0), (8.0, 500.0), (1e6, 1e8), (1e9, 0.0)])

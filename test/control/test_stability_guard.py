@@ -98,6 +98,7 @@ def test_a_loop_that_saturates_at_the_largest_stable_step_shakes_after_a_larger_
         assert assess(node, accepted, part * largest_step).verdict is Verdict.SETTLED
 
 
+@pytest.mark.slow
 def test_the_deadband_it_reports_removes_the_stiction_cycle() -> None:
     node, gain = FrictionNode(1.0, 0.5, 40.0, 20.0, 0.8, 1.2), 1e-3
     cycle = friction_verdict(node, IntegralLoop(gain)).cycle
@@ -121,6 +122,7 @@ def test_nothing_accepted_diverges_and_without_the_guard_much_would() -> None:
 
 
 # --------------------------------------------------------------------------------------- the arm
+@pytest.mark.slow
 def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_stays() -> None:
     loop = Loop(OWN)
     with pytest.raises(ParameterError) as refusal:
@@ -160,6 +162,7 @@ def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
         assert make(replace(own, **{name: (float(reported.split(",")[0]),)})).assessment is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str) -> None:
     found = Loop(replace(OWN, feedback=feedback)).assessment
@@ -167,6 +170,7 @@ def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str
     assert found.domain is Domain.I
 
 
+@pytest.mark.slow
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
     with pytest.raises(ParameterError, match=r"torque_gain .* times the largest linearly stable one"):
         Loop(replace(OWN, mode="joint_torque", torque_gain=(0.1,)))
@@ -224,6 +228,7 @@ def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
     assert loop.report is not report
 
 
+@pytest.mark.slow
 def test_gains_of_the_velocity_loop_are_taken_where_the_guard_only_warns_or_is_off() -> None:
     warned, silent = (Loop(guarded(replace(OWN, force_gain=(0.09,)), mode=mode)) for mode in ("warn", "off"))
     for loop in (warned, silent):
@@ -356,6 +361,7 @@ def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, flo
 FREE = replace(OWN.limits, joint_gain=0.0, contact_force=1e9, impact=0.0, free_travel=1e3)
 
 
+@pytest.mark.slow
 def test_the_velocity_obeys_the_factor() -> None:
     loop = Loop(
         replace(OWN, force_gain=(0.09,), blend_time=0.0, force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE)
@@ -467,6 +473,7 @@ def test_the_loop_is_assessed_again_where_one_thing_about_the_contact_has_change
     assert assessed_again(contact, contact._replace(**much))
 
 
+@pytest.mark.slow
 def test_a_judgement_is_distributed_over_periods_and_not_repeated_at_rest() -> None:
     loop = Loop(replace(OWN, force_gain=(0.09,)))
     assert isinstance(loop.watch, Watch)

@@ -104,6 +104,7 @@ def test_an_axis_of_a_link_turns_with_it() -> None:
     assert world.force(DOWN) == pytest.approx(10.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_point_slides_with_the_commanded_velocity_while_it_presses() -> None:
     world = Springs(springs={DOWN: 4000.0})
     slide = TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, Y, 0.05)
@@ -180,6 +181,7 @@ def impedance(along: Triple, value: float | None = None, stiffness: float = 400.
     return TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, along, value, 0.0, stiffness, 100.0)
 
 
+@pytest.mark.slow
 def test_live_parameters_leave_the_equilibrium_of_an_impedance_where_it_was() -> None:
     world, task = Springs(), base(impedance(Y))
     world.step(task, 10)
@@ -194,6 +196,7 @@ def test_live_parameters_leave_the_equilibrium_of_an_impedance_where_it_was() ->
     assert world.point(Y)[1] == pytest.approx(start, abs=3e-3)
 
 
+@pytest.mark.slow
 def test_live_parameters_do_not_begin_the_way_in_free_air_anew() -> None:
     world, task = Springs(), base(force(8.0))
     world.step(task, 600)
@@ -216,6 +219,7 @@ def test_a_refused_task_is_tried_again_with_new_parameters() -> None:
     assert world.force(DOWN) == pytest.approx(10.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_impedance_is_sensed_at_the_side_that_is_touched_whichever_way_it_is_written() -> None:
     """Friction along the link has another lever at the other side of it: the force was wrong by as much."""
     found = []
@@ -234,6 +238,7 @@ def test_an_impedance_is_sensed_at_the_side_that_is_touched_whichever_way_it_is_
     assert found[0][0] > 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sd", "is_known"), [(0.01, True), (0.8, False)])
 def test_a_force_from_torques_that_are_known_badly_is_reported_with_its_uncertainty(sd: float, is_known: bool) -> None:
     """As one that is commanded alone."""
@@ -472,6 +477,7 @@ def test_joint_torques_are_axes_too() -> None:
     assert 200.0 * (world.q - start) == pytest.approx(wanted, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_joint_torque_that_nothing_takes_is_reported_in_time() -> None:
     """The joint turns on until its end, which is far."""
     world, wanted, late = Springs(), [0.0, 1.0, 0.0, 0.0], round(OWN.limits.settling_time / DT)
@@ -513,6 +519,7 @@ def test_a_motion_of_a_task_that_is_blocked_is_reported(axis: TaskAxis, reason: 
     assert blocked(base(axis), joint=0).reaction is ForceReaction.NONE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [X, Y, Z])
 def test_a_motion_of_a_point_is_reported_only_if_it_is_not_done(direction: Triple) -> None:
     slide = TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, direction, -0.05)

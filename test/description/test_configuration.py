@@ -314,6 +314,7 @@ def test_a_real_time_factor_at_which_nothing_seems_to_move_is_refused(factor: fl
     assert WAM.with_values({"timing.real_time_factor": 0.001}).shared.timing.real_time_factor == 0.001
 
 
+@pytest.mark.slow
 def test_a_configuration_without_nodes_is_refused() -> None:
     empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
     with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):

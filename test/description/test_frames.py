@@ -38,6 +38,7 @@ def in_the_root(placements: list[FramePlacement], root: str = "base_link") -> di
     return {name: found(name) for name in parents}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wam", "testbed", "barrett-wam4", "barrett-wam7"])
 def test_every_frame_is_where_pinocchio_puts_the_link_of_that_name_of_the_urdf(name: str) -> None:
     arm = arm_of(name)

@@ -207,6 +207,7 @@ def test_a_world_that_cannot_be_simulated_is_refused(change: dict[str, dict[str,
         plant_of(**{name: dataclasses.replace(one, **change.get(name, {})) for name, one in given.items()})
 
 
+@pytest.mark.slow
 def test_the_objects_are_published_where_there_are_any() -> None:
     steps = [ScenarioStep("wait", 0.05)]
     plain = Simulation(CONFIGURATION, steps)
@@ -239,6 +240,7 @@ def test_a_reset_puts_every_object_back() -> None:
     assert np.array(plant.objects()) == pytest.approx(np.array(start), nan_ok=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [0.0, 4000.0])
 def test_a_folded_elbow_is_stopped_by_the_links_that_touch(stiffness: float) -> None:
     """One force between the two tubes; its torque about the elbow is what the joint measures."""

@@ -153,6 +153,7 @@ def test_current_noise_has_its_standard_deviation_and_no_offset() -> None:
     np.testing.assert_allclose(np.corrcoef(normal.T), np.eye(3), atol=0.03)
 
 
+@pytest.mark.slow
 def test_current_noise_is_that_of_the_seed() -> None:
     commanded = [1.0, -2.0, 1.0, 3.0]
     np.testing.assert_array_equal(noisy(5, commanded), noisy(5, commanded))
@@ -165,6 +166,7 @@ def test_no_noise_flows_where_nothing_is_asked_for() -> None:
     assert noisy(1, [1e-6] * 4)[:, [0, 1, 3]].all()
 
 
+@pytest.mark.slow
 def test_noise_does_not_go_beyond_the_peak() -> None:
     flowing = noisy(1, [PEAK, -PEAK, 0.0, 0.0])[:100]
     assert np.abs(flowing).max() == PEAK

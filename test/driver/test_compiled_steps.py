@@ -100,6 +100,7 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_steps_have_the_bits_of_plain_python(case: str, with_c: pytest.MonkeyPatch) -> None:
     fast = plant(**CASES[case])

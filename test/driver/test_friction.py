@@ -191,6 +191,7 @@ def test_presliding_begins_with_its_stiffness_and_yields_as_dahl_has_it(sigma: f
         assert angle[k] == pytest.approx(-MOTOR / sigma * math.log(1.0 - torque[k] / MOTOR), rel=0.03)
 
 
+@pytest.mark.slow
 def test_hysteresis_loop_has_the_width_and_the_area_of_dahl() -> None:
     peak = 0.8 * MOTOR
     angle, torque = quasi_static(peak, 3)

@@ -220,6 +220,7 @@ def test_diagnostics_hold_nothing_of_the_wall_clock_where_there_is_no_pace() -> 
     assert set(Bench("lockstep").lockstep().facts()) == {"real-time factor", "behind [ms]", "slips"}
 
 
+@pytest.mark.slow
 def test_of_a_computer_that_is_too_slow_for_realtime_the_late_periods_are_named_until_they_are_rare() -> None:
     bench = Bench("realtime")
     realtime = bench.realtime()
@@ -261,6 +262,7 @@ def test_periods_that_were_late_before_all_nodes_were_connected_keep_no_brakes_o
     assert realtime.obstacle() == ""
 
 
+@pytest.mark.slow
 def test_on_a_computer_too_slow_for_realtime_the_brakes_stay_on_unless_late_periods_allows_it() -> None:
     bench = Bench("realtime")
     realtime, bold = bench.realtime(), bench.realtime(late_periods=1.0)

@@ -114,6 +114,7 @@ def test_both_resonances_of_the_testbed_are_those_of_4_4(ratio: float, surface: 
     np.testing.assert_allclose(found, expected, rtol=4e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [4e3, 4e4])
 def test_both_resonances_of_joint_4_are_those_of_4_4(surface: float) -> None:
     locked = {"armature": (1e6, 1e6, 1e6, WAM.joints.armature[3])}
@@ -447,6 +448,7 @@ def test_contact_friction_holds_below_its_cone_and_takes_its_share_above() -> No
     assert np.all(np.hypot(held[:, 0], held[:, 1]) < 1.0 * held[:, 2])
 
 
+@pytest.mark.slow
 def test_contact_on_one_cover_out_of_several_obstacles_has_the_stiffness_of_its_own() -> None:
     low = cover_frame(TILTED, "outer_link") @ [TIP, 0.0, 0.0, 1.0]
     top = low[2] - RADIUS + 2e-3
@@ -770,6 +772,7 @@ def test_power_that_goes_in_at_the_motors_comes_out_at_the_joints() -> None:
 # repeatability
 
 
+@pytest.mark.slow
 def test_halving_the_step_changes_a_motion_by_little_and_brings_it_nearer() -> None:
     arm = changed(WAM, joints=WIDE)
     coarse, fine, finest = (swing(arm, 0.4, STEP / divisor)[-1][2] for divisor in (1, 2, 8))

@@ -250,6 +250,7 @@ def test_stiction_cycle_is_that_of_the_exact_node(number: float, zeta: float, st
     assert found[1] == pytest.approx((exact.peak_to_peak, exact.period), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_stiction_cycle_of_a_slow_loop_is_that_of_5_8_and_5_9_corrected() -> None:
     """To 2 %: the motor's motion in a slip, which the formulas leave out, makes 1.4 % at (5.11) = 0.02."""
     number, zeta, static, dynamic = CASES[0]

@@ -125,6 +125,7 @@ def complaints(root: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_texts_are_in_the_terms_of_the_field() -> None:
     found = complaints(ROOT)
     assert not found, f"{len(found)} terms:\n" + "\n".join(found)

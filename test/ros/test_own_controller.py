@@ -159,6 +159,7 @@ class Takes(Echo):
         return {}
 
 
+@pytest.mark.slow
 def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(configured: Configuration, tmp_path: Path) -> None:
     own = {"nodes": [node for node in configured.shared.nodes if ":" not in node]}
     steps = load(tmp_path / "script.yaml", configured.shared)
@@ -170,6 +171,7 @@ def test_a_node_may_return_arrays_of_numpy_as_well_as_lists(configured: Configur
     assert repr(runs[0].rows) == repr(runs[1].rows), "as text, in which NaN equals NaN"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("output", "text"),
     [
@@ -623,6 +625,7 @@ def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
         assert driver.driver.safety.fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [0, 50, 300])
 def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_topic(
     steps: int,
@@ -637,6 +640,7 @@ def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_t
     assert run.driver.safety.fault in failure
 
 
+@pytest.mark.slow
 def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason() -> None:
     class Silent:
         name, parameters = "my_transform", Nothing

@@ -659,6 +659,7 @@ def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) 
     assert "--set timing.mode has no effect here: the running stack has its own" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["urdf", "mjcf"])
 def test_model_is_written_to_standard_output(form: str, capsys: Any) -> None:
     code, out, _ = command(capsys, "model", form)

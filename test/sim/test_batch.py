@@ -264,6 +264,7 @@ def test_no_more_processes_are_started_than_there_are_pieces(
         assert len(options.executor._processes) == count
 
 
+@pytest.mark.slow
 def test_an_end_does_not_wait_for_inputs_that_no_worker_takes(tmp_path: Path) -> None:
     (tmp_path / "large.py").write_text(LARGE)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

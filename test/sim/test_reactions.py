@@ -73,6 +73,7 @@ def press(summary: DemoSummary, name: str) -> SteadyPress:
     return one
 
 
+@pytest.mark.slow
 def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tmp_path: Path) -> None:
     summary = summarize(recorded(tmp_path, TORQUES))
     (answer,) = (one for one in verdict(summary) if one.result == "NO")
@@ -88,6 +89,7 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
     assert str(answer) == "commands carried out: NO (1 not reached)"
 
 
+@pytest.mark.slow
 def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
     summary = summarize(recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0]))
     (answer,) = (one for one in verdict(summary) if "commands" in one.question)
@@ -95,6 +97,7 @@ def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carr
     assert str(answer) == f"commands carried out: NO (1 refused), {words}"
 
 
+@pytest.mark.slow
 def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) -> None:
     """It ends the watch of the torque."""
     slow = TORQUES.replace("seconds: 3.0", "seconds: 3.0, set: {force_loop: {limits.settling_time: 60.0}}")
@@ -107,6 +110,7 @@ def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) 
     assert any(words in line for line in sections["verdict"].sentences)
 
 
+@pytest.mark.slow
 def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
     spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
     values = {f"driver:world.springs.{key}": value for key, value in spring.items()}
@@ -116,6 +120,7 @@ def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
     assert summary.traces.true.is_known.all()
 
 
+@pytest.mark.slow
 def test_a_posture_that_the_arm_does_not_follow_is_not_as_it_should_be(tmp_path: Path) -> None:
     """From where a task leaves the arm, which nobody knows before."""
     turned = Configuration.load(packaged("wam")).shared.arm.joints.start

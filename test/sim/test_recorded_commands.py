@@ -87,6 +87,7 @@ def test_a_command_without_a_stamp_has_that_of_the_newest_state_logged_before_it
     assert (hold.end - hold.begin) / 1e9 == pytest.approx(2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("topic", COMMANDS)
 def test_a_bag_whose_commands_were_all_taken_is_not_changed(topic: str) -> None:
     bag = bag_of(**{topic.replace("sim/", "sim_"): forces(STREAMED, FORCE, "outer_link")})

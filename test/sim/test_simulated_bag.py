@@ -164,6 +164,7 @@ def test_messages_are_serialized_as_ros_does() -> None:
         assert len(data) == len(exact_cdr(kind, bytes(serialize_message(message))))  # its padding is not defined
 
 
+@pytest.mark.slow
 def test_what_a_scenario_commands_is_recorded_with_a_configuration_that_does_not_name_its_node(tmp_path: Path) -> None:
     configuration = Configuration.load(packaged("wam"))
     assert "scenario" not in configuration.shared.nodes
@@ -176,6 +177,7 @@ def test_what_a_scenario_commands_is_recorded_with_a_configuration_that_does_not
     assert pushed.force[1].tolist() == [0.0, 12.0, 0.0]
 
 
+@pytest.mark.slow
 def test_a_step_with_the_name_of_the_one_before_is_a_step_of_its_own_with_what_it_sets(tmp_path: Path) -> None:
     setting = Setting("force_loop", "limits.contact_force", 20.0)
     steps = [ScenarioStep("hold", 0.05), ScenarioStep("hold", 0.05, settings=(setting,)), ScenarioStep("hold", 0.05)]

@@ -72,6 +72,7 @@ def pressed(tmp_path: Path, frame: str, newtons: list[float]) -> SweepResult:
     return outcome(runs(file, (0.004,))[0])
 
 
+@pytest.mark.slow
 def test_the_error_is_the_same_in_every_frame_and_all_of_the_force_where_nothing_is_touched(tmp_path: Path) -> None:
     on_link, in_base = pressed(tmp_path, "link", [0.0, -20.0, 0.0]), pressed(tmp_path, "base", [0.0, 0.0, -20.0])
     assert in_base.force_rms == pytest.approx(on_link.force_rms, rel=0.02) != pytest.approx(20.0)
@@ -86,6 +87,7 @@ def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path)
     assert math.isnan(found.force_rms)
 
 
+@pytest.mark.slow
 def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
     file, found = tmp_path / "brief.yaml", []
     for seconds in ("0.4", "1.0"):
@@ -164,6 +166,7 @@ def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) ->
     assert [one.step.name for one in run.played] == ["release", "press"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "failure"),
     [
@@ -188,6 +191,7 @@ def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
     assert bool(found) == bool(failure)
 
 
+@pytest.mark.slow
 def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> None:
     """From where a task leaves the arm, which nobody knows before."""
     file = tmp_path / "late.yaml"
@@ -287,6 +291,7 @@ def test_a_sweep_does_not_write_over_what_it_reads(
     assert {name: (tmp_path / name).read_text() for name in texts} == texts
 
 
+@pytest.mark.slow
 def test_runs_with_a_node_of_ones_own_are_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -306,6 +311,7 @@ def test_runs_with_a_node_of_ones_own_are_computed_again(
     assert not (tmp_path / "kept.jsonl").exists()
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path) -> None:
     table, plot = tmp_path / "sweep.csv", tmp_path / "sweep.png"
     command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--config", "testbed", "--fresh"]

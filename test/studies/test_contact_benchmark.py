@@ -451,6 +451,7 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
         assert got == (pytest.approx(value, rel=1e-4, abs=1e-4, nan_ok=True) if isinstance(value, float) else value)
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a_shorter_one() -> None:
     barrett = Configuration.load(packaged("barrett-wam7"))
     steps = tuple(ScenarioGenerator(barrett, 1).free(1)[0].steps[:1])

@@ -29,6 +29,7 @@ def choices() -> dict[str, Choice]:
     return {choice.quantity: choice for choice in friction_or_stiffness()}
 
 
+@pytest.mark.slow
 def test_a_transmission_by_4_10_would_cost_the_arm_a_tenth_of_its_bandwidth() -> None:
     """By the eigenvalues of two masses: so little do 3 % of the asymptote say against the transmission."""
     configuration = Configuration.load(packaged("wam"))
@@ -111,6 +112,7 @@ def test_twice_the_stiffness_costs_margin_and_less_friction_does_not(choices: di
     assert ratio.half_friction == 1.0 > ratio.twice_stiffness
 
 
+@pytest.mark.slow
 def test_third_stage_leaves_96_percent_from_a_radius_of_an_inch_and_a_half_on() -> None:
     """In the units of the thesis: 43 in-lb times 30.4 at each pulley of the differential, E A 51 500 lb."""
     configuration = Configuration.load(packaged("wam"))

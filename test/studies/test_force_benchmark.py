@@ -230,6 +230,7 @@ def test_the_inertia_of_an_impact_is_that_of_the_compiled_plant() -> None:
     assert 0.5 * float(qd @ mass @ qd) == pytest.approx(float(plant.data.energy[1]), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_gain_that_the_guard_refuses_is_lowered_to_one_that_it_accepts() -> None:
     high = configured(CONFIGURATION, TASK).with_values({"force_loop:force_gain": [0.2]})
     lowered = with_accepted_gain(high)

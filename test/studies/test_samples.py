@@ -70,6 +70,7 @@ def test_every_sample_that_an_experiment_or_task_declares_is_there_and_what_is_d
         assert thinned == " ".join(f"{topic}:{each}" for topic, each in sample.thinned.items())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(ENTRIES))
 def test_what_a_sample_shows_is_measured_again(name: str) -> None:
     assert check(load(name), ENTRIES[name], BAGS) == []

@@ -53,6 +53,7 @@ def test_tasks_move_along_lines_of_the_tip_and_joint_trajectories(tmp_path: Path
     assert all(map(sum, zip(*motions.values(), strict=True))), motions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", tasks())
 def test_every_number_of_a_task_with_a_bound_is_within_it(name: str) -> None:
     result = evaluate(load(name), SAMPLES / name)

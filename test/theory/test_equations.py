@@ -74,6 +74,7 @@ def test_every_argument_of_a_public_function_stands_in_its_docstring() -> None:
             assert re.search(rf"\b{argument.name}\b", parameters or text), f"{name}: {argument.name} is not explained"
 
 
+@pytest.mark.slow
 def test_errata_name_tests_that_exist_and_every_corrected_equation() -> None:
     named = re.findall(r"`(test_\w+)\.(test_\w+)`", ERRATA)
     rows = [line for line in ERRATA.splitlines() if line.startswith("| ") and not line.startswith(("| where", "| ---"))]
