@@ -133,13 +133,13 @@ setup(
     extras_require={
         # the inner loop as C: WAM_COMPILE
         "compile": ["mypy", "setuptools<80"],
-        # Tab in the shell: `wam completion bash`
+        # Tab in the shell: `register-python-argcomplete wam`
         "completion": ["argcomplete"],
-        # maps and benchmarks on many machines: `wam map --dask ADDRESS`
+        # sweeps and benchmarks on many machines: `wam sweep --dask ADDRESS`
         "dask": ["distributed"],
         # the documentation site: `make docs`
         "docs": ["furo", "myst-parser", "numpydoc", "sphinx>=8.2"],
-        # the live page in the browser: `wam live`, `wam view`; without an upper limit pip takes 0.2, which has no plots
+        # the live page in the browser: `wam live`; without an upper limit pip takes 0.2, which has no plots
         "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
@@ -158,7 +158,7 @@ setup(
             "setuptools<80",
             "types-PyYAML",
         ],
-        # the viewer of `wam view`; its interface changes from version to version
+        # the viewer of `wam live BAG --rerun`; its interface changes from version to version
         "view": ["rerun-sdk>=0.41,<0.42"],
     },
     data_files=[

@@ -82,7 +82,7 @@ def main() -> None:
     port, debug = free_port(), free_port()
     flags = [flag for flag in FLAGS if "debugging-port" not in flag]
     with tempfile.TemporaryDirectory(prefix="wam_docs_", ignore_cleanup_errors=True) as folder:
-        what = ["view", str(given.bag), "--at", str(given.at)] if given.bag else ["up", "--live"]
+        what = ["live", str(given.bag), "--at", str(given.at)] if given.bag else ["up", "--live"]
         what += [] if given.bag else ["--real-time-factor", FACTOR, "--set", "timing.timeout=60.0"]
         serve = [sys.executable, "-m", "wam_cli.main", *what, "--port", str(port)]
         with subprocess.Popen(serve, stdout=subprocess.PIPE, text=True) as server:

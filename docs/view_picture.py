@@ -87,7 +87,7 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="wam_docs_", ignore_cleanup_errors=True) as folder:
         file = Path(folder) / "view.rrd"
-        subprocess.run([sys.executable, "-m", "wam_cli.main", "view", given.bag, "--save", file], check=True)
+        subprocess.run([sys.executable, "-m", "wam_cli.main", "live", given.bag, "--save", file], check=True)
         serve = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--serve-web"]
         serve += ["--web-viewer-port", str(WEB), "--port", str(GRPC), str(file)]
         address = f"http://127.0.0.1:{WEB}/?url={quote(f'rerun+http://127.0.0.1:{GRPC}/proxy', safe='')}&renderer=webgl"

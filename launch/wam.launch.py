@@ -143,7 +143,7 @@ def transforms(configuration: Configuration, given: dict[str, str], namespace: s
     if given["tf"] == "false":
         return []
     if importlib.util.find_spec("tf2_msgs") is not None:
-        return [program(["tf", "--namespace", namespace, f"--frame-prefix={given['frame_prefix']}"], ends)]
+        return [program(["live", "--tf", "--namespace", namespace, f"--frame-prefix={given['frame_prefix']}"], ends)]
     if given["tf"] == "auto" and "robot_state_publisher" not in get_packages_with_prefixes():
         return [LogInfo(msg="no /tf: install tf2_msgs (apt install ros-jazzy-tf2-msgs)")]
     return [
@@ -194,7 +194,7 @@ def action(given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[
     wanted = given["trajectory_action"]
     if wanted == "false" or (wanted == "auto" and importlib.util.find_spec("control_msgs") is None):
         return []
-    return [program(["follow", "--namespace", namespace], ends)]
+    return [program(["live", "--trajectories", "--namespace", namespace], ends)]
 
 
 def program(command: list[str], ends: dict[str, Any]) -> Any:

@@ -22,34 +22,22 @@ COMMANDS = {
     "up": "start the nodes and run them until Ctrl-C",
     "node": "start one node, with ROS arguments if needed",
     "call": "one request to a running stack: enable, disable, pause, get, set, echo, push and others",
-    "record": "record every topic of a running stack until Ctrl-C",
-    "bag": "print the contents of a bag, or repair a broken bag",
-    "report": "print the demo report again",
+    "live": "show a running stack or a recording in the browser; or serve a running stack to MoveIt, /tf",
+    "bag": "record a running stack, print the contents of a bag, or repair a broken one",
     "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
     "identify": "identify the controllers' model (friction, gravity, inertia) from a recording of free motion",
-    "live": "show a running stack in the browser: watch it, push it, press its buttons",
-    "follow": "serve the action FollowJointTrajectory of a running stack, for MoveIt and other planners",
-    "tf": "publish the frames of a running stack on /tf and /tf_static",
-    "view": "show a recording in the browser or in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
-    "experiment": "run an experiment of the thesis, record it and print predicted against measured",
-    "samples": "check the sample bags, one of each experiment and task, or record them again",
-    "figures": "draw the figures of chapters 3 to 6 with points of the simulated plant",
-    "map": "compute the stability map of figure 5.8: the largest stable step over gamma and zeta",
-    "scorecard": "compare the arm with the requisites of chapter 3",
-    "plant": "draw the plant's effects with the theory and print the differences",
+    "experiment": "run experiments of the thesis, record them and print predicted against measured",
     "sweep": "play a scenario with many parameter sets: a table and a plot",
+    "evaluate": "seeded benchmarks (contact, robustness, force, faults, identify, soak); the thesis's figures",
     "guard": "validate the stability guard by Monte Carlo simulation, or assess a force loop of your own",
     "conform": "test a driver, the simulated one or yours, against the contract of drivers",
-    "evaluate": "seeded benchmarks: contact, robustness, force, faults, identify, soak",
-    "model": "print the arm's model as URDF or MJCF",
-    "completion": "print what makes a shell complete commands and options: bash, zsh or fish",
+    "model": "print the arm's model as URDF or MJCF, or compare it with the requisites of chapter 3",
 }
 
 # libraries of the system that wheels need and a small container has not, and their packages in Debian
 LIBRARIES = {"libgomp.so.1": "libgomp1"}
 COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on
-ALIASES = {"analyze": "analyse"}
 # the extras of setup.py, and the modules that come with them
 EXTRAS = {
     "ros": (
@@ -68,8 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if COMPLETING in os.environ:
         _complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words and words[0] in ALIASES:
-        words[0] = ALIASES[words[0]]
     command = _command(words)
     parser = _parser(command)
     _check_name(parser, words)
@@ -166,8 +152,8 @@ def program() -> None:
 
 def _unknown(word: str) -> str:
     """What to print about a command that does not exist."""
-    near = difflib.get_close_matches(word, [*COMMANDS, *ALIASES], n=1)
-    meant = f"; did you mean '{ALIASES.get(near[0], near[0])}'?" if near else ""
+    near = difflib.get_close_matches(word, COMMANDS, n=1)
+    meant = f"; did you mean '{near[0]}'?" if near else ""
     return f"no command '{word}'" + (meant or f"; choose from {', '.join(COMMANDS)}")
 
 

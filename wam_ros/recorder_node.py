@@ -113,7 +113,7 @@ class RecorderNode(TolerantNode):
     def _wrong(self) -> str:
         """How nodes run otherwise than this recorder takes them to, and what to do."""
         listed = "; ".join(filter(None, self._differing.values()))
-        return listed and f"{listed}; start the recorder with 'wam record', which takes both from the running stack"
+        return listed and f"{listed}; start the recorder with 'wam bag record', which takes both from the running stack"
 
     @property
     def _empty(self) -> str:

@@ -1,4 +1,4 @@
-"""The arm of a configuration compared with the requisites of chapter 3: ``wam scorecard``."""
+"""The arm of a configuration compared with the requisites of chapter 3: ``wam model scorecard``."""
 
 import math
 from itertools import product

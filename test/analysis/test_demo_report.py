@@ -803,7 +803,7 @@ stoppable_report(Path("{bag}"), False, None)
 """
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (128 + number, "")
-    assert done.stderr.strip().endswith(f"the recording is in {bag}; to print the report: wam report {bag}")
+    assert done.stderr.strip().endswith(f"the recording is in {bag}; to print the report: wam analyse {bag} --steps")
 
 
 def test_bounce_does_not_end_a_contact():
@@ -1408,7 +1408,7 @@ def with_outcome(folder, *statuses: tuple[str, str, int]):
 def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys, last, failure):
     bag = with_outcome(tmp_path / "bag", ("scenario", "lower", 0), last)
     with pytest.raises(SystemExit) as ended:
-        main(["report", str(bag)])
+        main(["analyse", str(bag), "--steps"])
     assert ended.value.code == int(bool(failure))
     assert ("not as it should be" in capsys.readouterr().out) is bool(failure)
     assert [one.partition(failure)[:2] for one in report(bag).unmet] == [("FAILED: ", failure)] * bool(failure)
@@ -1442,7 +1442,7 @@ def test_a_recording_of_something_else_is_refused_and_nothing_is_written_into_it
         writer.write(connection, 1, store.serialize_cdr(store.types[kind]("hello"), kind))
     before = sorted((tmp_path / "bag").iterdir())
     with pytest.raises(SystemExit) as ended:
-        main(["report", str(tmp_path / "bag")])
+        main(["analyse", str(tmp_path / "bag"), "--steps"])
     assert ended.value.code == 1
     said = capsys.readouterr()
     assert said.out == ""

@@ -16,7 +16,7 @@ import pytest
 
 from wam_bag.bag import BagError, JointColumns, read
 from wam_cli.commands.demo import report_task
-from wam_cli.main import ALIASES, COMMANDS, EXTRAS, main
+from wam_cli.main import COMMANDS, EXTRAS, main
 from wam_description.configuration import Configuration, packaged
 from wam_sim.recording import recorded_run
 
@@ -54,15 +54,8 @@ def test_a_misspelt_command_is_answered_with_the_one_that_was_meant(capsys: pyte
 
 def test_an_abbreviated_option_is_no_other_one(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
-        main(["up", "--name", "left"])  # of `wam demo` and `wam record`; it was taken for --namespace
+        main(["up", "--name", "left"])  # of `wam demo` and `wam bag record`; it was taken for --namespace
     assert "unrecognized arguments: --name left" in capsys.readouterr().err
-
-
-def test_the_american_spelling_is_the_same_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ALIASES == {"analyze": "analyse"}
-    code, out, _ = said(capsys, "analyze", str(ROOT / "bags" / "sample" / "creep"), "--quiet")
-    assert code == 0
-    assert out.startswith("Verdict")
 
 
 def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,7 +108,7 @@ def test_values_of_a_sweep_are_refused_with_the_reason(values: str, reason: str,
     assert len(printed) < 2000
 
 
-@pytest.mark.parametrize("command", ["plant FILE", "sweep t.csv --vary seed=1:2:2 --picture FILE"])
+@pytest.mark.parametrize("command", ["analyse bag --steps --picture FILE", "sweep t.csv --vary seed=1 --picture FILE"])
 def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
     command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -178,7 +171,7 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     assert "it is empty; give a name or a file, or leave the option out" in err
 
 
-@pytest.mark.parametrize("command", ["model urdf", "scorecard", "demo --no-live", "up", "sweep t.csv --vary seed=1"])
+@pytest.mark.parametrize("command", ["model urdf", "demo --no-live", "up", "sweep t.csv --vary seed=1"])
 def test_a_parameter_with_two_values_is_refused(
     command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -197,7 +190,7 @@ def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     assert "started" not in out
 
 
-@pytest.mark.parametrize("command", ["demo", "up --live", "live", "view bag"])
+@pytest.mark.parametrize("command", ["demo", "up --live", "live", "live bag"])
 @pytest.mark.parametrize("port", ["99999", "0", "-1", "web"])
 def test_a_port_that_does_not_exist_is_refused(command: str, port: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = said(capsys, *command.split(), f"--port={port}")
@@ -307,17 +300,8 @@ def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
 def test_files_are_offered_where_a_file_is_asked_for_and_names_where_a_name_is(tmp_path: Path) -> None:
     pytest.importorskip("argcomplete")
     assert set(completed("wam demo --config barrett", tmp_path)) == {"barrett-wam4", "barrett-wam7"}
-    assert f"{ROOT}/README.md" in completed(f"wam view {ROOT}/READ", tmp_path)
+    assert f"{ROOT}/README.md" in completed(f"wam live {ROOT}/READ", tmp_path)
     assert completed(f"wam demo --name {ROOT}/READ", tmp_path) == []
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_each_shell_has_its_script(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("argcomplete")
-    code, out, err = said(capsys, "completion", shell)
-    assert (code, err) == (0, "")
-    assert "wam" in out
-    assert "_ARGCOMPLETE" in out
 
 
 def requests_of(parser: argparse.ArgumentParser, *before: str) -> Iterator[tuple[str, ...]]:
@@ -379,5 +363,5 @@ def test_a_signal_ends_a_command_with_its_code_whatever_an_interrupted_import_ra
             raise error from None  # as the module of MuJoCo in C
         return 0
 
-    monkeypatch.setattr(importlib.import_module("wam_cli.commands.scorecard"), "run", interrupted)
-    assert said(capsys, "scorecard") == (128 + number, "", "")
+    monkeypatch.setattr(importlib.import_module("wam_cli.commands.model"), "run", interrupted)
+    assert said(capsys, "model", "scorecard") == (128 + number, "", "")

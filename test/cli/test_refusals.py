@@ -23,11 +23,6 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        ("map out.csv --gamma-points 0", "wam map: --gamma-points is 0; it must be at least 1"),
-        ("map out.csv --zeta-points -2", "wam map: --zeta-points is -2; it must be at least 1"),
-        ("map out.csv --jobs 0", "wam map: --jobs is 0; it must be at least 1"),
-        ("map out.csv --zeta 0.9 0.1", "wam map: --zeta is 0.9 to 0.1; LOW must be above 0 and HIGH not below it"),
-        ("map out.csv --gamma 0 2", "wam map: --gamma is 0 to 2; LOW must be above 0 and HIGH not below it"),
         ("guard --sets -3", "wam guard: --sets is -3; it must be at least 1"),
         ("guard --testbed 0", "wam guard: --testbed is 0; it must be at least 1"),
         ("guard --seed -1", "wam guard: --seed is -1; it must be at least 0"),
@@ -35,8 +30,7 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
         ("evaluate contact --jobs 0", "wam evaluate: --jobs is 0; it must be at least 1"),
         ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
         ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
-        ("figures --jobs 0", "wam figures: --jobs is 0; it must be at least 1"),
-        ("map out.csv --jobs 99999", "wam map: --jobs is 99999; it must be at most 1024"),
+        ("evaluate figures --jobs 0", "wam evaluate: --jobs is 0; it must be at least 1"),
         ("evaluate force --jobs 99999", "wam evaluate: --jobs is 99999; it must be at most 1024"),
         (
             "identify --excite e.yaml --only-write --seconds inf",
@@ -68,12 +62,11 @@ def test_a_count_or_a_range_that_says_nothing_is_named(
             "cannot write none/x.json: none is no directory; give another file as --json",
         ),
         ("analyse bag --html .", "cannot write .: it is a directory; give another file as --html"),
-        ("map none/x.csv", "cannot write none/x.csv: none is no directory; give another file as FILE"),
         (
-            "map x.csv --results file/in/x",
+            "evaluate figures --results file/in/x",
             "cannot write into file/in: file is no directory; give another directory as --results",
         ),
-        ("figures --to file", "cannot write into file: file is no directory; give another directory as --to"),
+        ("evaluate figures --to file", "cannot write into file: file is no directory; give another directory as --to"),
         ("experiment creep --directory file/in", "cannot write into file/in: file is no directory; give another"),
         ("evaluate contact --write none/x.md", "cannot write none/x.md: none is no directory; give another file as"),
     ],
@@ -95,7 +88,6 @@ def test_what_cannot_be_written_is_said_before_the_work(
             "a file that ends in .csv, .tsv, .txt, .dat; give the scenario with --scenario",
         ),
         ("sweep own.yaml --experiment creep --vary seed=1,2", "FILE own.yaml would be a table; give a file that ends"),
-        ("map own.yaml", "FILE own.yaml would be a table; give a file that ends"),
         ("analyse bag --json own.yaml", "--json own.yaml would be JSON; give a file that ends in .json, .txt"),
         (
             "analyse bag --html own.yaml",
@@ -125,7 +117,7 @@ def test_a_file_of_another_kind_is_not_written_over(
     assert {entry.name: entry.read_text() for entry in tmp_path.iterdir()} == {"own.yaml": own}
 
 
-@pytest.mark.parametrize("command", ["demo --no-live", "record"])
+@pytest.mark.parametrize("command", ["demo --no-live", "bag record"])
 def test_a_bag_that_exists_is_named_before_the_work(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -145,8 +137,8 @@ def test_a_directory_without_permission_is_named_with_the_option(
     monkeypatch.chdir(tmp_path)
     for words, option in (
         (f"experiment creep --directory {closed[0]}/bags", "give another directory as --directory"),
-        (f"record --directory {closed[0]}/bags", "give another directory as --directory"),
-        (f"figures --results {closed[0]}/.cache/x", "give another directory as --results"),
+        (f"bag record --directory {closed[0]}/bags", "give another directory as --directory"),
+        (f"evaluate figures --results {closed[0]}/.cache", "give another directory as --results"),
         (f"analyse bag --html {closed[0]}/x.html", "give another file as --html"),
     ):
         said = refused(capfd, *words.split())

@@ -53,7 +53,7 @@ def test_without_rerun_the_command_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(SystemExit) as ended:
-        main(["view", "--rerun", str(bag)])
+        main(["live", "--rerun", str(bag)])
     assert ended.value.code == 1
     assert "pip install 'wam_stack[view]'" in capsys.readouterr().err
 
@@ -63,7 +63,7 @@ def test_without_viser_the_page_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(SystemExit, match="1"):
-        main(["view", str(bag)])
+        main(["live", str(bag)])
     assert "pip install 'wam_stack[live]'" in capsys.readouterr().err
 
 

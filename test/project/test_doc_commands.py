@@ -40,7 +40,7 @@ FENCE = re.compile(r"(?:<!-- ([^\n]*?) -->\n+)?^```(\w*)\n(.*?)^```", re.DOTALL 
 PLAYED = ("run", "file: ", "refused: ", "printed", "start: ")
 MARKS = (*PLAYED, "not run here: ", "generated: ")
 CODE = ("sh", "bash", "console", "python", "yaml")
-NODES = re.compile(r"^wam (demo|up|node|call|record)\b", re.MULTILINE)
+NODES = re.compile(r"^wam (demo|up|node|call|bag record)\b", re.MULTILINE)
 COMMAND = re.compile(r"^(\$ |wam |make |python3? |pip |ros2 |docker )", re.MULTILINE)
 
 

@@ -23,7 +23,7 @@ HANDBOOK = {
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]
 }
 
-ACTIONS = {"/wam/follow_joint_trajectory"}  # of `wam follow`, where control_msgs is installed
+ACTIONS = {"/wam/follow_joint_trajectory"}  # of `wam live --trajectories`, where control_msgs is installed
 
 
 def load(path: Path) -> ModuleType:
@@ -122,7 +122,7 @@ def test_refusals_in_the_handbook_are_those_of_the_code() -> None:
     table = HANDBOOK["safety.md"].partition("<!-- messages:")[2]
     messages = re.findall(r"^\|[^|]+\| `(.+)` \|$", table, re.MULTILINE)
     assert len(messages) >= 19
-    texts = [text for path in ROOT.glob("wam_*/*.py") for text in spoken(path)]
+    texts = [text for path in ROOT.glob("wam_*/**/*.py") for text in spoken(path)]
     for message in messages:
         whole = message.removeprefix("refused: ")  # the driver puts it before an obstacle
         pattern = re.compile(".*?".join(re.escape(part) for part in re.split(r"<\w+>", whole)))

@@ -24,8 +24,7 @@ from conftest import LONG
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from wam_cli.commands import tf as tf_command
-from wam_cli.commands import up
+from wam_cli.commands import live, up
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import NODES as TABLE
 from wam_description.parameters import ParameterError
@@ -309,7 +308,7 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
 def test_launch_serves_the_trajectory_action_where_its_type_is(launch_file, monkeypatch):
     _, start = launch_file
     (*_, server) = start({**CHOSEN, "processes": "false", "trajectory_action": "true"})
-    assert server.cmd[1:] == ["-m", "wam_cli.main", "follow", "--namespace", "left"]
+    assert server.cmd[1:] == ["-m", "wam_cli.main", "live", "--trajectories", "--namespace", "left"]
     assert server.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
     for spec, processes in ((None, 1), (SimpleNamespace(), 2)):
         monkeypatch.setattr(importlib.util, "find_spec", lambda name, spec=spec: spec)
@@ -351,9 +350,9 @@ def test_launch_lets_the_stack_publish_its_frames_where_their_type_is(launch_fil
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace())
     for tf in ("auto", "true"):
         _, frames = start({**CHOSEN, "processes": "false", "tf": tf, "frame_prefix": "left/"})
-        assert frames.cmd[1:4] == ["-m", "wam_cli.main", "tf"]
+        assert frames.cmd[1:4] == ["-m", "wam_cli.main", "live"]
         options = argparse.ArgumentParser()
-        tf_command.arguments(options)
+        live.arguments(options)
         chosen = options.parse_args(frames.cmd[4:])
         assert (chosen.namespace, chosen.frame_prefix) == ("left", "left/")
         assert frames.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}

@@ -109,7 +109,7 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
 def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another_node(
     ros: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`wam record` needs them, and a real driver need not have them."""
+    """`wam bag record` needs them, and a real driver need not have them."""
     monkeypatch.setattr("wam_ros.call.PATIENCE", LONG)
     driver = ros.node("driver")
     driver.declare_parameter("serial", "WAM7")

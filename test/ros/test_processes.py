@@ -384,7 +384,7 @@ def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, 
 PROGRAMS = {
     "up": ("wam_cli.main", "up"),
     "node": ("wam_cli.main", "node", "driver"),
-    "scorecard": ("wam_cli.main", "scorecard"),
+    "scorecard": ("wam_cli.main", "model", "scorecard"),
     "program": ("wam_ros.program", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
 }
 
@@ -544,11 +544,11 @@ def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_a_reader_who_has_had_enough_is_no_error() -> None:
-    """As in `wam scorecard | head -1`."""
+    """As in `wam model scorecard | head -1`."""
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(
-        [sys.executable, "-m", "wam_cli.main", "scorecard"],
+        [sys.executable, "-m", "wam_cli.main", "model", "scorecard"],
         stdout=write,
         stderr=subprocess.PIPE,
         text=True,
@@ -628,7 +628,7 @@ def test_record_takes_mode_and_nodes_from_the_running_stack(
     path = os.pathsep.join([str(ROOT), str(tmp_path)])
     with Composition(configured, "left", domain_id) as composition:
         words = ("--name", "mine", "--directory", str(tmp_path / "bags"), "--namespace", "left")
-        stack = started("-m", "wam_cli.main", "record", *words, PYTHONPATH=path)
+        stack = started("-m", "wam_cli.main", "bag", "record", *words, PYTHONPATH=path)
         begin = time.monotonic()
         composition.spin(lambda: recorded(stack) > 400_000 or time.monotonic() - begin > LONG)
         assert recorded(stack) > 400_000, stack.said()
@@ -648,13 +648,13 @@ def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
     tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
     monkeypatch.setattr("wam_ros.call.PATIENCE", 0.2)
-    code, _, err = command(capfd, "record", "--directory", str(tmp_path / "bags"))
+    code, _, err = command(capfd, "bag", "record", "--directory", str(tmp_path / "bags"))
     assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
-    assert err == "wam record: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
+    assert err == "wam bag: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
 
 
 def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) -> None:
-    code, _, err = command(capsys, "record", "--set", "timing.mode=realtime")
+    code, _, err = command(capsys, "bag", "record", "--set", "timing.mode=realtime")
     assert code == 1
     assert "--set timing.mode has no effect here: the running stack has its own" in err
 
@@ -780,7 +780,7 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
     begin = time.monotonic()
     with Composition(configured, domain_id=domain_id) as composition:
-        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+        listener = started("-m", "wam_cli.main", "bag", "record", "--name", "outside")
         composition.spin(lambda: recorded(listener) > 400_000 or time.monotonic() - begin > LONG)
         assert recorded(listener) > 400_000, listener.said()
         listener.process.send_signal(signal.SIGSTOP)
@@ -807,7 +807,7 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
             end = time.monotonic() + seconds
             composition.spin(lambda: is_enough() or time.monotonic() > end)
 
-        listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+        listener = started("-m", "wam_cli.main", "bag", "record", "--name", "outside")
         spin_until(lambda: recorded(listener) > 40_000, LONG)
         assert recorded(listener) > 40_000, listener.said()
         listener.process.send_signal(signal.SIGSTOP)

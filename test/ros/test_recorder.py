@@ -352,7 +352,7 @@ def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     states.publish(state(1, 0.0))
     ros.wait(lambda: received(node, "/wam/motor_states") and "driver" in node.parameters_of_nodes.found)
     node.attend()
-    advice = "; start the recorder with 'wam record', which takes both from the running stack"
+    advice = "; start the recorder with 'wam bag record', which takes both from the running stack"
     assert node.failure == (difference and difference + advice)
 
 

@@ -65,7 +65,7 @@ def test_every_sample_that_an_experiment_or_task_declares_is_there_and_what_is_d
         assert sample is not None
         assert [entry["run"], entry["shows"], *entry["seconds"]] == [
             sample.run, sample.shows, sample.begin, sample.end
-        ], f"wam samples --make {entry['name']}"  # fmt: skip
+        ], f"wam experiment {entry['name']} --samples make"  # fmt: skip
         thinned = read(BAGS / "sample" / entry["name"]).metadata[CUT].get("thinned", "")
         assert thinned == " ".join(f"{topic}:{each}" for topic, each in sample.thinned.items())
 
@@ -154,7 +154,7 @@ def test_a_changed_sample_and_a_changed_list_are_noticed(tmp_path: Path) -> None
 
 def test_an_index_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "index.yaml").write_text("samples: [{name: creep}]")
-    with pytest.raises(ParameterError, match=r"is not an index of samples .*'wam samples --make' writes it"):
+    with pytest.raises(ParameterError, match=r"is not an index of samples .*'wam experiment --samples make' writes it"):
         read_index(tmp_path)
 
 
@@ -183,7 +183,7 @@ def test_a_sample_is_recorded_cut_judged_and_listed_by_one_command(
     Path("bags").mkdir()
     shutil.copy(BAGS / "README.md", "bags")
     with pytest.raises(SystemExit) as ended:
-        main(["samples", "--make", "step-response"])
+        main(["experiment", "step-response", "--samples", "make"])
     assert ended.value.code == 0
     assert "every sample is as the index lists it" in capfd.readouterr().out
     (entry,) = read_index(Path("bags")).values()

@@ -180,7 +180,7 @@ def test_a_bad_measure_and_another_arm_are_refused(arm: Measures) -> None:
 
 @pytest.mark.slow
 def test_the_command_prints_the_table(configuration: Configuration) -> None:
-    command = [sys.executable, "-m", "wam_cli.main", "scorecard"]
+    command = [sys.executable, "-m", "wam_cli.main", "model", "scorecard"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).resolve().parents[2])
     assert done.stdout == report(configuration)
     assert done.stdout.count("| yes") == 14

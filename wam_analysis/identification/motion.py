@@ -81,7 +81,7 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
     columns = run.joints("motor_states")
     where = run.bag.path
     if columns is None:
-        raise BagError(f"{where} has no motor_states with values; record the topic of the driver ('wam record')")
+        raise BagError(f"{where} has no motor_states with values; record the topic of the driver ('wam bag record')")
     names = arm.motors.names
     if not set(names) <= set(columns.names):
         raise BagError(

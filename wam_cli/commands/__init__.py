@@ -64,24 +64,6 @@ def exit_code_of(unmet: Sequence[object]) -> int:
     return int(bool(unmet))
 
 
-@contextmanager
-def of_installation(package: str) -> Iterator[None]:
-    """Imports of a package that only an installation of ROS has; states this where it is missing.
-
-    Raises
-    ------
-    ValueError
-        with the package and how to install it.
-    """
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name != package:
-            raise
-        install = f"apt install ros-jazzy-{package.replace('_', '-')}"
-        raise ValueError(f"it needs {package}, of a ROS installation: {install}") from None
-
-
 def port(text: str) -> int:
     """A port of this machine, as an option takes it.
 
@@ -304,7 +286,8 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
     if not given.fresh:
         writable_directory("--results", given.results.parent)
     with executor_of(given, pieces) as found:
-        yield BatchOptions(found, None if given.fresh else given.results, Progress(given.command, sys.stderr))
+        progress = Progress(getattr(given, "part", given.command), sys.stderr)
+        yield BatchOptions(found, None if given.fresh else given.results, progress)
 
 
 def take_topic_map(parser: argparse.ArgumentParser) -> None:
@@ -383,19 +366,6 @@ def at_least(option: str, value: float, low: float, high: float = math.inf) -> N
         raise ValueError(f"{option} is {value:g}; it must be at least {low:g}")
     if value > high:
         raise ValueError(f"{option} is {value:g}; it must be at most {high:g}")
-
-
-def rising(option: str, ends: Sequence[float]) -> None:
-    """Refuse the ends of a range that do not rise from above zero.
-
-    Raises
-    ------
-    ValueError
-        which names the option, the values and what is allowed.
-    """
-    low, high = ends
-    if not 0.0 < low <= high < math.inf:
-        raise ValueError(f"{option} is {low:g} to {high:g}; LOW must be above 0 and HIGH not below it")
 
 
 def writable_file(option: str, file: Path, kind: FileKind, advice: str = "") -> None:

@@ -8,7 +8,16 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.commands import HTML, JSON, take_arm, take_topic_map, topic_map_of, writable_file
+from wam_cli.commands import (
+    HTML,
+    JSON,
+    exit_code_of,
+    take_arm,
+    take_topic_map,
+    topic_map_of,
+    writable_file,
+    writable_picture,
+)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,12 +32,23 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress output")
+    parser.add_argument(
+        "--steps",
+        action="store_true",
+        help="instead: the report of 'wam demo', whether each step of the scenario did what was commanded; exit code 1 "
+        "if a result is NO or the run failed",
+    )
+    parser.add_argument("--picture", type=Path, help="of --steps: draw the arm, the forces and the contact positions")
     take_arm(parser)
     take_topic_map(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Analyse, print, write."""
+    if given.steps:
+        return _steps(given)
+    if given.picture:
+        raise ValueError("--picture has no effect without --steps; leave it out, or write a page with --html")
     if given.html:
         writable_file("--html", given.html, HTML)
     if given.json and given.json != "-":
@@ -53,3 +73,16 @@ def run(given: argparse.Namespace) -> int:
         given.html.write_text(page(analysis), encoding="utf-8")
         progress(f"wrote {given.html}")
     return 0
+
+
+def _steps(given: argparse.Namespace) -> int:
+    """Print the report of the demonstration again; nothing is written into the directory of the bag."""
+    from wam_analysis.demo_report import report
+
+    if given.html or given.json:
+        raise ValueError("--steps prints text alone; leave out --html and --json")
+    if given.picture:
+        writable_picture("--picture", given.picture)
+    made = report(given.bag, given.picture, given.namespace or "")
+    print(made.text)
+    return exit_code_of(made.unmet)

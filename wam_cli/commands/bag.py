@@ -1,4 +1,4 @@
-"""`wam bag`: the contents of a bag; repair of a broken one."""
+"""`wam bag`: record a running stack; the contents of a bag; repair of a broken one."""
 
 import argparse
 from datetime import UTC, datetime
@@ -7,21 +7,79 @@ from pathlib import Path
 from wam_bag.contents import Contents, contents
 from wam_bag.losses import PARAMETERS, RECORDING, Losses, losses
 from wam_bag.repair import Repaired, repair
+from wam_cli.commands import configuration_of, namespace, new_bag, take_configuration, writable_directory
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration, option_values
+from wam_description.interface import Interface
+from wam_description.parameters import values
+
+RECORDER = "recorder"
+OF_RECORDER = (
+    "Time, nodes and arm are those of the running stack; of --config and --set, only the parameters of the node "
+    "recorder are used."
+)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("what", choices=("info", "repair"))
-    parser.add_argument("bag", help="directory of the bag, or an .mcap file", type=Path)
+    requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
+    for name, text in (("info", "print the contents of a bag"), ("repair", "repair a broken bag")):
+        found = requests.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        found.add_argument("bag", help="directory of the bag, or an .mcap file", type=Path)
+    text = "record every topic of a running stack until Ctrl-C"
+    record = requests.add_parser("record", help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=OF_RECORDER)
+    record.add_argument("--name", default="", help="name of the bag; default: arm, date and time")
+    record.add_argument("--directory", help="directory for the bag, instead of that of the configuration")
+    record.add_argument("--namespace", type=namespace, default="wam", help="of the stack; default: %(default)s")
+    take_configuration(record)
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print what is in a bag, or repair it."""
-    if given.what == "info":
+    """Record until Ctrl-C, print what is in a bag, or repair it."""
+    if given.request == "record":
+        return _record(given)
+    if given.request == "info":
         print("\n".join(described(contents(given.bag))))
     else:
         print("\n".join(stated(result) for result in repair(given.bag)))
     return 0
+
+
+def _record(given: argparse.Namespace) -> int:
+    """Record until Ctrl-C."""
+    for name in option_values(given.values):
+        if not name.startswith(f"{RECORDER}:"):
+            raise ValueError(
+                f"--set {name} has no effect here: the running stack has its own; "
+                f"give parameters of the recorder alone, as --set {RECORDER}:split_time=60.0"
+            )
+    own = {f"{RECORDER}:name": given.name}
+    if given.directory:
+        own[f"{RECORDER}:directory"] = given.directory
+    configuration = configuration_of(given).with_values(own)
+    directory = Path(str(configuration.sections[RECORDER]["directory"]))
+    writable_directory("--directory", directory)
+    if given.name:
+        new_bag(directory / given.name)
+    from wam_ros.bring_up import parameter_file  # the other requests need no ROS
+    from wam_ros.call import CalledStack
+    from wam_ros.node import node_makers
+    from wam_ros.run import run as run_node
+
+    with CalledStack(given.namespace) as stack:
+        shared = stack.shared()
+    nodes = [name for name in Interface(shared).names if name != RECORDER]
+    print(f"the stack in /{given.namespace} runs in {shared.timing.mode}: {', '.join(nodes)}", flush=True)
+    with parameter_file(_of_stack(configuration, shared)) as file:
+        where = f"__ns:=/{given.namespace}"
+        run_node(node_makers([RECORDER]), ["wam", "--ros-args", "--params-file", str(file), "-r", where])
+    return 0
+
+
+def _of_stack(configuration: Configuration, shared: Shared) -> Configuration:
+    """The configuration with the shared parameters of a running stack, of which this recorder is no part."""
+    nodes = [entry for entry in shared.nodes if entry != RECORDER]
+    return configuration.with_values({**values(shared), "nodes": nodes})
 
 
 def described(found: Contents) -> list[str]:

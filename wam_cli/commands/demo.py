@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -86,8 +87,9 @@ def run(given: argparse.Namespace) -> int:
         for command in _next(configuration.shared.timing.mode, bag if stated.is_there else None):
             print(f"next: {command}", file=stream)
         return 1
-    print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
-    print(f"         wam analyse {bag}    # measured and compared with theory")
+    bag_word = shlex.quote(str(bag))
+    print(f"next     wam live {bag_word}       # the recording in the browser, to play and to scrub")
+    print(f"         wam analyse {bag_word}    # measured and compared with theory")
     return exit_code_of(stated.unmet)
 
 
@@ -123,8 +125,9 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
 
 def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
     """Print the report; a signal ends the program with where the recording is, which is closed."""
-    missing = "stopped before the report was finished"
-    end_at_once_on_signals(f"\n{missing}; the recording is in {bag}; to print the report: wam report {bag}\n")
+    again = f"wam analyse {shlex.quote(str(bag))} --steps"
+    stated = "stopped before the report was finished"
+    end_at_once_on_signals(f"\n{stated}; the recording is in {bag}; to print the report: {again}\n")
     return _report(bag, failed, task)
 
 
@@ -171,7 +174,7 @@ def _cause(bag: Path) -> str:
 
 def _next(mode: str, bag: Path | None) -> list[str]:
     """What the user can do after a failure."""
-    commands = [f"wam analyse {bag}"] if bag else []
+    commands = [f"wam analyse {shlex.quote(str(bag))}"] if bag else []
     if mode == "realtime":
         commands.append("wam demo    # without --realtime: lockstep waits for a busy machine")
     other = "if something else runs in this ROS domain, end it, or set another ROS_DOMAIN_ID"

@@ -24,6 +24,7 @@ from wam_cli.commands import (
     writable_file,
 )
 from wam_cli.commands import evaluate_faults as faults
+from wam_cli.commands import evaluate_figures as figures
 from wam_cli.commands import evaluate_robustness as robustness
 from wam_cli.commands import evaluate_soak as soak
 from wam_description.configuration import Configuration, option_values
@@ -51,6 +52,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     faults.arguments(parts.add_parser("faults", help="wrong messages, lost nodes, full disks, Ctrl-C"))
     soak.arguments(parts.add_parser("soak", help="a long run: memory and lost messages"))
+    figures.arguments(parts.add_parser("figures", help="draw the figures of chapters 3 to 6 with the simulated plant"))
     for name in STUDIES:
         kind = load(name)
         study_arguments(parts.add_parser(name, help=kind.title), name, kind)
@@ -96,6 +98,7 @@ def run(given: argparse.Namespace) -> int:
         "robustness": robustness.run,
         "faults": faults.run,
         "soak": soak.run,
+        "figures": figures.run,
     }
     return parts[given.part](given)
 

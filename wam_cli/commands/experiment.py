@@ -1,6 +1,8 @@
-"""`wam experiment`: an experiment of the thesis, run over topics in lockstep, recorded, evaluated from its bags."""
+"""`wam experiment`: experiments of the thesis, run over topics in lockstep, recorded, evaluated; their sample bags."""
 
 import argparse
+import contextlib
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -8,25 +10,33 @@ from pathlib import Path
 from wam_cli.commands import PAGE, writable_directory, writable_file
 from wam_ros.process_signals import Stop
 from wam_studies.experiment_runs import record
-from wam_studies.thesis.definition import Experiment, Run, load, names
+from wam_studies.thesis.definition import Experiment, Run, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.figure import draw
 from wam_studies.thesis.page import write
 from wam_studies.thesis.rows import Result
+from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 
 PICTURE = "result.png"
 SHOWN_EVERY = 0.2  # s
+RECORDED = "recorded"  # in the directory of the samples: what they are cut from, by a path that is the same everywhere
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("experiment", nargs="?", help="name, or path of a YAML file; --list prints the names")
+    parser.add_argument("experiment", nargs="*", help="names, or paths of YAML files; --list prints the names")
     parser.add_argument("--list", action="store_true", help="print the name of every experiment")
     parser.add_argument("--all", action="store_true", help="run every experiment")
     parser.add_argument(
         "--evaluate",
         metavar="DIRECTORY",
         help="evaluate the bags in this directory and run nothing; the picture goes to --directory",
+    )
+    parser.add_argument(
+        "--samples",
+        choices=("check", "make"),
+        help="instead: check the sample bags that the index in --directory lists, or record and cut them again; of "
+        "experiments and tasks, default all",
     )
     parser.add_argument("--directory", default="bags", help="directory for bags and pictures; default: bags")
     parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
@@ -39,22 +49,25 @@ def run(given: argparse.Namespace) -> int:
         for name in names():
             print(f"{name:22} {load(name).title}")
         return 0
+    if given.samples:
+        return _samples(given)
     if bool(given.experiment) == given.all:
-        raise ValueError("name one experiment, or give --all; --list prints the names")
+        raise ValueError("name an experiment, or give --all; --list prints the names")
     writable_directory("--directory", Path(given.directory))
     if given.write:
         writable_file("--write", Path(given.write), PAGE)
     results: dict[str, tuple[Experiment, Result, Path]] = {}
-    chosen = names() if given.all else [given.experiment]
+    chosen = names() if given.all else given.experiment
+    is_one = len(chosen) == 1 and not given.all
     for number, experiment in enumerate(map(load, chosen), 1):
         if given.evaluate:
-            directory = Path(given.evaluate) / experiment.name if given.all else Path(given.evaluate)
+            directory = Path(given.evaluate) if is_one else Path(given.evaluate) / experiment.name
             picture = Path(given.directory) / f"{experiment.name}.png"
         else:
             name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-            directory = Path(given.directory) / (f"{name}/{experiment.name}" if given.all and given.name else name)
+            directory = Path(given.directory) / (name if is_one or not given.name else f"{name}/{experiment.name}")
             picture = directory / PICTURE
-            if not _record(experiment, directory, f"{number}/{len(chosen)} " if given.all else ""):
+            if not _record(experiment, directory, "" if is_one else f"{number}/{len(chosen)} "):
                 return 130
         result = evaluate(experiment, directory)
         drawn = ""
@@ -102,3 +115,57 @@ def _show(words: str, end: str = "") -> None:
         print(f"\r\033[K{words}", end=end, file=sys.stderr, flush=True)
     elif end:
         print(words, file=sys.stderr, flush=True)
+
+
+def _samples(given: argparse.Namespace) -> int:
+    """Check the samples, or record them; 0 if every sample is as the index lists it."""
+    directory = Path(given.directory)
+    every = [load(name) for name in given.experiment or [*names(), *tasks()]]
+    chosen = [experiment for experiment in every if given.experiment or experiment.sample is not None]
+    if given.samples == "make" and not _make(chosen, directory):
+        return 130
+    entries = read_index(directory)
+    wrong = []
+    for experiment in chosen:
+        if experiment.name not in entries:
+            wrong.append(
+                f"{directory} lists no sample of {experiment.name}; 'wam experiment {experiment.name} --samples make'"
+            )
+            continue
+        entry = entries[experiment.name]
+        found = check(experiment, entry, directory)
+        wrong += found
+        print(_stated(entry, directory, not found))
+    size = sum(entry.size for entry in entries.values())
+    if size >= LIMIT:
+        wrong.append(f"the samples have {size} bytes together; {LIMIT} are allowed: cut less in their experiments")
+    print("\n".join(wrong) if wrong else f"every sample is as the index lists it, {size / 1e6:.2f} MB together")
+    return 1 if wrong else 0
+
+
+def _make(chosen: list[Experiment], directory: Path) -> bool:
+    """Record, cut and list; False if it was interrupted."""
+    stop = Stop()
+    entries = read_index(directory)
+    for experiment in chosen:
+        if experiment.sample is None:
+            raise ValueError(f"experiment {experiment.name} declares no sample; add one to its YAML")
+        recorded = directory / RECORDED / experiment.name
+        shutil.rmtree(recorded, ignore_errors=True)
+        play(experiment, experiment.run(experiment.sample.run), recorded, experiment.name, stop)
+        if stop.is_set:
+            return False
+        shutil.rmtree(directory / FOLDER / experiment.name, ignore_errors=True)
+        entries[experiment.name] = make(experiment, recorded / experiment.sample.run, directory)
+        shutil.rmtree(recorded)
+        write_index(directory, entries)
+    with contextlib.suppress(OSError):  # where another one's recording was left in it
+        (directory / RECORDED).rmdir()
+    return True
+
+
+def _stated(entry: Entry, directory: Path, is_right: bool) -> str:
+    begin, end = entry.seconds
+    word = "ok   " if is_right else "WRONG"
+    bag = directory / FOLDER / entry.name
+    return f"{word} {bag}  {entry.size / 1e3:.0f} kB, {begin:g} to {end:g} s\n      {entry.shows}"

@@ -132,10 +132,11 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     if not given.only_write:
         writable_directory("--directory", given.directory)
     text = yaml.safe_dump(scenario(configuration, given.seed, given.seconds), sort_keys=False, default_flow_style=None)
-    command = f"wam identify --excite {given.excite} --seed {given.seed} --seconds {given.seconds:g}"
+    command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {given.seed} --seconds {given.seconds:g}"
     given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
-    print(f"written: {given.excite}; on an arm of yours: wam up --record --scenario {given.excite}{still}", flush=True)
+    record = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
+    print(f"written: {given.excite}; on an arm of yours: {record}", flush=True)
     if given.only_write:
         return None
     name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"

@@ -1,4 +1,4 @@
-"""`wam live`: the live page of a stack that runs, in a browser; and the page of `wam up` and `wam demo`."""
+"""`wam live`: a running stack or a recording in the browser; and a running stack for other programs of ROS."""
 
 import argparse
 import os
@@ -7,25 +7,152 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
-from wam_cli.commands import namespace, take_port
+from wam_cli.commands import RERUN, namespace, take_port, writable_file
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
-from wam_ros.run import PARENT, die_with_parent
-from wam_ros.topics import NAMESPACE
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 5.0  # s, after which a page that is not there yet is reported
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
+NEEDS = (
+    "The page needs viser, pip install 'wam_stack[live]', and is reachable from this machine alone; --rerun and --save "
+    "need 'wam_stack[view]'; --tf needs tf2_msgs and --trajectories control_msgs, of a ROS installation."
+)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("--namespace", type=namespace, default=NAMESPACE, help="of the stack; default: %(default)s")
+    parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
+    where = "of the stack, default wam; or of the arm in the bag, default that with the most topics"
+    parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
-    parser.epilog = "Needs viser: pip install 'wam_stack[live]'.  The page is reachable from this machine alone."
+    parser.add_argument("--at", type=float, metavar="SECONDS", help="of a bag: show this time and do not play")
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--rerun", action="store_true", help="of a bag: open the Rerun viewer instead of the page")
+    way.add_argument("--save", type=Path, metavar="FILE", help="of a bag: write this .rrd file for Rerun, open nothing")
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
+    way.add_argument(
+        "--trajectories", action="store_true", help="no page: serve the action FollowJointTrajectory, as for MoveIt"
+    )
+    parser.add_argument("--frame-prefix", help="of --tf: put before every frame, for example left/")
+    parser.epilog = NEEDS
+
+
+def run(given: argparse.Namespace) -> int:
+    """Show or serve until Ctrl-C."""
+    if given.bag is None:
+        for option, value in (("--at", given.at), ("--rerun", given.rerun), ("--save", given.save)):
+            if value not in (None, False):
+                raise ValueError(f"{option} is for a recording; give its directory")
+    elif given.tf or given.trajectories:
+        raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
+    if given.frame_prefix and not given.tf:
+        raise ValueError("--frame-prefix has no effect without --tf; leave it out")
+    if given.save or given.rerun:
+        return _rerun(given)
+    if given.bag is not None:
+        return _recording(given)
+    from wam_ros.run import die_with_parent  # a recording is shown without ROS
+    from wam_ros.topics import NAMESPACE
+
+    given.namespace = given.namespace or NAMESPACE
+    end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
+    die_with_parent()
+    if given.tf:
+        _frames(given)
+    elif given.trajectories:
+        _trajectories(given)
+    else:
+        _page(given)
+    return 0
+
+
+def _page(given: argparse.Namespace) -> None:
+    from wam_ros.run import PARENT
+
+    if PARENT in os.environ:  # the stack comes first
+        set_priority(0, NICENESS)
+    with needing_viser():
+        from wam_live.live_page import LivePage
+    stop = Stop()
+    LivePage(given.namespace, free_port(given.port, _print), _print).run(lambda: stop.is_set)
+
+
+def _frames(given: argparse.Namespace) -> None:
+    with of_installation("tf2_msgs"):
+        from wam_live.frame_publisher import FramesNode
+    from wam_live.stack_client import run_next_to
+
+    stop, prefix = Stop(), given.frame_prefix or ""
+    run_next_to(
+        given.namespace,
+        lambda context, shared: FramesNode(context, given.namespace, shared, prefix),
+        lambda: stop.is_set,
+    )
+
+
+def _trajectories(given: argparse.Namespace) -> None:
+    with of_installation("control_msgs"):
+        from wam_live.trajectory_action import serve
+    stop = Stop()
+    serve(given.namespace, lambda: stop.is_set, _print)
+
+
+@contextmanager
+def of_installation(package: str) -> Iterator[None]:
+    """Imports of a package that only an installation of ROS has; states this where it is missing.
+
+    Raises
+    ------
+    ValueError
+        with the package and how to install it.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        install = f"apt install ros-jazzy-{package.replace('_', '-')}"
+        raise ValueError(f"it needs {package}, of a ROS installation: {install}") from None
+
+
+def _recording(given: argparse.Namespace) -> int:
+    """Play a recording in the browser."""
+    with needing_viser():
+        from wam_live.playback import play
+    stop = Stop()
+    port = free_port(given.port, _print)
+    play(_run_of(given), port, given.at, lambda: stop.is_set, _print)
+    return 0
+
+
+def _rerun(given: argparse.Namespace) -> int:
+    """Open a recording in Rerun, or save it for that."""
+    from wam_analysis.rerun_view import load_rerun, view, viewer
+
+    load_rerun()  # before the work
+    if given.save:
+        writable_file("--save", given.save, RERUN)
+    else:
+        viewer()
+    print(f"{given.save or 'viewer'}: {view(_run_of(given), given.save)}")
+    return 0
+
+
+def _run_of(given: argparse.Namespace) -> Any:
+    """The run of the arm in a bag; of several, it is named."""
+    from wam_analysis.findings.analysed_run import analysed_run
+    from wam_bag.bag import read
+
+    found = analysed_run(read(given.bag), given.namespace or "")
+    if found.run.others:
+        _print(found.run.others)
+    return found
 
 
 @contextmanager
@@ -68,6 +195,8 @@ class PageProcess:
     """The page as a process of its own, which can neither delay nor fail the stack."""
 
     def __init__(self, port: int, namespace: str) -> None:
+        from wam_ros.run import PARENT
+
         command = [sys.executable, "-m", "wam_cli.program", "live", "--port", str(port), "--namespace", namespace]
         # a session of its own: Ctrl-C reaches the parent alone
         self._process = subprocess.Popen(
@@ -106,20 +235,6 @@ def lateness(port: int, is_paced: bool) -> str:
         return ""
     text = f"the live page is still starting, as the nodes come first; it will be at {url(port)}"
     return text if is_paced else f"{text}; the run may end before it: --real-time-factor 1 leaves it the time"
-
-
-def run(given: argparse.Namespace) -> int:
-    """Serve the page until Ctrl-C."""
-    end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
-    if PARENT in os.environ:  # the stack comes first
-        set_priority(0, NICENESS)
-    die_with_parent()
-    with needing_viser():
-        from wam_live.live_page import LivePage
-    stop = Stop()
-    page = LivePage(given.namespace, free_port(given.port, _print), _print)
-    page.run(lambda: stop.is_set)
-    return 0
 
 
 def _print(line: str) -> None:

@@ -1,4 +1,4 @@
-"""`wam model`: the arm's model, printed for other programs."""
+"""`wam model`: the arm of a configuration, printed for other programs or compared with the thesis's requisites."""
 
 import argparse
 
@@ -13,7 +13,11 @@ from wam_description.world import World
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("format", choices=("urdf", "mjcf"))
+    parser.add_argument(
+        "format",
+        choices=("urdf", "mjcf", "scorecard"),
+        help="model as URDF or MJCF, or a table: the arm compared with the requisites of chapter 3",
+    )
     parser.add_argument(
         "--ros2-control",
         type=namespace,
@@ -24,16 +28,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the model."""
+    """Print the model or the table."""
+    if given.ros2_control and given.format != "urdf":
+        raise ValueError("--ros2-control is a tag of URDF; print wam model urdf")
     configuration = configuration_of(given)
     shared = configuration.shared
-    if given.format == "urdf":
-        print(urdf_with_ros2_control(shared.arm, given.ros2_control) if given.ros2_control else urdf(shared.arm))
-        return 0
-    if given.ros2_control:
-        raise ValueError("--ros2-control is a tag of URDF; print wam model urdf")
+    if given.format == "scorecard":
+        from wam_studies.scorecard import report  # its thesis has slow imports
 
-    section = configuration.sections["driver"]
-    world, effects = build_part(World, section, "world."), build_part(Effects, section, "effects.")
-    print(mjcf(shared.arm, shared.timing.substep, world, effects))
+        print(report(configuration), end="")
+    elif given.format == "urdf":
+        print(urdf_with_ros2_control(shared.arm, given.ros2_control) if given.ros2_control else urdf(shared.arm))
+    else:
+        section = configuration.sections["driver"]
+        world, effects = build_part(World, section, "world."), build_part(Effects, section, "effects.")
+        print(mjcf(shared.arm, shared.timing.substep, world, effects))
     return 0

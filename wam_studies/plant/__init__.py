@@ -1,4 +1,4 @@
-"""The plant's effects, each measured alone on an ideal testbed and compared with theory (`wam plant`).
+"""The plant's effects, each measured alone on an ideal testbed and compared with theory.
 
 ideal_testbed    one link on one cable circuit, with the requested effects only
 effects          curves of the plant and of theory: slack, creep, efficiency, ripple, resonances, impact, cycles

@@ -1,4 +1,4 @@
-"""The plant's effects as one figure and one table: ``wam plant FILE``."""
+"""The plant's effects as one figure and one table."""
 
 from pathlib import Path
 

@@ -27,7 +27,7 @@ PAGE: Final = "README.md"
 LIMIT: Final = 8_000_000  # bytes of all samples together, part of every clone
 FILES: Final = ("metadata.yaml", "*.mcap")
 _BLOCK = re.compile(r"(<!-- samples -->\n).*?(<!-- end -->)", re.DOTALL)
-_HEAD = f"# Contents of the bags in {FOLDER}/; written by 'wam samples --make', checked by 'wam samples'.\n"
+_HEAD = f"# Contents of the bags in {FOLDER}/; written by 'wam experiment --samples make'.\n"
 _ALIKE = 1e-9  # rounding of a sum over another array
 
 
@@ -97,7 +97,7 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
         experiment.name,
         sample.run,
         sample.shows,
-        f"wam samples --make {experiment.name}",
+        f"wam experiment {experiment.name} --samples make",
         (sample.begin, sample.end),
         count,
         sum(file.stat().st_size for file in files_of(bag)),
@@ -141,7 +141,7 @@ def read_index(directory: Path) -> dict[str, Entry]:
     try:
         entries = [_entry(body) for body in yaml.safe_load(file.read_text(encoding="utf-8"))["samples"]]
     except (yaml.YAMLError, TypeError, KeyError, ValueError) as error:
-        require(False, f"{file} is not an index of samples ({error}); 'wam samples --make' writes it")
+        require(False, f"{file} is not an index of samples ({error}); 'wam experiment --samples make' writes it")
         raise
     return {entry.name: entry for entry in entries}
 

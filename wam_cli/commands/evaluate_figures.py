@@ -1,4 +1,4 @@
-"""`wam figures`: the thesis's figures that carry data."""
+"""`wam evaluate figures`: the thesis's figures that carry data."""
 
 import argparse
 from pathlib import Path
