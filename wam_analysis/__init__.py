@@ -21,4 +21,5 @@ arm_picture         the arm and its obstacles from the side
 arm_render          the process that renders it with MuJoCo
 rerun_view          a bag for the Rerun viewer
 table               tables of text, for a terminal and for Markdown
+thresholds          what is evaluated, and when it is certain, by concern; the layout of reports
 """

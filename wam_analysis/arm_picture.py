@@ -20,7 +20,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL, PEDESTAL_COLOUR, TUBE_COLOURS
+from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
+from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf, rotation_xyz
@@ -32,8 +33,6 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 Array = NDArray[np.float64]
 
 GL = ("egl", "osmesa")
-RENDER_TIMEOUT = 30.0  # s
-PIXELS_PER_METRE = 1500
 OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 
@@ -209,9 +208,9 @@ def render(
         "elevation": view.elevation,
         "centre": view.centre.tolist(),
         "extent": view.height,
-        "size": [round(view.width * PIXELS_PER_METRE), round(view.height * PIXELS_PER_METRE)],
+        "size": [round(view.width * LAYOUT.pixels_per_metre), round(view.height * LAYOUT.pixels_per_metre)],
         "floor": floor_height(obstacles),
-        "pedestal": PEDESTAL,
+        "pedestal": LAYOUT.pedestal,
         "colours": {
             **{name: to_rgb(TUBE_COLOURS[i % len(TUBE_COLOURS)]) for i, name in enumerate(arm.covers.names)},
             **{name: to_rgb(BLOCK_COLOUR) for name in obstacles.names},
@@ -235,7 +234,7 @@ def render(
                     env={**os.environ, "MUJOCO_GL": name, "PYTHONPATH": paths},
                     cwd=directory,
                     capture_output=True,
-                    timeout=RENDER_TIMEOUT,
+                    timeout=LAYOUT.render_timeout,
                     check=False,
                 )
             except (OSError, subprocess.TimeoutExpired):
@@ -283,9 +282,9 @@ def draw(axes: Axes, arm: Arm, q: Sequence[float], obstacles: Obstacles, view: V
 
 def _draw_pedestal(axes: Axes, view: View, floor: float) -> None:
     """A rounded pillar, cut off at the floor."""
-    pillar = Tube(np.array([0.0, 0.0, floor]), np.zeros(3), PEDESTAL, PEDESTAL_COLOUR)
+    pillar = Tube(np.array([0.0, 0.0, floor]), np.zeros(3), LAYOUT.pedestal, PEDESTAL_COLOUR)
     angles = np.linspace(0.0, 2.0 * math.pi, 73)
-    ring = PEDESTAL * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(73)]) + pillar.start
+    ring = LAYOUT.pedestal * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(73)]) + pillar.start
     foot = view.project(ring)
     order = np.argsort(foot[:, 0])
     front = foot[order][foot[order, 1] <= float(np.mean(foot[:, 1])) + 1e-9]

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-FLOOR_GAP = 0.002  # m below the obstacles, so that surfaces do not flicker
+from wam_analysis.thresholds import LAYOUT
 
 
 def main() -> None:
@@ -64,7 +64,7 @@ def _lit(scene: dict[str, Any]) -> str:
     _add(asset, "material", name="floor", rgba="1 1 1 1", specular=0, shininess=0, reflectance=0)
     light = {"type": "directional", "pos": "-1 -1.6 3", "dir": "0.1 0.4 -0.9", "castshadow": "true"}
     _add(world, "light", diffuse="0.3 0.3 0.3", ambient="0.12 0.12 0.12", specular="0.15 0.15 0.15", **light)
-    _add(world, "geom", type="plane", pos=f"0 0 {floor - FLOOR_GAP}", size="20 20 1", material="floor")
+    _add(world, "geom", type="plane", pos=f"0 0 {floor - LAYOUT.floor_gap}", size="20 20 1", material="floor")
     pillar = {"fromto": f"0 0 {floor} 0 0 0", "size": radius}
     _add(world, "geom", name="pedestal", type="capsule", **pillar)
     for geom in root.iter("geom"):

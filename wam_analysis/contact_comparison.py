@@ -7,8 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.contact_list import (
-    BOUNCE,
-    LASTING,
     NO_LINK,
     Certainty,
     CutBy,
@@ -20,10 +18,10 @@ from wam_analysis.contact_list import (
     most,
 )
 from wam_analysis.demo_traces import NAN, Mask, Times, Traces
+from wam_analysis.thresholds import TOUCH
 from wam_sim.recording import RecordedStep
 
 NOT_RECORDED = "not recorded"
-TOUCH = 500_000_000  # ns, within which a contact that began before a pressing step belongs to that step
 
 
 class StepContact(NamedTuple):
@@ -33,7 +31,7 @@ class StepContact(NamedTuple):
     ----------
     begin, end : ns.
     link_true : 'none' where something was estimated and nothing touched.
-    link_estimated : 'none' also where a contact was estimated for less than `LASTING` of the time.
+    link_estimated : 'none' also where a contact was estimated for less than `lasting` of the time.
     right : fraction of the time in which the estimated link was the true one; NaN where it is not known.
     position_estimated : NaN also where another link was estimated.
     is_lower_bound : whether the estimated force is the least one, because the estimator cannot observe the position.
@@ -72,7 +70,7 @@ def compared_contacts(
     for number, (first, last) in enumerate(links):
         latency = _latency(traces, links, number)
         for begin, end in cut_at(traces.stamp, [(first, last)], _bounds(traces.stamp, first, steps, moving)):
-            if traces.stamp[end - 1] - traces.stamp[begin] >= BOUNCE:
+            if traces.stamp[end - 1] - traces.stamp[begin] >= TOUCH.bounce:
                 own = _step(traces.stamp[begin:end], steps, moving)
                 name = own.name if own else ""
                 rows = np.arange(begin, end)
@@ -92,7 +90,7 @@ def compared_contacts(
 
 
 def uncompared_contacts(traces: Traces, touches: Sequence[StepContact]) -> int:
-    """The number of true contacts that are in none of those that are compared: they are shorter than `BOUNCE`."""
+    """The number of true contacts that are in none of those that are compared: they are shorter than `bounce`."""
     times = [traces.stamp[[begin, end - 1]] for begin, end in contacts_by_link(traces.stamp, traces.true)]
     return sum(not any(one.begin <= end and begin <= one.end for one in touches) for begin, end in times)
 
@@ -115,7 +113,7 @@ def _pressed(begin: int, steps: Sequence[RecordedStep], moving: Sequence[Recorde
     """The step to which a contact belongs that begins shortly before it, in a step that only moves."""
     later = next((step for step in steps if step.begin > begin), None)
     is_moving = any(step.begin <= begin < step.end for step in moving)
-    return later if later and is_moving and later not in moving and later.begin - begin < TOUCH else None
+    return later if later and is_moving and later not in moving and later.begin - begin < TOUCH.touch else None
 
 
 def _step(stamp: Times, steps: Sequence[RecordedStep], moving: Sequence[RecordedStep]) -> RecordedStep | None:
@@ -139,9 +137,9 @@ def _compared(
     own = touching[true.frame[touching] == link]
     watched = touching if len(touching) else rows
     known = touching[estimated.is_known[touching]]
-    is_lasting = link == NOT_RECORDED or float(np.mean(estimated.acts[known])) >= LASTING if len(known) else False
+    is_lasting = link == NOT_RECORDED or float(np.mean(estimated.acts[known])) >= TOUCH.lasting if len(known) else False
     found = estimate(traces, certainty, touching[estimated.acts[touching] & is_lasting])
-    is_seen = found.link != NO_LINK or float(np.mean(estimated.is_known[watched])) >= LASTING
+    is_seen = found.link != NO_LINK or float(np.mean(estimated.is_known[watched])) >= TOUCH.lasting
     is_same = estimated.acts[known] & (estimated.frame[known] == true.frame[known])
     return StepContact(
         step,

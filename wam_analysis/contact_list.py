@@ -22,16 +22,14 @@ from wam_analysis.demo_traces import (
 )
 from wam_analysis.held_messages import held_rows
 from wam_analysis.measures.runs import runs
+from wam_analysis.thresholds import TOUCH
 from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"
-BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
 NOT_CERTAIN = "Without contact/hypotheses it is not known how certain contacts are."
 NOT_PLACED = "not recorded (contact/point), so it is not known whether a force is only the least one"
 NOT_ESTIMATED = "the estimated contact was not recorded"
-PLATEAU = 500_000_000  # ns, for which a commanded force is the same
-LASTING = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 
 
@@ -168,7 +166,7 @@ def contact_rows(stamp: Times, acts: Mask) -> list[tuple[int, int]]:
     """Rows [begin, end) of each contact; bounces do not end it."""
     contacts: list[tuple[int, int]] = []
     for begin, end in runs(acts).tolist():
-        if contacts and stamp[begin] - stamp[contacts[-1][1] - 1] <= BOUNCE:
+        if contacts and stamp[begin] - stamp[contacts[-1][1] - 1] <= TOUCH.bounce:
             contacts[-1] = (contacts[-1][0], end)
         else:
             contacts.append((begin, end))
@@ -181,9 +179,9 @@ def most(names: Names) -> str:
 
 
 def median(values: Numbers) -> float:
-    """Median of those that are known, NaN where fewer than `LASTING` of all are: they do not stand for the rest."""
+    """Median of those that are known, NaN where fewer than `lasting` of all are: they do not stand for the rest."""
     known = values[~np.isnan(values)]
-    return float(np.median(known)) if len(known) >= LASTING * len(values) > 0 else NAN
+    return float(np.median(known)) if len(known) >= TOUCH.lasting * len(values) > 0 else NAN
 
 
 def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[CutBy, CutBy]:
@@ -208,12 +206,12 @@ def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]
 
 
 def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tuple[int, int]]:
-    """Parts of a contact, each on another link; a change shorter than `BOUNCE` is none."""
+    """Parts of a contact, each on another link; a change shorter than `bounce` is none."""
     acting = begin + np.flatnonzero(signal.acts[begin:end])
     names = signal.frame[acting]
     starts, link = [begin], ""
     for first, after in _constant(names[1:] != names[:-1]):
-        if stamp[acting[after - 1]] - stamp[acting[first]] < BOUNCE:
+        if stamp[acting[after - 1]] - stamp[acting[first]] < TOUCH.bounce:
             continue
         if link and names[first] != link:
             starts.append(int(acting[first]))
@@ -222,12 +220,12 @@ def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tupl
 
 
 def _other_commands(traces: Traces) -> list[int]:
-    """Stamps from which on the commanded force stays as it is for `PLATEAU`, ns; a ramp belongs to what was before."""
+    """Stamps from which on the commanded force stays as it is for `plateau`, ns; a ramp belongs to what was before."""
     force, stamp = np.nan_to_num(traces.commanded.force), traces.stamp
     if not len(stamp):
         return []
     constant = _constant(np.any(force[1:] != force[:-1], axis=1))
-    return [int(stamp[first]) for first, after in constant if stamp[after - 1] - stamp[first] >= PLATEAU]
+    return [int(stamp[first]) for first, after in constant if stamp[after - 1] - stamp[first] >= TOUCH.plateau]
 
 
 def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
@@ -236,13 +234,13 @@ def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
 
 
 def cut_at(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:
-    """Rows of the parts of contacts between some stamps; none is shorter than `BOUNCE`, if its contact is not."""
+    """Rows of the parts of contacts between some stamps; none is shorter than `bounce`, if its contact is not."""
     bounds = np.searchsorted(stamp, at).tolist()
     parts: list[tuple[int, int]] = []
     for begin, end in contacts:
         start = begin
         for bound in bounds:
-            if begin < bound < end and min(stamp[bound] - stamp[start], stamp[end - 1] - stamp[bound]) >= BOUNCE:
+            if begin < bound < end and min(stamp[bound] - stamp[start], stamp[end - 1] - stamp[bound]) >= TOUCH.bounce:
                 parts.append((start, bound))
                 start = bound
         parts.append((start, end))
@@ -286,9 +284,9 @@ def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Es
         bool(len(placed)),
         median(estimated.size[own]),
         force_sd,
-        float(np.sum(estimated.is_lower_bound[placed])) > LASTING * len(placed),
+        float(np.sum(estimated.is_lower_bound[placed])) > TOUCH.lasting * len(placed),
         float(np.mean(bits & sum(TWO) > 0)) if len(bits) else NAN,
-        tuple(why for why, part in lasting.items() if part > LASTING and why not in (SECOND, CERTAIN_SECOND)),
+        tuple(why for why, part in lasting.items() if part > TOUCH.lasting and why not in (SECOND, CERTAIN_SECOND)),
     )
 
 

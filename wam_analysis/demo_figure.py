@@ -17,16 +17,12 @@ from wam_analysis import arm_picture
 from wam_analysis.contact_comparison import StepContact
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, STYLE, TRUE
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
+from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
 from wam_description.signals import Contact
 from wam_sim.recording import RecordedStep
-
-DPI = 200
-SIZE = (9.0, 4.0)  # inches
-LABELS = 0.08  # m, for the labels beyond the tips of the arrows
-NAME_LINES = 3  # of the name of a step: more would cover the forces
 
 
 def save(path: Path, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -48,7 +44,7 @@ def save(path: Path, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[s
         commanded = os.environ.get("MUJOCO_GL", "").lower()
         gl = sorted(arm_picture.GL, key=lambda name: name != commanded)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, dpi=DPI)
+        figure = Figure(figsize=LAYOUT.size, dpi=LAYOUT.dpi)
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(
             2, 2, width_ratios=(1.1, 1.3), height_ratios=(1.5, 1.0),
@@ -91,7 +87,7 @@ def draw_arm(
     box = axes.get_window_extent()
     forces = _contact_forces(summary, arm, q)
     tips = [
-        point + force * (METRES_PER_NEWTON + LABELS / max(float(np.linalg.norm(force)), 1e-9))
+        point + force * (LAYOUT.metres_per_newton + LAYOUT.labels / max(float(np.linalg.norm(force)), 1e-9))
         for point, force, *_ in forces
     ]
     view = arm_picture.side_view(arm, q, obstacles, aspect=float(box.width / box.height), more=tips)
@@ -125,7 +121,7 @@ def _draw_contacts(axes: Axes, forces: Sequence[tuple[Numbers, Numbers, str, str
     """Arrows of the contact force on the arm, labelled with its magnitude."""
     arrows = []
     for point, force, colour, label in forces:
-        start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
+        start, end = view.project(np.array([point, point + LAYOUT.metres_per_newton * force]))
         arrows.append((start, end, colour, label))
     for i, (start, end, colour, _) in enumerate(arrows):
         width = 4.2 if colour is TRUE else 1.3  # so that the true force is visible under a correct estimate
@@ -291,9 +287,9 @@ def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
         room = round(letters * (step.end - step.begin) / 1e9 / (last - first))
         if room >= 6 and first <= _middle(summary, step) <= last:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
-            if len(lines) > NAME_LINES:
-                word = lines[NAME_LINES - 1]
-                lines = [*lines[: NAME_LINES - 1], f"{word}…" if len(word) < room - 1 else word]
+            if len(lines) > LAYOUT.name_lines:
+                word = lines[LAYOUT.name_lines - 1]
+                lines = [*lines[: LAYOUT.name_lines - 1], f"{word}…" if len(word) < room - 1 else word]
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
                 va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,

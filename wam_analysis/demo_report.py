@@ -11,25 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
-from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import DemoSummary, LoopReport, SteadyPress, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
+from wam_analysis.thresholds import HOLD, LAYOUT, TOUCH
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
 from wam_control.force.reaction_status import REFUSAL
 from wam_description.status import DONE
 from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
 from wam_sim.recording import RecordedRun, recorded_run
-
-FORCE_TOLERANCE = 10.0  # % of the commanded force
-POSITION_TOLERANCE = 0.04  # m
-FALSE_TOLERANCE = 10.0  # % of the time without contact, in which one may be estimated
-ENDING = 0.2  # s: one of less may be a contact that has just ended, before a recording did
-MISSED = 2.0  # of an answer about the link: worse than another link, which is 1
-WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
 
 class VerdictResult(StrEnum):
@@ -170,7 +164,7 @@ def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
 
 
 def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
-    question = f"force within {FORCE_TOLERANCE:g} %"
+    question = f"force within {HOLD.force_tolerance:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [press for press in presses if not press.is_refused]
     ripples = [100.0 * press.ripple / abs(press.commanded) for press in done]
@@ -182,7 +176,7 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
         ripple = f"{ripples[errors.index(worst)]:.1f}"
         return f"{worst:.1f} %" + (f", {ripple} % of it ripple" if float(ripple) else "")
 
-    answer = _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
+    answer = _answer(question, errors, lambda error: error <= HOLD.force_tolerance, of)
     short = sum(press.is_short for press in presses)
     remark = f"{short} of {len(presses)} commanded for less than {STEADY:g} s" * bool(short)
     return answer._replace(remark=remark)
@@ -210,15 +204,15 @@ def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
     def wrong(touch: StepContact) -> float:
         if NOT_RECORDED in (touch.link_true, touch.link_estimated):
             return math.nan
-        return MISSED if touch.link_estimated == NO_LINK else float(touch.link_true != touch.link_estimated)
+        return TOUCH.missed if touch.link_estimated == NO_LINK else float(touch.link_true != touch.link_estimated)
 
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
-    missed = [MISSED for contact in summary.missed if contact.end - contact.begin >= 1e-9 * BOUNCE]
+    missed = [TOUCH.missed for contact in summary.missed if contact.end - contact.begin >= 1e-9 * TOUCH.bounce]
     return _answer(
         "right link",
         [*(wrong(touch) for touch in summary.touches), *missed],
         lambda value: not value,
-        lambda wrong: {MISSED: "missed", 0.0: f"{100.0 * least:.0f} %"}.get(wrong, "another link"),
+        lambda wrong: {TOUCH.missed: "missed", 0.0: f"{100.0 * least:.0f} %"}.get(wrong, "another link"),
     )
 
 
@@ -226,9 +220,11 @@ def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     touches = [touch for touch in summary.touches if touch.link_true != NO_LINK]
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.is_lower_bound]
-    question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
+    question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = len(touches) - len(errors)
-    answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
+    answer = _answer(
+        question, errors, lambda error: error <= TOUCH.position_tolerance, lambda far: f"{100.0 * far:.1f} cm"
+    )
     return answer._replace(remark=f"unknown for {unknown} of {len(touches)} contacts" * bool(unknown))
 
 
@@ -236,12 +232,12 @@ def _false_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     """Whether a contact was estimated where none is; none where that is not known."""
     if not summary.free:
         return []
-    question = f"false detections within {FALSE_TOLERANCE:g} % of the time without contact"
+    question = f"false detections within {TOUCH.false_tolerance:g} % of the time without contact"
     part = 100.0 * summary.false_contact / summary.free
-    if part > FALSE_TOLERANCE and summary.false_contact <= ENDING:
+    if part > TOUCH.false_tolerance and summary.false_contact <= TOUCH.ending:
         brief = f"{1e3 * summary.false_contact:.0f} ms, as a contact that ends may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]
-    is_right = part <= FALSE_TOLERANCE
+    is_right = part <= TOUCH.false_tolerance
     return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]
 
 
@@ -416,7 +412,7 @@ def _uncompared(summary: DemoSummary) -> list[str]:
     """How many true contacts the table lacks."""
     number = summary.uncompared
     contacts = "1 true contact is" if number == 1 else f"{number} true contacts are"
-    return [f"{contacts} shorter than {1e-9 * BOUNCE:g} s and not compared."] if number else []
+    return [f"{contacts} shorter than {1e-9 * TOUCH.bounce:g} s and not compared."] if number else []
 
 
 def _false_contacts(summary: DemoSummary) -> str:
@@ -474,10 +470,10 @@ def _latency(latency: float | None, period: float) -> str:
 
 
 def _table(rows: Sequence[Sequence[str]], *head: Sequence[str]) -> list[str]:
-    lines = plain(head, rows, first=STEP)
+    lines = plain(head, rows, first=LAYOUT.step)
     rule = "─" * max(map(len, lines))
     return [f"  {line}" for line in (*lines[: len(head)], rule, *lines[len(head) :])]
 
 
 def _wrapped(line: str, indent: str = " " * 9) -> list[str]:
-    return textwrap.wrap(line, WIDTH, subsequent_indent=indent, drop_whitespace=True) if line else []
+    return textwrap.wrap(line, LAYOUT.width, subsequent_indent=indent, drop_whitespace=True) if line else []

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.held_messages import held_rows, with_holes
 from wam_analysis.task_forces import TaskForce, arm_of
+from wam_analysis.thresholds import TOUCH
 from wam_bag.bag import TableColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
@@ -19,7 +20,6 @@ Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 NAN = float("nan")
-LEAST = 5e-3  # N, below which a true force is printed as 0.00 N: a spring at its rest, which touches nothing
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 HYPOTHESIS = ("probability", "position", "position_sd", "force_sd", "reasons")  # columns that are read
@@ -155,7 +155,7 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
             break
     commanded, measured = signal("force_command"), signal("force_measured")
     true = signal("sim/contact/wrench", _points(run, "sim/contact/point"))
-    true = true._replace(force=np.where(true.size[:, np.newaxis] < LEAST, 0.0, true.force))
+    true = true._replace(force=np.where(true.size[:, np.newaxis] < TOUCH.least_force, 0.0, true.force))
     estimated = signal("contact/wrench", _points(run, "contact/point") or _points_of_hypotheses(run))
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:

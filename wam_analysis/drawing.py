@@ -2,6 +2,8 @@
 
 from typing import Any, Final
 
+from wam_analysis.thresholds import LAYOUT
+
 # distinguishable with colour blindness
 COMMANDED, TRUE, MEASURED, ESTIMATED = "#222222", "#0072b2", "#009e73", "#d55e00"
 PREDICTED: Final = "#6b7280"  # by theory
@@ -17,11 +19,6 @@ TUBE_COLOURS: Final = ("#5d6670", "#87919c")
 BLOCK_COLOUR: Final = "#ecca88"
 OBJECT_COLOUR: Final = "#5f93bd"
 PEDESTAL_COLOUR: Final = "#c9ced4"
-PEDESTAL: Final = 0.07  # m, radius of the drawn base, which is not in the parameters
-FLOOR: Final = -1.0  # m, height of the foot of the drawn base
-STILL: Final = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
-FLAT: Final = 1e-4  # nor one that is smaller than this part of the value
-METRES_PER_NEWTON: Final = 0.015  # length of an arrow
 
 
 # of matplotlib; 9 points are readable where a picture of up to 9 inches fills a page
@@ -48,7 +45,7 @@ def widen_flat(axes: Any) -> None:
     """Show a quantity that does not change as a line, not its rounding errors."""
     for limits, widen in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
         low, high = limits
-        least = max(STILL, FLAT * abs(low + high) / 2.0)
+        least = max(LAYOUT.still, LAYOUT.flat * abs(low + high) / 2.0)
         if high - low < least:
             widen((low + high - least) / 2.0, (low + high + least) / 2.0)
 

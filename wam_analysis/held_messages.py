@@ -3,16 +3,19 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import STREAM
+
 Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
-THINNED, FEWEST = 2, 10  # periods of a thinned topic for which a message is held, and messages of which one is known
-
 
 def held_for(stamps: Times) -> int:
-    """For how long a message of these is held, ns: `HELD`, or longer where a recording was thinned."""
-    return max(HELD, THINNED * int(np.median(np.diff(stamps)))) if len(stamps) > FEWEST else HELD
+    """For how long a message of these is held, ns: `held`, or longer where a recording was thinned."""
+    return (
+        max(STREAM.held, STREAM.thinned * int(np.median(np.diff(stamps))))
+        if len(stamps) > STREAM.fewest
+        else STREAM.held
+    )
 
 
 def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:

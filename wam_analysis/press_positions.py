@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import NAN, Mask, Traces
 from wam_analysis.task_forces import arm_of
+from wam_analysis.thresholds import TOUCH
 from wam_bag.bag import BagError, TableColumns
 from wam_control.force.force_axis import ForceAxes, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.rigid_body import RigidBody
 from wam_sim.recording import RecordedRun
-
-SAMPLES = 9  # of a steady state
 
 
 class PositionedForce(NamedTuple):
@@ -63,7 +62,7 @@ def press_positions(run: RecordedRun, traces: Traces, steady: Mask, measured: fl
     body = RigidBody(arm)
     axes = ForceAxes(arm, body, own.sensing)
     rows = np.flatnonzero(steady)
-    rows = rows[np.linspace(0, len(rows) - 1, SAMPLES).round().astype(int)]
+    rows = rows[np.linspace(0, len(rows) - 1, TOUCH.samples).round().astype(int)]
     covers = set(traces.commanded.frame[rows].tolist())
     cover = str(min(covers))
     if len(covers) > 1 or cover not in arm.covers.names:
@@ -91,7 +90,7 @@ def press_positions(run: RecordedRun, traces: Traces, steady: Mask, measured: fl
 
     def of(signal: NDArray[np.float64], frames: NDArray[np.str_]) -> float:
         known = signal[rows][(frames[rows] == cover) & ~np.isnan(signal[rows])]
-        return float(np.mean(known)) if 2 * len(known) >= SAMPLES else NAN
+        return float(np.mean(known)) if 2 * len(known) >= TOUCH.samples else NAN
 
     configured = own.contact_position if own.contact_cover == cover else NAN
     true, estimated = traces.true, traces.estimated

@@ -16,19 +16,11 @@ from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
 from wam_analysis.demo_traces import ForceSignal
-from wam_analysis.drawing import (
-    BLOCK_COLOUR,
-    COLOURS,
-    FLOOR,
-    METRES_PER_NEWTON,
-    PEDESTAL,
-    PEDESTAL_COLOUR,
-    TUBE_COLOURS,
-    channels,
-)
+from wam_analysis.drawing import BLOCK_COLOUR, COLOURS, PEDESTAL_COLOUR, TUBE_COLOURS, channels
 from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
@@ -41,9 +33,6 @@ PROGRAM = "rerun"
 TIMELINE = "time"
 # plots, each with the corner in which its legend covers no curve of the demonstration
 LEGENDS = {"force": "RightTop", "position": "RightTop", "joints": "LeftBottom"}
-SHARES = (1.9, 1.0, 1.5, 0.9)  # heights of the plots and of the status: a legend has up to four lines
-DISTANCE = 1.3  # of the eye, in heights of what it sees
-POSES = 100.0  # poses of the arm in a second at most
 
 
 class NoViewerError(OSError):
@@ -139,7 +128,7 @@ def joint_motion(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | No
             good = np.flatnonzero(np.all(np.isfinite(angles), axis=1))
             steps = np.diff(columns.stamp_ns[good])
             period = float(np.median(steps)) / 1e9 if len(steps) else 1.0
-            some = good[:: max(1, round(1.0 / (POSES * period)))]
+            some = good[:: max(1, round(1.0 / (LAYOUT.poses * period)))]
             return columns.stamp_ns[some], angles[some]
     return None
 
@@ -155,13 +144,13 @@ def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] 
     eye = None
     if joints is not None and len(joints[1]):
         side = side_view(recorded.arm, joints[1][len(joints[1]) // 2].tolist(), recorded.obstacles, aspect=1.0)
-        position = side.centre - DISTANCE * side.height * side.axes[2]
+        position = side.centre - LAYOUT.eye_distance * side.height * side.axes[2]
         eye = show.EyeControls3D(position=position, look_target=side.centre, eye_up=[0.0, 0.0, 1.0])
     plots = [
         show.TimeSeriesView(origin=f"/plots/{name}", name=name, plot_legend=show.PlotLegend(corner))
         for name, corner in LEGENDS.items()
     ]
-    right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"), row_shares=SHARES)
+    right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"), row_shares=LAYOUT.plot_heights)
     left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
     return show.Blueprint(
         show.Horizontal(left, right), show.TimePanel(expanded=False, timeline=TIMELINE), collapse_panels=True
@@ -200,9 +189,9 @@ def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times
 
 def _log_obstacles(rerun: Any, stream: Any, recorded: RecordedArm) -> None:
     base = rerun.Cylinders3D(
-        lengths=[-FLOOR],
-        radii=[PEDESTAL],
-        centers=[(0.0, 0.0, 0.5 * FLOOR)],
+        lengths=[-LAYOUT.floor],
+        radii=[LAYOUT.pedestal],
+        centers=[(0.0, 0.0, 0.5 * LAYOUT.floor)],
         colors=[channels(PEDESTAL_COLOUR)],
         fill_mode="solid",
     )
@@ -245,7 +234,7 @@ def _arrows(signal: ForceSignal, rows: NDArray[np.intp], cover: str) -> tuple[Nu
     there = (signal.frame[rows] == cover) & signal.acts[rows] & np.isfinite(signal.position[rows])
     origins, vectors = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
     origins[there, 0] = signal.position[rows][there]
-    vectors[there] = METRES_PER_NEWTON * signal.force[rows][there]
+    vectors[there] = LAYOUT.metres_per_newton * signal.force[rows][there]
     return origins, vectors
 
 

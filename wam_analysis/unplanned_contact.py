@@ -8,12 +8,12 @@ import numpy as np
 from wam_analysis.command_gaps import CommandGap
 from wam_analysis.demo_traces import NAN, Mask, Numbers, Times, Traces
 from wam_analysis.held_messages import held_rows
+from wam_analysis.thresholds import TOUCH
 from wam_bag.bag import BagError, TableColumns
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
 from wam_sim.recording import RecordedRun, RecordedStep
 
-AFTER = 100_000_000  # ns, for which the force of a push or a press may last after its command
 LIMIT = "limits.contact_force"
 
 
@@ -109,7 +109,7 @@ def _by_what_is_lacking(
     """Commands that were not recorded, and the stamps at which they were not; the last is where none is lacking."""
     within = {topic: np.full(len(stamps), True) for topic in everywhere}
     for gap in gaps:
-        within[gap.topic] = within.get(gap.topic, np.full(len(stamps), False)) | gap.covers(stamps, AFTER)
+        within[gap.topic] = within.get(gap.topic, np.full(len(stamps), False)) | gap.covers(stamps, TOUCH.after_command)
     lacks = np.any([*within.values(), np.full(len(stamps), False)], axis=0)
     return [([topic for topic, part in within.items() if np.any(part)], lacks), ([], ~lacks)]
 
@@ -141,7 +141,7 @@ def _planned(run: RecordedRun, traces: Traces) -> Mask:
     if not np.any(acts):
         return acts
     last = np.maximum.accumulate(np.where(acts, traces.stamp, 0))
-    planned: Mask = (last > 0) & (traces.stamp - last <= AFTER)
+    planned: Mask = (last > 0) & (traces.stamp - last <= TOUCH.after_command)
     return planned
 
 

@@ -15,18 +15,8 @@ import viser
 from numpy.typing import NDArray
 from viser.transforms import SO3
 
-from wam_analysis.drawing import (
-    BLOCK_COLOUR,
-    COLOURS,
-    FLOOR,
-    HAND,
-    LIKELY,
-    METRES_PER_NEWTON,
-    PEDESTAL,
-    PEDESTAL_COLOUR,
-    TUBE_COLOURS,
-    channels,
-)
+from wam_analysis.drawing import BLOCK_COLOUR, COLOURS, HAND, LIKELY, PEDESTAL_COLOUR, TUBE_COLOURS, channels
+from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, LikelyRange, Wrench
@@ -152,10 +142,10 @@ class Scene:
                 thick = sizes[2] if shape == "box" else 0.002
                 self._scene.add_box(path, colour, (2.0 * sizes[0], 2.0 * sizes[1], 2.0 * thick), **place)
         self._scene.add_cylinder(
-            "/world/pedestal", PEDESTAL, -FLOOR, channels(PEDESTAL_COLOUR), position=(0, 0, 0.5 * FLOOR),
-            cast_shadow=False,
+            "/world/pedestal", LAYOUT.pedestal, -LAYOUT.floor, channels(PEDESTAL_COLOUR),
+            position=(0, 0, 0.5 * LAYOUT.floor), cast_shadow=False,
         )  # fmt: skip
-        self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, FLOOR), cell_size=0.2)
+        self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, LAYOUT.floor), cell_size=0.2)
 
     def _add_arrow(self, name: str) -> Any:
         shaft, head = ARROWS[name]
@@ -169,12 +159,12 @@ class Scene:
     def _show_arrow(self, name: str, contact: Contact) -> None:
         """An arrow from where the world pushes, in the direction in which it pushes the arm."""
         arrow = self._arrows[name]
-        length = METRES_PER_NEWTON * size(contact.force)
+        length = LAYOUT.metres_per_newton * size(contact.force)
         known = contact.cover in self.links and math.isfinite(contact.position) and length > 1e-3
         if known:
             pose = self._body.cover_pose(self._q, contact.cover)
             start = self.point(contact.cover, contact.position)
-            scale = min(length, LONGEST_ARROW) / length * METRES_PER_NEWTON
+            scale = min(length, LONGEST_ARROW) / length * LAYOUT.metres_per_newton
             end = start + scale * pose.rotation @ np.array(contact.force)
             arrow.points = np.array([[start, end]], dtype=np.float32)
             if name == "estimated":

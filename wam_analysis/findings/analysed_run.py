@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from wam_analysis.demo_summary import DemoSummary, summary_of
 from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
+from wam_analysis.thresholds import HOLD
 from wam_bag.bag import Bag, JointColumns
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, within
 from wam_sim.recording import RecordedRun, recorded_run
 
 Numbers = NDArray[np.float64]
 Times = NDArray[np.int64]
-
-SHORTEST_HOLD = 0.3  # s; a shorter one is part of a ramp
-SMALL = 0.01  # N; commanded forces that differ by less are equal
 
 
 class Hold(NamedTuple):
@@ -124,7 +122,7 @@ def _forces(run: RecordedRun, summary: DemoSummary) -> Iterator[Hold]:
     if commands is None:
         return
     frames = np.array(commands.frames)
-    changed = np.any(np.abs(np.diff(commands.force, axis=0)) > SMALL, axis=1) | (frames[1:] != frames[:-1])
+    changed = np.any(np.abs(np.diff(commands.force, axis=0)) > HOLD.equal_force, axis=1) | (frames[1:] != frames[:-1])
     steps = np.searchsorted(commands.stamp_ns, [step.begin for step in summary.steps])
     gaps = (rows_before_gaps(commands.stamp_ns) + 1).tolist()
     inner = {*(np.flatnonzero(changed) + 1).tolist(), *steps.tolist(), *gaps} - {0, len(frames)}
@@ -134,7 +132,7 @@ def _forces(run: RecordedRun, summary: DemoSummary) -> Iterator[Hold]:
         force = commands.force[a]
         commanded = float(np.linalg.norm(force))
         begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
-        if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
+        if commanded > HOLD.equal_force and end - begin >= HOLD.shortest * 1e9:
             yield Hold("", begin, end, str(frames[a]), force, commanded, False)
 
 
@@ -145,7 +143,7 @@ def _forces_of_tasks(summary: DemoSummary) -> Iterator[Hold]:
         commanded = float(np.linalg.norm(task.force))
         bounds = [task.begin, *(at for at in starts if task.begin < at < task.end), task.end]
         for begin, end in itertools.pairwise(bounds):
-            if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
+            if commanded > HOLD.equal_force and end - begin >= HOLD.shortest * 1e9:
                 axis = -1 if task.is_only else task.number
                 yield Hold("", begin, end, task.frame, task.force, commanded, False, task.cover, axis)
 

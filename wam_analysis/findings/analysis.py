@@ -20,6 +20,7 @@ from wam_analysis.findings.timing import extent, provenance, timing_section
 from wam_analysis.foreign.reading import foreign_bag, is_of_other_encoding, needs_rosbags
 from wam_analysis.foreign.sections import foreign_sections
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import Bag, BagError, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
@@ -27,8 +28,6 @@ from wam_description.status import DONE
 from wam_sim.recording import RecordedRun
 
 OF_THE_START = "predicted for the parameters at the start, which were changed"
-MOST_CHANGES = 4  # of parameters that are named
-LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
 
 # the topics that are analysed; reading others would only cost time
@@ -203,9 +202,9 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
                 found.setdefault(key, f"{key} from {before} to {value} at {(stamp - zero) / 1e9:.2f} s")
     if found:
         named = list(found.values())
-        more = f" and {len(named) - MOST_CHANGES} more" * (len(named) > MOST_CHANGES)
+        more = f" and {len(named) - LAYOUT.changes} more" * (len(named) > LAYOUT.changes)
         yield (
-            f"Changed while it ran: {', '.join(named[:MOST_CHANGES])}{more}. "
+            f"Changed while it ran: {', '.join(named[: LAYOUT.changes])}{more}. "
             "Predictions and domains of gains are for the values at the start."
         )
 
@@ -224,7 +223,9 @@ def _of_the_start(section: Section, recording: AnalysedRun) -> Section:
 
 def _brief(note: str) -> str:
     """A note on the parameters in one line; the whole of it is in the provenance."""
-    return note if len(note) <= LONGEST else f"{note[:LONGEST].rpartition(',')[0]}, ... (all under Provenance)."
+    if len(note) <= LAYOUT.note:
+        return note
+    return f"{note[: LAYOUT.note].rpartition(',')[0]}, ... (all under Provenance)."
 
 
 def _count(number: int, name: str) -> str:

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from wam_analysis.drawing import ESTIMATED, MEASURED, SHAFTS, TRUE
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.signals import envelope, forces_over_time, moving, spectrum
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import JointColumns
 
 Numbers = NDArray[np.float64]
 
-MOST = 6000  # points of a line
-DIGITS = 6
 INK = "ink"  # the colour of the page's text, for what was commanded: readable on light and dark
 
 
@@ -90,10 +89,10 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
 
 def _thinned(chart: Chart) -> Chart:
     """The chart with at most MOST points, which looks the same."""
-    if len(chart.x) <= MOST:
+    if len(chart.x) <= LAYOUT.points:
         return chart
-    lines = [one._replace(values=envelope(chart.x, one.values, MOST)[1]) for one in chart.series]
-    return chart._replace(x=envelope(chart.x, chart.x, MOST)[0], series=tuple(lines))
+    lines = [one._replace(values=envelope(chart.x, one.values, LAYOUT.points)[1]) for one in chart.series]
+    return chart._replace(x=envelope(chart.x, chart.x, LAYOUT.points)[0], series=tuple(lines))
 
 
 def data(found: list[Chart]) -> str:
@@ -119,7 +118,7 @@ def _plain(chart: Chart) -> dict[str, Any]:
 
 
 def _numbers(values: Numbers) -> list[float | None]:
-    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
+    return [float(f"{value:.{LAYOUT.digits}g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
 def scripts() -> tuple[str, str, str]:

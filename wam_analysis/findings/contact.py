@@ -10,6 +10,7 @@ from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
 from wam_analysis.task_forces import arm_of
+from wam_analysis.thresholds import TOUCH
 from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
@@ -23,7 +24,6 @@ AFTER = {
     CutBy.RECORDING: "it goes past the end of the recording",
     CutBy.GAP: "the estimate is missing after it",
 }
-STEADY_LINK = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
 
 
 def contact_section(recording: AnalysedRun) -> Section:
@@ -108,7 +108,7 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     """What is not to be trusted of a contact, and whether it was another one."""
     if cut := [text for text in (BEFORE[contact.before], AFTER[contact.after]) if text]:
         yield f"{name}: {' and '.join(cut)}."
-    if contact.estimate.lasting < STEADY_LINK:
+    if contact.estimate.lasting < TOUCH.steady_link:
         yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
     if contact.estimate.reasons:
         yield f"{name}: {'; '.join(contact.estimate.reasons)}."

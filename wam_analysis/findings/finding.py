@@ -3,8 +3,7 @@
 import math
 from typing import NamedTuple
 
-NEGLECTED = 2e-3  # of a prediction: what its fit neglects, where a recording without noise has next to no error
-SIGMAS = 3.0  # standard errors by which a number may differ from its prediction
+from wam_analysis.thresholds import SHAFT
 
 
 class Finding(NamedTuple):
@@ -46,8 +45,8 @@ class Finding(NamedTuple):
         """Whether it differs from its prediction by more than three standard errors."""
         if self.is_ideal:
             return False
-        error = math.hypot(self.error, NEGLECTED * self.predicted)
-        return bool(abs(self.measured - self.predicted) > SIGMAS * error)  # not with NaN
+        error = math.hypot(self.error, SHAFT.neglected * self.predicted)
+        return bool(abs(self.measured - self.predicted) > SHAFT.sigmas * error)  # not with NaN
 
 
 class Section(NamedTuple):
@@ -81,7 +80,7 @@ def deviations(findings: tuple[Finding, ...]) -> tuple[str, ...]:
         f"{one.name} {shown(one.measured)} +- {shown(one.error, one.unit)}, predicted {shown(one.predicted)}"
         for one in found
     ]
-    return (f"More than {SIGMAS:g} standard errors from the prediction: {'; '.join(words)}.",)
+    return (f"More than {SHAFT.sigmas:g} standard errors from the prediction: {'; '.join(words)}.",)
 
 
 def shown(value: float, unit: str = "") -> str:

@@ -6,24 +6,22 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.findings.analysed_run import SHORTEST_HOLD, AnalysedRun
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
-from wam_analysis.findings.held_force import CYCLING, HeldForce
+from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
-from wam_analysis.measures.limit_cycle import FEWEST
+from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.thresholds import GUARD
 from wam_description.signals import BASE
 from wam_sim.reactions import FAULT, STEADY, TOO_MUCH, UNREACHED, RecordedReaction, too_short, unassessed, unmet, within
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
-SURE = 0.8  # confidence from which a limit cycle is reported as one
-NO_FORCE = f"No constant force was commanded for {SHORTEST_HOLD:g} s"
-SEEN = 0.02  # of the force; a smaller cycle is not reported
+NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
 
 
 def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
@@ -247,7 +245,7 @@ def _fate(one: HeldForce) -> tuple[str, str]:
     }
     text = f"{name}: the force {words[verdict.verdict]}"
     is_bad = verdict.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
-    if cycle.confidence >= SURE and cycle.peak_to_peak > SEEN * one.hold.commanded:
+    if cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded:
         if verdict.verdict is not Verdict.DIVERGED:
             text = f"{name}: the force oscillates"
         text += (
@@ -279,7 +277,7 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
                 size, period = shown(predicted.driven_peak_to_peak, "N"), shown(predicted.driven_period, "s")
                 text += f" ({size} and {period} with the compliance of the velocity loops)"
             text += "" if predicted.is_certain else " if the inertia were smaller, (5.11)"
-            if predicted.period * FEWEST > CYCLING * (one.hold.end - one.hold.begin) / 1e9:
+            if predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9:
                 text += ", which is too long for this recording"
         sentences.append(text + ".")
     return sentences
@@ -287,7 +285,7 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
 
 def _cycle_findings(one: HeldForce) -> list[Finding]:
     name, cycle, predicted = one.hold.name, one.cycle, one.predicted
-    seen = cycle.confidence >= SURE
+    seen = cycle.confidence >= CYCLE.sure
     force = period = soft_force = soft_period = math.nan
     note = ""
     if predicted is not None:

@@ -8,12 +8,8 @@ from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
 from wam_analysis.measures.runs import after_gaps
+from wam_analysis.thresholds import CYCLE
 from wam_description.arm import Arm
-
-COHERENT = 0.8  # coherence from which a response is taken
-EXCITED = 1e-4  # of the strongest part of the input
-SEGMENT = 2.0  # s
-SEGMENTS = 6  # that are averaged at least: of fewer, noise is often coherent
 
 
 def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
@@ -31,23 +27,25 @@ def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
             put, out = commanded[good, i], got[row[good], i]
             try:
                 found = frequency_response(
-                    rate, put, out, max(8, round(SEGMENT * rate)), after_gaps(commands.stamp_ns[good])
+                    rate, put, out, max(8, round(CYCLE.segment * rate)), after_gaps(commands.stamp_ns[good])
                 )
             except ValueError:
                 continue
-            if found.segments < SEGMENTS:
+            if found.segments < CYCLE.segments:
                 continue
-            believed = believable(found, COHERENT, EXCITED)
+            believed = believable(found, CYCLE.coherent, CYCLE.excited)
             width = bandwidth(found, believed)
             trusted = found.frequency[believed]
             top = float(trusted[-1]) if len(trusted) else math.nan
             findings += [
                 Finding(f"{name}: bandwidth of the velocity loop", "Hz", width, note="-3 dB, of the coherent part"),
-                Finding(f"{name}: highest coherent frequency", "Hz", top, note=f"coherence at least {COHERENT:g}"),
+                Finding(
+                    f"{name}: highest coherent frequency", "Hz", top, note=f"coherence at least {CYCLE.coherent:g}"
+                ),
             ]
             sentences.append(_bandwidth_sentence(name, width, top))
     if not sentences:
-        least = 0.5 * (SEGMENTS + 1) * SEGMENT
+        least = 0.5 * (CYCLE.segments + 1) * CYCLE.segment
         sentences.append(
             f"The velocity commands are too short for a frequency response, which takes {least:g} s without a gap."
         )
@@ -56,7 +54,7 @@ def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
 
 def _bandwidth_sentence(name: str, width: float, top: float) -> str:
     if math.isnan(width):
-        return f"{name}: bandwidth not identifiable (coherence below {COHERENT:g})."
+        return f"{name}: bandwidth not identifiable (coherence below {CYCLE.coherent:g})."
     if math.isinf(width):
         return f"{name} followed its velocity command up to {shown(top, 'Hz')}, the highest frequency that was excited."
     return f"{name} followed its velocity command up to {shown(width, 'Hz')} (-3 dB)."

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
+from wam_analysis.thresholds import HOLD
 from wam_control.force.force_loop_parameters import force_law, task_of
 from wam_control.force.friction_verdict import Domain
 from wam_control.force.guard import Supervision
@@ -19,7 +20,6 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
 Numbers = NDArray[np.float64]
-TYPICAL = 10.0  # N, of a press
 
 
 class Guarded(NamedTuple):
@@ -68,7 +68,7 @@ def guarded(
         guard = StabilityGuard(arm, servo, timing, parameters, loop.sensing)
     except ParameterError:
         return None
-    touches = guard.with_lever(GuardedContact(tuple(q), cover, position, 0.0, (x, y, z), TYPICAL))
+    touches = guard.with_lever(GuardedContact(tuple(q), cover, position, 0.0, (x, y, z), HOLD.typical_press))
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
     found = guard.assess(task_of(loop, law), touches)

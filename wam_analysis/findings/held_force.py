@@ -19,6 +19,7 @@ from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.task_forces import measured_force
+from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
@@ -26,14 +27,6 @@ from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
-STEADY = 0.4  # fraction of a hold, at its end, taken as steady
-CYCLING = 0.7  # fraction of it, at its end, searched for a limit cycle
-BAND = 0.05  # of the step: settled within it
-LOUD = 0.1  # of the force: an error that stays within it has settled
-LEAST_STEP = 0.1  # of the force; a smaller change is not evaluated as a step
-FRESH = 0.2  # s; the force of a more recent contact is that of the impact
-FAR = 0.5  # of a force: where the loop measured less by that of what acted before a command, it had no measurement
-FEW = 20  # samples below which a signal is not evaluated
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
@@ -106,11 +99,11 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     if not np.any(np.isfinite(true)):
         time_true, true = np.empty(0), np.empty(0)
     duration = (hold.end - hold.begin) / 1e9
-    late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
-    swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
+    late, late_true = time >= (1.0 - HOLD.steady) * duration, time_true >= (1.0 - HOLD.steady) * duration
+    swings, swings_true = time >= (1.0 - CYCLE.late_part) * duration, time_true >= (1.0 - CYCLE.late_part) * duration
     cover, position = _touched(recording, hold)
     touched = _touch_down(recording, hold)
-    response = _response(hold, time, measured, STEADY * duration)
+    response = _response(hold, time, measured, HOLD.steady * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     theory = _theory(recording, hold, cover, position)
@@ -168,13 +161,13 @@ def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:
 
 
 def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> StepResponse | None:
-    if len(time) < FEW:
+    if len(time) < SHAFT.fewest_samples:
         return None
     begin = float(measured[0])
-    if abs(hold.commanded - begin) < max(4.0 * noise(measured), LEAST_STEP * hold.commanded):
+    if abs(hold.commanded - begin) < max(4.0 * noise(measured), HOLD.least_step * hold.commanded):
         return None
     try:
-        return step_response(time, measured, begin, steady, BAND)
+        return step_response(time, measured, begin, steady, HOLD.band)
     except ValueError:
         return None
 
@@ -194,7 +187,7 @@ def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
         if not np.any(acts[first:last]) or not len(free) or not signal.is_known[free[-1]]:
             return math.nan
         begin = float(traces.stamp[free[-1] + 1] - hold.begin) / 1e9
-        return begin if begin > -FRESH else math.nan
+        return begin if begin > -HOLD.fresh else math.nan
     return math.nan
 
 
@@ -207,14 +200,14 @@ def _before(recording: AnalysedRun, hold: Hold, measured: Numbers) -> float:
             is_there = signal.acts[row] and signal.frame[row] in (hold.cover or hold.frame, BASE)
             force = float(signal.size[row]) if is_there or hold.frame == BASE else 0.0
             known = float(traces.measured.size[row] if traces.measured.is_known[row] else abs(measured[0]))
-            return force if force - known > FAR * max(force, hold.commanded) else 0.0
+            return force if force - known > HOLD.far * max(force, hold.commanded) else 0.0
     return 0.0
 
 
 def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
     """What repeats in a force, apart from the dither of a period, s, which a mean over it takes out; 0 for none."""
     good = np.isfinite(value)
-    if int(np.sum(good)) < FEW or np.mean(good) <= 0.95:
+    if int(np.sum(good)) < SHAFT.fewest_samples or np.mean(good) <= 0.95:
         return None
     time, value = time[good], value[good]
     if dither and (width := round(dither / float(np.median(np.diff(time))))) > 1:
@@ -224,9 +217,9 @@ def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
 
 
 def _stability(hold: Hold, measured: Numbers) -> Stability:
-    if len(measured) < FEW:
+    if len(measured) < SHAFT.fewest_samples:
         return UNDECIDED
-    return stability(hold.commanded - measured, max(LOUD * hold.commanded, 4.0 * noise(measured)))
+    return stability(hold.commanded - measured, max(HOLD.loud * hold.commanded, 4.0 * noise(measured)))
 
 
 def _touched(recording: AnalysedRun, hold: Hold) -> tuple[str, float]:

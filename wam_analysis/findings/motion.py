@@ -17,24 +17,14 @@ from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recorded import PredictionParameters
+from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
 Numbers = NDArray[np.float64]
 
-MOTOR_REST = 0.05  # rad/s; a slower motor is at rest
-JOINT_REST = 0.002  # rad/s
-SHORTEST = 0.01  # s; a shorter stick or slip is chatter
-WINDOW = 0.03  # s over which friction is averaged
-ORDERS = 48  # of the ripple, cycles per turn
-ENOUGH = 1.2  # turns that determine it where they have no gaps
-FAINT = 3.0  # times the median order; smaller ripple is not reported
-SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
-UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable"
 ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
-DROWNED = 10.0  # times the torque of the cables; rotors that take more hide every loss
-IMPOSSIBLE = 3.0  # standard errors below zero
 
 
 class MotionFindings(NamedTuple):
@@ -83,7 +73,7 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
     """
     accelerates = np.abs(np.array(arm.motors.inertia) * np.gradient(signals.velocity, signals.time, axis=0))
     rotors, cables = float(np.max(accelerates)), float(np.max(np.abs(signals.load)))
-    if rotors <= DROWNED * cables:
+    if rotors <= SHAFT.drowned * cables:
         return ""
     return (
         "Friction, ripple and efficiency of the motors were not measured: to accelerate the rotors takes up to "
@@ -97,7 +87,11 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
 
 def _stick_section(recording: AnalysedRun) -> Section:
     sentences, findings = [], []
-    for topic, rest in (("motor_states", MOTOR_REST), ("joint_sensors", JOINT_REST), ("joint_states", JOINT_REST)):
+    for topic, rest in (
+        ("motor_states", SHAFT.motor_rest),
+        ("joint_sensors", SHAFT.joint_rest),
+        ("joint_states", SHAFT.joint_rest),
+    ):
         columns = recording.run.joints(topic)
         if columns is None or not columns.velocity.shape[1] or len(columns.stamp_ns) < 10:
             continue
@@ -109,7 +103,7 @@ def _stick_section(recording: AnalysedRun) -> Section:
             velocity = velocity[np.isfinite(velocity)]
             if len(velocity) < 10:
                 continue
-            phases = stick_slip_phases(velocity, rest, max(1, round(SHORTEST / period)))
+            phases = stick_slip_phases(velocity, rest, max(1, round(SHAFT.shortest_phase / period)))
             phases = without_turns(phases, velocity, rest)
             findings += [
                 Finding(f"{name}: at rest", "%", 100.0 * phases.stuck, note=f"slower than {rest:g} rad/s"),
@@ -152,8 +146,8 @@ def _friction_of_motors(
                 signals.time,
                 velocity[:, i],
                 free[:, i],
-                MOTOR_REST,
-                WINDOW,
+                SHAFT.motor_rest,
+                SHAFT.window,
                 signals.use,
                 waves=np.hstack([_waves(signals, i, name, parameters), _unrecorded(signals, i)]),
             )
@@ -199,7 +193,7 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
     if signals.load_from != CABLE or not np.any(np.isfinite(free)):
         return {}
     return {
-        name: _possible(identify_friction(time, velocity[:, i], free[:, i], JOINT_REST, WINDOW, use))
+        name: _possible(identify_friction(time, velocity[:, i], free[:, i], SHAFT.joint_rest, SHAFT.window, use))
         for i, name in enumerate(arm.joints.names)
     }
 
@@ -207,7 +201,7 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
 def _possible(found: Friction) -> Friction:
     """The friction, without its numbers where one is surely below zero: then the torque holds more than friction."""
     known = ((found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error))
-    if not any(value < -IMPOSSIBLE * error for value, error in known):
+    if not any(value < -SHAFT.below_zero * error for value, error in known):
         return found
     nan = math.nan
     return found._replace(static=nan, dynamic=nan, viscous=nan, inertia=nan)
@@ -274,7 +268,7 @@ def _known(value: float, error: float, unit: str) -> str:
 
 
 def _is_identified(value: float, error: float) -> bool:
-    return not error > UNSURE * abs(value)
+    return not error > SHAFT.unsure * abs(value)
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
@@ -342,13 +336,13 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
         rest = rest - np.nan_to_num(known.viscous) * velocity
         rest = rest - arm.motors.inertia[i] * np.gradient(velocity, signals.time)
         rows &= np.abs(rest) < 10.0 * float(np.median(np.abs(rest[rows]))) + 1e-12
-        found[name] = ripple_spectrum(signals.angle[rows, i], rest[rows], ORDERS)
+        found[name] = ripple_spectrum(signals.angle[rows, i], rest[rows], SHAFT.orders)
     return found
 
 
 def _turning(signals: TransmissionSignals, motor: int) -> NDArray[np.bool_]:
     """The samples in which a motor turns."""
-    return (np.abs(signals.velocity[:, motor]) > MOTOR_REST) & signals.use & signals.sampled
+    return (np.abs(signals.velocity[:, motor]) > SHAFT.motor_rest) & signals.use & signals.sampled
 
 
 def _ripple_section(
@@ -360,7 +354,7 @@ def _ripple_section(
     sentences, findings = [], []
     for name, found in ripple.items():
         if not len(found.order):
-            why = "too few" if found.turns < ENOUGH else "with too large gaps"
+            why = "too few" if found.turns < SHAFT.enough_turns else "with too large gaps"
             sentences.append(f"{name} made {found.turns:.2f} turns, {why} to identify its ripple.")
             continue
         top = int(np.argmax(found.amplitude))
@@ -375,7 +369,10 @@ def _ripple_section(
                 f"{order} cycles per turn, {found.turns:.1f} turns",
             )
         )
-        clear = amplitude > FAINT * float(np.median(found.amplitude)) and amplitude > SLIGHT * friction[name].dynamic
+        clear = (
+            amplitude > SHAFT.faint_ripple * float(np.median(found.amplitude))
+            and amplitude > SHAFT.slight_ripple * friction[name].dynamic
+        )
         sentences.append(
             f"{name}: {shown(amplitude, 'N m')} at {order} cycles per turn."
             if clear

@@ -10,9 +10,8 @@ from wam_analysis.findings.charts import Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.plots import Plot, plots
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.losses import PARAMETERS
-
-NARROW = 640  # px; up to this width the narrow pictures are shown
 
 # no network access, whatever is in the bag; only the scripts of this page run
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {}"
@@ -144,7 +143,7 @@ def _figure(picture: Plot) -> str:
     text = html.escape(picture.title)
     image = f'<img alt="{text}" src="{wide}">'
     if picture.wide != picture.narrow:
-        image = f'<picture><source media="(max-width: {NARROW}px)" srcset="{narrow}">{image}</picture>'
+        image = f'<picture><source media="(max-width: {LAYOUT.narrow_page}px)" srcset="{narrow}">{image}</picture>'
     kind = ' class="arm"' if picture.kind == "png" else ' class="still"' if picture.has_chart else ""
     return f"<figure{kind}>{image}<figcaption>{text}</figcaption></figure>"
 

@@ -25,14 +25,12 @@ from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.signals import envelope, forces_over_time, moving
 from wam_analysis.measures.loop_timing import latency
 from wam_analysis.recorded import recorded_arm
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 
-WIDE, NARROW = 9.6, 4.1  # inches
-MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
-PNG_DPI = 130
-TICKS = 5  # at most, across a small picture
+MOST = {LAYOUT.wide: 3000, LAYOUT.narrow: 1200}  # points of a line
 PAGE_STYLE: Any = {
     **STYLE,
     "font.size": 10.0,
@@ -120,7 +118,7 @@ def _figure(width: float, height: float, draw: Draw) -> Figure:
 def _svg(section: str, title: str, draw: Draw, wide: float, narrow: float) -> Plot:
     pictures = []
     with mpl.rc_context(PAGE_STYLE):
-        for width, height in ((WIDE, wide), (NARROW, narrow)):
+        for width, height in ((LAYOUT.wide, wide), (LAYOUT.narrow, narrow)):
             stream = io.BytesIO()
             _figure(width, height, draw).savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
             pictures.append(stream.getvalue())
@@ -131,7 +129,7 @@ def _arm(analysis: Analysis) -> Plot:
     """The arm, rendered by MuJoCo or drawn, the same for both widths."""
     recording = analysis.recording
     recorded = recorded_arm(recording.run.parameters)
-    figure = Figure(figsize=(5.6, 4.2), dpi=PNG_DPI)
+    figure = Figure(figsize=(5.6, 4.2), dpi=LAYOUT.png_dpi)
     FigureCanvasAgg(figure)
     stream = io.BytesIO()
     with mpl.rc_context(PAGE_STYLE):
@@ -149,7 +147,7 @@ def _story(figure: Figure, width: float, analysis: Analysis) -> None:
     summary = analysis.recording.summary
     arm = analysis.recording.parameters.arm or recorded_arm(analysis.recording.run.parameters).arm
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
-    is_wide = width > NARROW
+    is_wide = width > LAYOUT.narrow
     draw_forces(above, summary, letter="", room=105 if is_wide else 0, most=MOST[width])
     draw_positions(below, summary, arm, letter="", most=MOST[width])
 
@@ -169,7 +167,7 @@ def _positions(figure: Figure, width: float, columns: JointColumns) -> None:
 def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
     """Velocity over position of each joint: a cycle is a closed curve."""
     n = columns.position.shape[1]
-    across = min(2, n) if width > NARROW else 1
+    across = min(2, n) if width > LAYOUT.narrow else 1
     grid = figure.subplots(math.ceil(n / across), across, squeeze=False)
     every = max(1, len(columns.stamp_ns) // MOST[width])
     for i, (axes, name) in enumerate(zip(grid.flat, columns.names, strict=False)):
@@ -177,7 +175,7 @@ def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
         axes.plot(position, velocity, color=SHAFTS[i % len(SHAFTS)], lw=0.8)
         axes.set(xlabel=f"{name} [rad]", ylabel="velocity [rad/s]")
         widen_flat(axes)
-        axes.locator_params(axis="x", nbins=TICKS)
+        axes.locator_params(axis="x", nbins=LAYOUT.ticks)
     for axes in list(grid.flat)[n:]:
         axes.set_axis_off()
 
@@ -193,13 +191,13 @@ def _wrench(figure: Figure, width: float, columns: WrenchColumns) -> None:
 
 
 def _legend(axes: Axes, width: float) -> None:
-    columns = 8 if width > NARROW else 4
+    columns = 8 if width > LAYOUT.narrow else 4
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, handlelength=1.4, columnspacing=1.0)
 
 
 def _holds(figure: Figure, width: float, analysis: Analysis) -> None:
     held = [one for one in analysis.held if len(one.time)][:6]
-    across = min(3, len(held)) if width > NARROW else 1
+    across = min(3, len(held)) if width > LAYOUT.narrow else 1
     grid = figure.subplots(math.ceil(len(held) / across), across, squeeze=False)
     for axes, one in zip(grid.flat, held, strict=False):
         most = MOST[width] // across
@@ -222,7 +220,7 @@ def _friction(figure: Figure, width: float, analysis: Analysis) -> None:
     if signals is None or arm is None:
         return
     n = signals.torque.shape[1]
-    across = min(2, n) if width > NARROW else 1
+    across = min(2, n) if width > LAYOUT.narrow else 1
     grid = figure.subplots(math.ceil(n / across), across, squeeze=False)
     some = np.flatnonzero(signals.use)
     some = some[:: max(1, len(some) // (MOST[width] // 2))]
@@ -242,7 +240,7 @@ def _friction(figure: Figure, width: float, analysis: Analysis) -> None:
         axes.set_ylim(-limit, limit)
         axes.set_title(name)
         axes.set_xlabel("speed [rad/s]")
-        axes.locator_params(axis="x", nbins=TICKS)
+        axes.locator_params(axis="x", nbins=LAYOUT.ticks)
     for row in grid:
         row[0].set_ylabel("torque [mN m]")
     for axes in list(grid.flat)[n:]:
@@ -269,7 +267,7 @@ def timing_plots(analysis: Analysis) -> Iterator[Plot]:
 
     def draw(figure: Figure, width: float) -> None:
         axes = figure.subplots()
-        bars = 80 if width > NARROW else 40
+        bars = 80 if width > LAYOUT.narrow else 40
         last = max(float(np.percentile(intervals, 99.9)), 1e-3)
         axes.hist(np.clip(intervals, 0.0, last), bars, range=(0.0, last), color=TRUE)
         axes.set(xlabel="interval [ms]", ylabel="messages", yscale="log")

@@ -9,11 +9,10 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.transmission_signals import TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction
+from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
 Numbers = NDArray[np.float64]
-
-LEAST_WORK = 1e-3  # J below which no efficiency is given
 
 
 def power_section(
@@ -38,7 +37,7 @@ def power_section(
                 "The efficiency was not measured: the work that rotors and cables store and return is larger here than "
                 "what is lost."
             )
-        elif found.forward_put > LEAST_WORK:
+        elif found.forward_put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
@@ -50,7 +49,7 @@ def power_section(
                 f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
                 "recording."
             )
-        if is_measured and found.back_put > LEAST_WORK:
+        if is_measured and found.back_put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
             sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
     findings += _backdrive(arm, friction, joints)

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.recorded import PredictionParameters
+from wam_analysis.thresholds import HOLD
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_theory import linear_loop, regimes, stiction
 
 Numbers = NDArray[np.float64]
-
-CERTAIN = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough for a comparison
 
 
 class Node(NamedTuple):
@@ -169,7 +168,7 @@ def predict(node: Node, gain: float, proportional_gain: float, sample_period: fl
         slow = float(linear_loop.damping_ratio(j, b, soft, kc))
         driven_force = float(stiction.stiction_cycle_force(soft, kc, fs, fd, slow))
         driven_period = float(stiction.stiction_cycle_period(gain, soft, kc, fs, fd, slow))
-    certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= CERTAIN
+    certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
     return Predicted(
         gamma=gamma,
         zeta=zeta,

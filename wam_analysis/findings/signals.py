@@ -4,14 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.thresholds import LAYOUT, STREAM
 from wam_bag.bag import JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 
 ORDER = ("joint_sensors", "joint_states", "sim/joint_states", "motor_states")  # where motion is best seen
 COMMANDS = ("/force_command", "/sim/disturbance")  # forces that were commanded
-FEWEST = 3  # messages of a topic that is shown
-AMPLITUDE = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
 
 
 def forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Numbers]] | None:
@@ -36,7 +35,7 @@ def moving(recording: AnalysedRun) -> dict[str, JointColumns | WrenchColumns]:
     topics = {
         name: columns
         for name, columns in sorted(recording.bag.topics.items())
-        if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= FEWEST
+        if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= STREAM.shown
     }
     joints = {n: c for n, c in topics.items() if isinstance(c, JointColumns) and c.position.size}
     own = [name for name in (f"{recording.namespace}/{seen}" for seen in ORDER) if name in joints]
@@ -58,7 +57,7 @@ def spectrum(columns: JointColumns) -> tuple[Numbers, Numbers]:
     window = np.hanning(n)[:, np.newaxis]
     amplitude = 2.0 * np.abs(np.fft.rfft(flat * window, axis=0)) / float(window.sum())
     frequency = np.fft.rfftfreq(n, float(columns.stamp_ns[-1] - columns.stamp_ns[0]) / 1e9 / (n - 1))
-    shown: Numbers = np.maximum(amplitude[1:], AMPLITUDE).astype(np.float64)
+    shown: Numbers = np.maximum(amplitude[1:], LAYOUT.amplitude).astype(np.float64)
     return frequency[1:].astype(np.float64), shown
 
 

@@ -10,15 +10,11 @@ from wam_analysis.findings.analysed_run import AnalysedRun, Hold
 from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.thresholds import CYCLE
 from wam_bag.bag import JointColumns
 from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
-
-LATE = 0.7  # of a hold, at its end: its range is that of the motion without the approach
-LEAST = 0.05  # of that range: a smaller change is no swing
-LOUD = 8.0  # standard deviations of the noise: likewise
-STILL = 1e-4  # rad; a shaft that moves less does not swing
 
 
 class Swinging(NamedTuple):
@@ -51,10 +47,14 @@ def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
     value = columns.position[a:b, i]
     if len(value) < 20 or not np.all(np.isfinite(value)):
         return None
-    extent = float(np.ptp(value[int((1.0 - LATE) * len(value)) :]))
-    if extent < STILL:
+    extent = float(np.ptp(value[int((1.0 - CYCLE.late_part) * len(value)) :]))
+    if extent < CYCLE.still_shaft:
         return None
-    return swings((columns.stamp_ns[a:b] - hold.begin) / 1e9, value, max(LEAST * extent, LOUD * noise(value)))
+    return swings(
+        (columns.stamp_ns[a:b] - hold.begin) / 1e9,
+        value,
+        max(CYCLE.least_swing * extent, CYCLE.loud_swing * noise(value)),
+    )
 
 
 def swinging_words(name: str, found: Swinging) -> tuple[str, str]:

@@ -9,9 +9,8 @@ from typing import Any
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
+from wam_analysis.thresholds import LAYOUT
 
-WIDTH, NARROWEST = 100, 40  # columns of text, at most and at least
-NAME, COLUMN = 0.4, 12  # widths in a table: of a name at most, of all; of a number at least, columns
 SCHEMA = 3  # of the JSON; incremented when a key changes its name or meaning
 
 
@@ -22,8 +21,8 @@ def text(analysis: Analysis, width: int | None = None) -> str:
     ----------
     width : columns; None takes those of the terminal, at most 100.
     """
-    wide = shutil.get_terminal_size((WIDTH, 24)).columns if width is None else width
-    wide = min(max(wide, NARROWEST), WIDTH)
+    wide = shutil.get_terminal_size((LAYOUT.width, 24)).columns if width is None else width
+    wide = min(max(wide, LAYOUT.narrowest), LAYOUT.width)
     lines: list[str] = []
     for section in analysis.sections:
         lines += ["", section.title, "─" * len(section.title)]
@@ -54,8 +53,11 @@ def _tables(section: Section, wide: int) -> list[str]:
 
 def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
     """The table in blocks that fit, each with the names of the rows; a prediction stays with what it predicts."""
-    names = max(COLUMN, min(int(NAME * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows))))))
-    column = max(COLUMN, *(len(word) for name in table.columns[1:] for word in name.split()))  # no word is broken
+    names = max(
+        LAYOUT.column, min(int(LAYOUT.name * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows)))))
+    )
+    words = [word for name in table.columns[1:] for word in name.split()]  # none is broken
+    column = max(LAYOUT.column, *map(len, words))
     column = min(column, wide - 4 - names)
     fits = max(1, (wide - 2 - names) // (column + 2))
     groups: list[list[int]] = []

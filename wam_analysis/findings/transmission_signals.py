@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
 from wam_analysis.measures.runs import after_gaps
+from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 
@@ -15,12 +16,7 @@ Numbers = NDArray[np.float64]
 
 CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"
-RELEASE = 200_000_000  # ns after the brakes were released
-SLOWEST = 0.006  # s; with a longer period, cable torques do not show what a resonance does between samples
 GRAVITY = "gravity alone, while nothing touches"
-AROUND = (
-    200_000_000  # ns before and after a push or an estimated contact: it begins before it is detected, cables swing
-)
 TOUCHES = ("contact/wrench", "sim/disturbance")  # the second is of a simulated arm
 SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
 
@@ -77,7 +73,7 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
         (
             (values, name)
             for values, name in ((cable, CABLE), (strain, STRAIN), (gravity, GRAVITY))
-            if np.any(np.isfinite(values)) and (name != CABLE or _period(recording) <= SLOWEST)
+            if np.any(np.isfinite(values)) and (name != CABLE or _period(recording) <= SHAFT.slowest_period)
         ),
         (cable, ""),
     )
@@ -116,7 +112,7 @@ def _braked(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.boo
         if status.node != "driver" or not status.mode or not status.stamp:
             continue
         if status.mode == "enabled" and since is not None:
-            braked |= (stamps >= since) & (stamps < status.stamp + RELEASE)
+            braked |= (stamps >= since) & (stamps < status.stamp + SHAFT.release)
             since = None
         elif status.mode != "enabled" and since is None:
             since = status.stamp
@@ -131,7 +127,7 @@ def _touched(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bo
         if forces is None:
             continue
         acting = forces.stamp_ns[np.any(forces.force != 0.0, axis=1)]
-        near = np.searchsorted(acting, [stamps - AROUND, stamps + AROUND])
+        near = np.searchsorted(acting, [stamps - SHAFT.around_contact, stamps + SHAFT.around_contact])
         touched |= near[1] > near[0]
     return touched
 

@@ -7,16 +7,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import STREAM
 from wam_bag.bag import JointColumns, WrenchColumns
 
 Times = NDArray[np.int64]
 
-PACE = 0.2  # by which the median period of the receptions may differ from that of the stamps
-RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
-AWAY = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
-LIVE = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
 CLOCK_SET = "stamps of a clock that was set or never set; times of reception are used"
-NEAR = 20  # messages on both sides of a stamp that goes back, whose ages show whether the clock was set back
 
 
 class Clock(NamedTuple):
@@ -55,7 +51,7 @@ def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Cloc
 
 def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name: str) -> Clock:
     """A clock by that of a reference, whose messages of some times arrived then."""
-    if not len(times) or not len(received) or np.ptp(arrivals) < LIVE * np.ptp(times):
+    if not len(times) or not len(received) or np.ptp(arrivals) < STREAM.live * np.ptp(times):
         return clock
     order = np.argsort(arrivals, kind="stable")
     begin = arrivals[order[0]]
@@ -63,11 +59,11 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
     there = np.interp((received - begin).astype(float), (arrivals[order] - begin).astype(float), (age - age[0]) * 1.0)
     apart = received - clock.times - age[0] - np.rint(there).astype(np.int64)
     shift = round(float(np.median(apart - apart[0]))) + int(apart[0])
-    if abs(shift) <= RESET:
+    if abs(shift) <= STREAM.reset:
         return clock
     side = "behind" if shift > 0 else "ahead of"
     note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as of another clock"
-    if float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05)) > RESET:
+    if float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05)) > STREAM.reset:
         return Clock(clock.times + apart, clock.note or f"{note}; times of reception are used")
     return Clock(clock.times + shift, clock.note or f"{note}; shifted by that")
 
@@ -78,24 +74,24 @@ def rising(stamps: Times, received: Times) -> Times:
     A clock was set forward where the stamps jump and the receptions, which keep the same period, do not.  A few stamps
     that are years away from their reception, such as 0, are replaced by it.
     """
-    away = np.abs(stamps - received) > AWAY
+    away = np.abs(stamps - received) > STREAM.away
     if 2 * int(np.sum(away)) < len(stamps):
         stamps = np.where(away, received, stamps)
     steps = np.diff(stamps)
     arrivals = np.diff(received)
-    keeps_pace = len(steps) > 0 and abs(np.median(arrivals) - np.median(steps)) <= PACE * np.median(steps)
-    was_set = bool(keeps_pace and np.any(steps - arrivals > RESET))
-    is_reset = np.any(steps < -RESET) or (keeps_pace and _is_set_back(stamps, received))
+    keeps_pace = len(steps) > 0 and abs(np.median(arrivals) - np.median(steps)) <= STREAM.pace * np.median(steps)
+    was_set = bool(keeps_pace and np.any(steps - arrivals > STREAM.reset))
+    is_reset = np.any(steps < -STREAM.reset) or (keeps_pace and _is_set_back(stamps, received))
     return received if was_set or is_reset or (len(steps) and not np.any(steps)) else stamps
 
 
 def _is_set_back(stamps: Times, received: Times) -> bool:
     """Whether a stamp goes back and the later ones stay as much older, unlike one message that was late."""
     rows = np.flatnonzero(np.diff(stamps) < 0)
-    rows = rows[(rows + 1 >= NEAR) & (rows + 1 <= len(stamps) - NEAR)]
+    rows = rows[(rows + 1 >= STREAM.near) & (rows + 1 <= len(stamps) - STREAM.near)]
     if not len(rows):
         return False
     age = (received - stamps) - (received[0] - stamps[0])
-    windows = sliding_window_view(age, NEAR)
-    before, after = (np.median(windows[rows + at], axis=1) for at in (1 - NEAR, 1))
+    windows = sliding_window_view(age, STREAM.near)
+    before, after = (np.median(windows[rows + at], axis=1) for at in (1 - STREAM.near, 1))
     return bool(np.any(after - before > 0.5 * (stamps[rows] - stamps[rows + 1])))

@@ -7,24 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import ABSENT, FEWEST, Piece, Source, longest, pieces
-from wam_analysis.measures.episodes import EDGE, Episode, episodes, without_drift
+from wam_analysis.foreign.sources import Piece, Source, longest, pieces
+from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import SpectralLine, spectral_lines
+from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 
 Numbers = NDArray[np.float64]
 
 LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1e-2, "A": 1e-3}  # peak to peak
-LOUD = 4.0  # standard deviations of the noise: a smaller cycle is not reported
-ALIKE = 0.03  # relative difference of two frequencies that are the same
-COMMANDED = 0.2  # of a cycle: a command that is smaller does not cause it
-LONGEST_LAG = 0.15  # s by which a joint may follow its command, in so many steps at most:
-MOST_LAGS = 40
-SLOW = (0.03, 0.1, 0.3)  # s, of the filters through which it may follow
-SINGULAR = 1e-8  # of the largest singular value: smaller ones of a command are rounding
-HARMONICS = 20  # of a commanded motion that are taken off before another cycle is looked for
-NEAR = 0.1  # of a frequency: what remains so near to the first harmonics is the command with a changing size
-LINES = 3  # of a spectrum
 
 COMMANDED_CYCLE, LIMIT_CYCLE, UNKNOWN = "commanded", "limit cycle", "not known whether commanded"
 HARMONIC = "near a multiple of the commanded frequency"
@@ -76,7 +67,7 @@ def cycles(source: Source, command: Source | None) -> list[FoundCycle]:
         label = source.label if source.is_joint else f"{source.label} {quantity}"
         unit = source.units[quantity]
         for piece in pieces(source):
-            least = max(LOUD * piece.noise[quantity], LEAST.get(unit, 0.0))
+            least = max(CYCLE.loud * piece.noise[quantity], LEAST.get(unit, 0.0))
             for one, origin, error in _of_piece(piece, quantity, command, least):
                 cycle = one.cycle
                 size = (cycle.peak_to_peak, error, cycle.growth, cycle.confidence)
@@ -92,7 +83,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         frequency = _commanded_frequency(one, quantity, command)
         if frequency is None:
             result.append((one, UNKNOWN, math.nan))
-        elif abs(frequency * one.cycle.period - 1.0) > ALIKE:
+        elif abs(frequency * one.cycle.period - 1.0) > CYCLE.same_frequency:
             if rest is None:
                 result.append((one, LIMIT_CYCLE, math.nan))
         else:
@@ -106,7 +97,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         return result
     for one in _found(piece, quantity, rest, least):
         frequency = _commanded_frequency(one, quantity, command) or 0.0
-        if abs(frequency * one.cycle.period - 1.0) <= ALIKE:
+        if abs(frequency * one.cycle.period - 1.0) <= CYCLE.same_frequency:
             continue  # the commanded motion itself, which it does not follow linearly
         inner = (piece.time >= one.begin) & (piece.time <= one.end)
         error = error_of_size(piece.time[inner], rest[inner], one.cycle.period)
@@ -123,7 +114,9 @@ def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterato
     for one in episodes(piece.time, value, least):
         if piece.stamps is not piece.time:
             period = one.cycle.period
-            first, last = (EDGE * period * (at not in (piece.time[0], piece.time[-1])) for at in (one.begin, one.end))
+            first, last = (
+                CYCLE.edge * period * (at not in (piece.time[0], piece.time[-1])) for at in (one.begin, one.end)
+            )
             inner = (piece.stamps >= one.begin + first) & (piece.stamps <= one.end - last)
             drift = piece.values[quantity] - without_drift(piece.time, value, period)
             stamps = piece.stamps[inner]
@@ -136,12 +129,16 @@ def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterato
 def _is_harmonic(one: Episode, frequency: float) -> bool:
     """Whether an episode is one of the first harmonics of a frequency, 0 for none."""
     order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
-    return order <= 0.5 + HARMONICS and abs(order - round(order)) <= NEAR
+    return order <= 0.5 + CYCLE.harmonics and abs(order - round(order)) <= CYCLE.near_harmonic
 
 
 def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
     """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
-    if quantity not in command.values or len(command.time) < FEWEST or _begins_after(command, piece.time[0]):
+    if (
+        quantity not in command.values
+        or len(command.time) < SHAFT.fewest_samples
+        or _begins_after(command, piece.time[0])
+    ):
         return None
     if np.any(command.is_away(piece.time)):
         return None
@@ -156,11 +153,11 @@ def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers |
 def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     """A signal less its linear response to a command at the same times."""
     period = float(piece.time[1] - piece.time[0])
-    lags = np.unique(np.round(np.linspace(0.0, LONGEST_LAG / period, MOST_LAGS)).astype(np.int64))
+    lags = np.unique(np.round(np.linspace(0.0, CYCLE.longest_lag / period, CYCLE.lags)).astype(np.int64))
     late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
-    slow = [_slowed(desired, period / (period + tau)) for tau in SLOW]
+    slow = [_slowed(desired, period / (period + tau)) for tau in CYCLE.command_filters]
     columns = np.column_stack([np.ones(len(desired)), *late, *slow])
-    rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=SINGULAR)[0]
+    rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]
     return rest
 
 
@@ -184,14 +181,14 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
         return None
     value = held(command, desired, time)
     cycle = limit_cycle(time, value)
-    is_small = desired == quantity and cycle.peak_to_peak < COMMANDED * one.cycle.peak_to_peak
+    is_small = desired == quantity and cycle.peak_to_peak < CYCLE.commanded * one.cycle.peak_to_peak
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 
 def _begins_after(command: Source, begin: float) -> bool:
     """Whether nothing was commanded yet; of two topics that begin at once either may have the first message."""
-    period = float(np.median(np.diff(command.time))) if len(command.time) >= FEWEST else 0.0
-    return float(command.time[0]) > begin + ABSENT * period
+    period = float(np.median(np.diff(command.time))) if len(command.time) >= SHAFT.fewest_samples else 0.0
+    return float(command.time[0]) > begin + STREAM.absent * period
 
 
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:
@@ -203,7 +200,7 @@ def held(command: Source, quantity: str, time: Numbers) -> Numbers:
 
 def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
     """A signal less its mean, its drift and the harmonics of a frequency."""
-    most = min(HARMONICS, int(0.5 / (frequency * float(time[1] - time[0]))) - 1)
+    most = min(CYCLE.harmonics, int(0.5 / (frequency * float(time[1] - time[0]))) - 1)
     angles = 2.0 * np.pi * frequency * np.outer(time - time[0], np.arange(1, most + 1))
     columns = np.column_stack([np.ones(len(time)), time - time[0], np.cos(angles), np.sin(angles)])
     rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
@@ -218,6 +215,6 @@ def lines(source: Source) -> list[tuple[str, str, SpectralLine]]:
     return [
         (source.label if source.is_joint else f"{source.label} {quantity}", source.units[quantity], line)
         for quantity in traced(source)
-        for line in spectral_lines(piece.time, piece.values[quantity], LINES)
+        for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines)
         if 2.0 * line.amplitude > LEAST.get(source.units[quantity], 0.0)
     ]

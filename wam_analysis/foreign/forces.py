@@ -7,14 +7,10 @@ from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Source, pieces
 from wam_analysis.measures.response import StepResponse, step_response
+from wam_analysis.thresholds import HOLD
 
 Numbers = NDArray[np.float64]
 
-SHORTEST = 0.3  # s; a shorter constant command is part of a ramp
-SMALL = 0.01  # N; commands that differ by less are equal
-STEADY = 0.4  # of a hold, at its end
-BEFORE = 0.1  # s before a step, whose mean is where it begins
-BAND = 0.05  # of the step: settled
 FORCE = ("force.x", "force.y", "force.z")
 
 
@@ -47,7 +43,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     if not axes or not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])
-    changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > SMALL, axis=1)) + 1
+    changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > HOLD.equal_force, axis=1)) + 1
     begins = [0, *changed.tolist()]
     ends = [*command.time[changed].tolist(), float(measured.time[-1])]
     stretches = pieces(measured)
@@ -60,18 +56,22 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
         end = min(until, command.leaves(begin), measured.leaves(begin))
         change = desired[row] - desired[last]
         size = float(np.linalg.norm(change))
-        if size <= SMALL or arrives[row] or end - begin < SHORTEST:
+        if size <= HOLD.equal_force or arrives[row] or end - begin < HOLD.shortest:
             continue
         way = change / size
         for piece in stretches:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
-            before = (piece.time < begin) & (piece.time >= begin - BEFORE)
+            before = (piece.time < begin) & (piece.time >= begin - HOLD.before)
             after = (piece.time >= begin) & (piece.time < end)
-            if not np.any(before) or int(np.sum(after)) < 8 or float(piece.time[after][-1]) < end - BEFORE:
+            if not np.any(before) or int(np.sum(after)) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             try:
                 response = step_response(
-                    piece.time[after] - begin, value[after], float(np.mean(value[before])), STEADY * (end - begin), BAND
+                    piece.time[after] - begin,
+                    value[after],
+                    float(np.mean(value[before])),
+                    HOLD.steady * (end - begin),
+                    HOLD.band,
                 )
             except ValueError:
                 continue

@@ -7,28 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces, resolution
+from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, resolution
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
+from wam_analysis.thresholds import SHAFT
 
 Numbers = NDArray[np.float64]
 
-REST = 0.002  # rad/s or m/s; a slower joint is at rest, unless the noise is larger
-NOISY = 6.0  # standard deviations of the noise of a velocity: likewise
-FAR = 20.0  # resolutions of a position, or seconds at the speed `REST`: who moves so far has moved
-BRIEFEST = 0.01  # s; a shorter stick or slip is chatter
-BRIEF = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
-TURNS = 0.8  # of the rests of such a joint have motion to the other side behind them
-WINDOW = 0.03  # s over which friction is averaged
-FEWEST_SAMPLES = 6  # in that window
-BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
-MUCH_BETTER = 0.5  # likewise, with a drag or a lag
 WEIGHT, DRAG, FILTER = "weight", "drag", "filter"
-LONGEST_LAG = 0.06  # s of the effort behind the motion, or before it
-APART = 0.1  # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
-SURE = 0.25  # of a number; with a larger standard error it is not identifiable
-AGREE = 0.2  # by which a recorded velocity may differ from the rate of the position
-BELOW_ZERO = 3.0  # standard errors: a fit in which one number is so negative holds more than friction
 
 
 class Sticking(NamedTuple):
@@ -55,12 +41,12 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
             return None
         rest = _rest(piece)
         period = float(piece.time[1] - piece.time[0])
-        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(BRIEFEST / period)))
+        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
         total += len(piece.time)
         if _only_turns(phases, piece.values["velocity"]):
             slips += 1
             lengths = np.diff(phases.sticks, axis=1)
-            still += int(np.sum(lengths[lengths > BRIEF * np.median(np.diff(phases.slips, axis=1))]))
+            still += int(np.sum(lengths[lengths > SHAFT.brief * np.median(np.diff(phases.slips, axis=1))]))
             continue
         phases = without_turns(phases, piece.values["velocity"], rest)
         still += round(phases.stuck * len(piece.time))
@@ -77,16 +63,16 @@ def hidden_motion(source: Source) -> float:
     """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
     position = source.values.get("position", np.zeros(1))
     distance = float(np.ptp(position))
-    return distance if distance > FAR * max(resolution(position), REST) else 0.0
+    return distance if distance > SHAFT.far * max(resolution(position), SHAFT.joint_rest) else 0.0
 
 
 def _only_turns(phases: Phases, velocity: Numbers) -> bool:
     """Whether it is one motion back and forth, which is slow for a moment where it turns."""
     between = phases.sticks[1:-1]
-    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < TURNS:
+    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < SHAFT.turns:
         return False
     rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
-    return rest < BRIEF * motion
+    return rest < SHAFT.brief * motion
 
 
 def _turns(sticks: NDArray[np.int64], velocity: Numbers) -> NDArray[np.bool_]:
@@ -96,7 +82,7 @@ def _turns(sticks: NDArray[np.int64], velocity: Numbers) -> NDArray[np.bool_]:
 
 
 def _rest(piece: Piece) -> float:
-    return max(REST, NOISY * piece.noise["velocity"])
+    return max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["velocity"])
 
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
@@ -117,14 +103,14 @@ def velocity_factor(source: Source) -> float:
     rates, speeds = [], []
     for piece in pieces(source):
         rate, sd = differentiated(piece.time, piece.values["position"])
-        moves = np.abs(rate) > max(REST, NOISY * sd)
+        moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
         rates.append(rate[moves])
         speeds.append(piece.values["velocity"][moves])
     rate, speed = (np.concatenate(parts) if parts else np.zeros(0) for parts in (rates, speeds))
-    if len(rate) < FEWEST:
+    if len(rate) < SHAFT.fewest_samples:
         return math.nan
     factor = float(rate @ speed / (rate @ rate))
-    return math.nan if abs(factor - 1.0) <= AGREE else factor
+    return math.nan if abs(factor - 1.0) <= SHAFT.agree else factor
 
 
 class FoundFriction(NamedTuple):
@@ -159,8 +145,9 @@ def friction(source: Source) -> FoundFriction | None:
     if not some or math.isfinite(velocity_factor(source)):
         return None
     period = float(some[0].time[1] - some[0].time[0])
-    window = max(WINDOW, FEWEST_SAMPLES * period)
-    apart = 2 * round(window / period) + 2 * math.ceil(LONGEST_LAG / period) + 2  # samples between two pieces
+    window = max(SHAFT.window, SHAFT.window_samples * period)
+    # samples between two pieces
+    apart = 2 * round(window / period) + 2 * math.ceil(SHAFT.longest_effort_lag / period) + 2
     blank = np.full(apart, math.nan)
     joined = {
         q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
@@ -175,7 +162,7 @@ def friction(source: Source) -> FoundFriction | None:
     trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
     width, per_lag = round(window / period), math.nan
     acceleration = _Acceleration.of(velocity, sd, rest, width, period)
-    one_frequency = WEIGHT in columns and acceleration.own_part(columns[WEIGHT], width) < APART
+    one_frequency = WEIGHT in columns and acceleration.own_part(columns[WEIGHT], width) < SHAFT.apart
     found, also, shift = _best(trial, not one_frequency)
     if (shift or FILTER in also) and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
         rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
@@ -189,7 +176,7 @@ def friction(source: Source) -> FoundFriction | None:
         found = found._replace(inertia=math.nan, inertia_error=math.nan)
     dry, viscous = (found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error)
     numbers = (dry, viscous, (found.inertia, found.inertia_error))
-    if not (is_sure(*dry) or is_sure(*viscous)) or any(v < -BELOW_ZERO * e for v, e in numbers):
+    if not (is_sure(*dry) or is_sure(*viscous)) or any(v < -SHAFT.below_zero * e for v, e in numbers):
         return None
     return FoundFriction(found, also, shift * period, per_lag)
 
@@ -216,7 +203,7 @@ class _Trial(NamedTuple):
 
     def lag(self, also: Sequence[str]) -> int:
         """The shift of the effort, samples, that leaves least unexplained."""
-        most = math.ceil(LONGEST_LAG / self.period)
+        most = math.ceil(SHAFT.longest_effort_lag / self.period)
         step, best = max(1, most // 4), 0
         left = {0: self.fit(also, 0).residual}
         while step:
@@ -242,7 +229,7 @@ def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
         others = [((*also, name), shift) for name in (*trial.columns, *([FILTER] * lags)) if name not in also]
         others += [(also, lag)] if lags and not shift and (lag := trial.lag(also)) else []
         fits = [trial.fit(*other) for other in others]
-        least = [BETTER if WEIGHT in {*other[0]} - {*also} else MUCH_BETTER for other in others]
+        least = [SHAFT.better if WEIGHT in {*other[0]} - {*also} else SHAFT.much_better for other in others]
         gains = [(fit.residual / share, i) for i, (fit, share) in enumerate(zip(fits, least, strict=True))]
         if not gains or not min(gains)[0] < found.residual:
             break
@@ -282,7 +269,7 @@ class _Acceleration(NamedTuple):
         """Share, rms, that is not alike the columns of a weight, without the noise of the velocity."""
         rows = self.rows & np.all(np.isfinite(weight), axis=1)
         rows[:width] = rows[-width:] = False  # the mean is incomplete
-        if int(np.sum(rows)) < FEWEST:
+        if int(np.sum(rows)) < SHAFT.fewest_samples:
             return 0.0
         columns, wanted = np.column_stack([np.ones(int(np.sum(rows))), weight[rows]]), self.value[rows]
         rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
@@ -292,4 +279,4 @@ class _Acceleration(NamedTuple):
 
 def is_sure(value: float, error: float) -> bool:
     """Whether a number that has to be above zero is identified."""
-    return value > 0.0 and error < SURE * value
+    return value > 0.0 and error < SHAFT.unsure * value

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.foreign.topic_map import UNITS, TopicMap
+from wam_analysis.thresholds import STREAM
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.contents import contents
 
@@ -29,8 +30,6 @@ IN_JOINTS = ("position", "velocity", "effort")
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
 ROSBAGS = (".bag", ".db3")
 BILLION = 1_000_000_000
-FASTER = 30.0  # times the receptions: stamps that go on so fast are not in s
-SECONDS = 1e17  # an integer time below this is in seconds or less, above it in ns since 1970
 
 
 def needs_rosbags(path: Path) -> bool:
@@ -232,7 +231,7 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
         nanoseconds = [getattr(one, "nanosec", getattr(one, "nsec", 0)) for one in stamps]
         return np.array([int(one.sec) * BILLION + int(ns) for one, ns in zip(stamps, nanoseconds, strict=True)])
     try:
-        is_ns = not has_unit and all(isinstance(one, Integral) for one in stamps) and min(stamps) > SECONDS
+        is_ns = not has_unit and all(isinstance(one, Integral) for one in stamps) and min(stamps) > STREAM.seconds
         factor = BILLION * given.scaled("stamp")[0]
         found = np.array([one if is_ns else round(float(one) * factor) for one in stamps], np.int64)
     except (TypeError, ValueError, OverflowError):
@@ -246,7 +245,7 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
 def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], received: NDArray[np.int64]) -> None:
     """Refuse numbers as seconds where the receptions show that they are others."""
     took, numbers = np.ptp(received) / 1e9, np.ptp(stamps) / 1e9
-    if took > 0.0 and numbers > FASTER * took:
+    if took > 0.0 and numbers > STREAM.faster * took:
         nearest = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * numbers / took)))
         raise ValueError(
             f"{topic}: the field '{path}' goes on by {shown(numbers)} while {shown(took, 's')} were recorded, so it is "

@@ -19,21 +19,18 @@ from wam_analysis.foreign.mechanics import (
     sticking,
     velocity_factor,
 )  # fmt: skip
-from wam_analysis.foreign.sources import FEWEST, Source, alternates, clocks_of, sources
+from wam_analysis.foreign.sources import Source, alternates, clocks_of, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
-DISOBEYED = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
 TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
 ALSO = {
     WEIGHT: "with its weight",
     DRAG: "with a drag by the square of the velocity",
     FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
 }
-UNSURE = 0.02  # of the size of a cycle: a larger error is printed
-STEADY = 0.9  # of a size: a cycle whose second half has less of the first, or more, is reported as changing
-TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 
 def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
@@ -225,9 +222,9 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
 
 def _cycle_sentence(one: FoundCycle) -> str:
     size = f"{shown(one.peak_to_peak, one.unit)} peak to peak"
-    if one.error > UNSURE * one.peak_to_peak:
+    if one.error > CYCLE.unsure * one.peak_to_peak:
         size = f"{shown(one.peak_to_peak)} +- {shown(one.error, one.unit)} peak to peak"
-    if not STEADY < one.growth < 1.0 / STEADY:
+    if not CYCLE.changing < one.growth < 1.0 / CYCLE.changing:
         change = f"{'growing' if one.growth > 1.0 else 'shrinking'} by {100.0 * abs(one.growth - 1.0):.0f} %"
         size += f", {change} from half to half,"
     where = f"from {one.begin:.1f} to {one.end:.1f} s (confidence {one.confidence:.2f})"
@@ -261,7 +258,8 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
     sentences, findings, verdict = [], [], []
     for one in states:
         command = _command_of(one, commands, states)
-        is_speed = command is not None and len(command.time) >= FEWEST  # not a position that is sent once and held
+        # not a position that is sent once and held
+        is_speed = command is not None and len(command.time) >= SHAFT.fewest_samples
         found = sticking(one, command if is_speed else None) if one.is_joint else None
         if found is None:
             continue
@@ -277,7 +275,7 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
             sentences.append(f"{one.label}: never moved.")
             continue
         sentence = f"{one.label}: at rest for {100.0 * found.stuck:.0f} % of the time, slipped {times(found.slips)}"
-        if found.commanded > DISOBEYED and found.slips > 2 and 100.0 * found.stuck > TURNING:
+        if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
@@ -347,7 +345,7 @@ def _friction(states: Sequence[Source]) -> Section:
 def _timing(found: Sequence[Source]) -> Section:
     clocks: dict[tuple[str, bytes], list[Source]] = {}
     for one in found:
-        if len(one.time) < FEWEST:
+        if len(one.time) < SHAFT.fewest_samples:
             continue
         clocks.setdefault((one.topic, one.sent.tobytes()), []).append(one)
     sentences, findings, verdict = [], [], []

@@ -10,18 +10,12 @@ from numpy.typing import NDArray
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.runs import after_gaps, noise
+from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEWEST = 20  # messages of what was measured, and of a piece of it; a command may be sent once and hold
-ABSENT = 1.5  # periods between two messages of a frame, from which one is absent
-ALTERNATES = 5.0  # times the change over two messages: the change over one, where two publishers take turns
-IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
-LOUD = 1e3  # roundings of a number: smaller changes are none
-PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
-WIDEST = 0.03  # s about each sample that such a velocity is taken from
 COMMAND = re.compile(r"(^|[/_ ])(command|commands|cmd|desired|reference|ref|target|setpoint|goal)($|[/_ ])")
 AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
@@ -126,7 +120,7 @@ def _stamped(bag: Bag, given: TopicMap) -> dict[str, JointColumns | WrenchColumn
         topic: columns
         for topic, columns in sorted(bag.topics.items())
         if isinstance(columns, (JointColumns, WrenchColumns))
-        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else FEWEST)
+        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else SHAFT.fewest_samples)
     }
 
 
@@ -140,7 +134,7 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     frames = np.asarray(columns.frames, dtype=str)
     masks = {frame: frames == frame for frame in dict.fromkeys(frames.tolist())}
     most = max(masks.values(), key=np.count_nonzero)
-    is_seldom = is_command and np.count_nonzero(most) < FEWEST
+    is_seldom = is_command and np.count_nonzero(most) < SHAFT.fewest_samples
     if len(masks) > 1 and not is_seldom and _is_besides(time, most):
         return [(frame, mask, mask) for frame, mask in masks.items()]
     every = np.ones(len(frames), dtype=bool)
@@ -155,7 +149,7 @@ def _is_besides(time: Numbers, own: Mask) -> bool:
     """Whether the messages of a frame go on at their period while those of others come."""
     rows = np.flatnonzero(own)
     steps, has_others = np.diff(time[rows]), np.diff(rows) > 1
-    return bool(np.any(has_others)) and float(np.median(steps[has_others])) < ABSENT * float(np.median(steps))
+    return bool(np.any(has_others)) and float(np.median(steps[has_others])) < STREAM.absent * float(np.median(steps))
 
 
 def _is_command(topic: str, given: TopicMap) -> bool:
@@ -169,7 +163,9 @@ def alternates(source: Source) -> bool:
     """
     for values in source.values.values():
         once, twice = (float(np.median(np.abs(values[n:] - values[:-n]))) for n in (1, 2))
-        if once > ALTERNATES * twice and once > LOUD * np.finfo(float).eps * float(np.max(np.abs(values))):
+        if once > STREAM.alternates * twice and once > STREAM.loud * np.finfo(float).eps * float(
+            np.max(np.abs(values))
+        ):
             return True
     return False
 
@@ -202,7 +198,7 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     sparse = {q: share for q, there in known.items() if q not in kept and (share := float(np.sum(there)) / most)}
     rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
     rows = rows[np.unique(one.time[rows], return_index=True)[1]]
-    if len(rows) < (1 if one.is_command else FEWEST):
+    if len(rows) < (1 if one.is_command else SHAFT.fewest_samples):
         return None
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
     # a joint may be in some messages of a topic only, a wrench is in all
@@ -231,12 +227,12 @@ def pieces(source: Source) -> list[Piece]:
     inner = np.flatnonzero(after_gaps(source.time)).tolist()
     found = []
     for begin, end in zip([0, *inner], [*inner, len(source.time)], strict=True):
-        if end - begin < FEWEST:
+        if end - begin < SHAFT.fewest_samples:
             continue
         time = source.time[begin:end]
         values = {q: v[begin:end] for q, v in source.values.items()}
         stamps, recorded = time, values
-        if float(np.max(np.abs(np.diff(time) - period))) > IRREGULAR * period:
+        if float(np.max(np.abs(np.diff(time) - period))) > STREAM.irregular * period:
             even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
             values = {q: at_times(even, time, v) for q, v in values.items()}
             time = even
@@ -285,13 +281,14 @@ def resolution(value: Numbers) -> float:
     counts = steps / quantum
     is_rounded = bool(np.all(np.abs(counts - np.rint(counts)) < 0.05)) and float(np.median(counts)) < 1e3
     sd = float(noise(value))
-    if len(value) > FEWEST:  # of fourth differences: with few samples in a period the second ones are of the motion
+    # of fourth differences: with few samples in a period the second ones are of the motion
+    if len(value) > SHAFT.fewest_samples:
         sd = min(sd, float(noise(np.diff(value, n=2))) * math.sqrt(6.0 / 70.0))
     return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
-    """Rate of a position, and its noise: slope of a line through as many samples as it needs, within `WIDEST`.
+    """Rate of a position, and its noise: slope of a line through as many samples as it needs, within `widest`.
 
     Parameters
     ----------
@@ -302,7 +299,11 @@ def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
     slope = np.gradient(position, period)
     speed, sd = float(np.percentile(np.abs(slope), 95.0)), resolution(position) / period
     half = 1
-    while half * period < WIDEST / 2.0 and _of_slope(sd, half) > PRECISE * speed and len(position) > 2 * half + 2:
+    while (
+        half * period < STREAM.widest / 2.0
+        and _of_slope(sd, half) > STREAM.precise * speed
+        and len(position) > 2 * half + 2
+    ):
         half += 1
     if half > 1:
         k = np.arange(half, -half - 1, -1)

@@ -18,22 +18,13 @@ from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_analysis.identification.tracked_errors import TrackedErrors, tracked_errors
 from wam_analysis.identification.uncertainty import Uncertainty
+from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 
-PARTS = 20  # of the motion
-ITERATIONS = 5  # the load on friction and the links' inertia are not linear in the parameters
-HUBER = 1.5  # standard deviations from which a residual counts less
-LAW = 0.003  # standard deviation of friction, per friction, by what its law leaves out
-ASYMMETRY = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
-WARM = 2  # iterations that start near the solution
-AVERAGED = 5  # windows, over which equations are averaged to see what the estimate depends on
-IDENTIFIED = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
-PINNED = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
-LIGHTEST = 0.1  # of the present mass of a link and inertia of a rotor, below which no estimate goes
 
 
 class Identification(NamedTuple):
@@ -95,12 +86,12 @@ class Identification(NamedTuple):
     @property
     def is_identified(self) -> NDArray[np.bool_]:
         """(p,), whether the motion shows a parameter by itself."""
-        return self.sd <= IDENTIFIED * self.unknowns.prior_sd
+        return self.sd <= IDENTIFY.identified * self.unknowns.prior_sd
 
     @property
     def is_combined(self) -> NDArray[np.bool_]:
         """(p,), whether the motion shows a parameter only together with others."""
-        return ~self.is_identified & (self.alone <= IDENTIFIED * self.unknowns.prior_sd)
+        return ~self.is_identified & (self.alone <= IDENTIFY.identified * self.unknowns.prior_sd)
 
 
 class _Normal(NamedTuple):
@@ -167,15 +158,15 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None
         values = start
     least = np.array([0.0 if name.startswith(NOT_NEGATIVE) else -np.inf for name in sought.names])
     for inert in map(sought.places, ("links.mass", "motors.inertia")):
-        least[inert] = LIGHTEST * sought.present[inert]
+        least[inert] = IDENTIFY.lightest * sought.present[inert]
     part = _parts(regressor.equations(values))
-    for _ in range(ITERATIONS if start is None else WARM):
+    for _ in range(IDENTIFY.iterations if start is None else IDENTIFY.warm_iterations):
         equations = regressor.equations(values)
         normal = _normal(equations, part, values)
         prior = prior_sd**-2
         values = _solve(normal.information.sum(0), normal.vector.sum(0), prior, centre)
         below = values < least
-        prior_sd[below], centre[below] = PINNED * sought.prior_sd[below], least[below]
+        prior_sd[below], centre[below] = IDENTIFY.pinned * sought.prior_sd[below], least[below]
         values = np.maximum(values, least)
     information, vector = normal.information.sum(0), normal.vector.sum(0)
     without = np.array(
@@ -183,14 +174,14 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None
     )
     left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
     squares = left**2 * equations.is_used
-    errors = np.array([squares[part == i].sum(0) for i in range(PARTS)])
+    errors = np.array([squares[part == i].sum(0) for i in range(IDENTIFY.parts)])
     return _Estimate(equations, part, values, without, prior_sd, normal, _rms(left, equations.is_used), errors)
 
 
 def _parts(equations: Equations) -> NDArray[np.int64]:
     """Part of the motion that each sample belongs to, (k,), of equal numbers of samples."""
     k = len(equations.time)
-    found: NDArray[np.int64] = np.arange(k) * PARTS // k
+    found: NDArray[np.int64] = np.arange(k) * IDENTIFY.parts // k
     return found
 
 
@@ -198,8 +189,8 @@ def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _No
     """Weighted normal equations; rows far from the present estimate count less (Huber)."""
     weight = _weights(equations, values)
     p = equations.columns.shape[2]
-    information, vector = np.zeros((PARTS, p, p)), np.zeros((PARTS, p))
-    for i in range(PARTS):
+    information, vector = np.zeros((IDENTIFY.parts, p, p)), np.zeros((IDENTIFY.parts, p))
+    for i in range(IDENTIFY.parts):
         rows = equations.columns[part == i].reshape(-1, p)
         weighted = rows * weight[part == i].reshape(-1, 1)
         information[i] = weighted.T @ rows
@@ -211,7 +202,9 @@ def _weights(equations: Equations, values: Array) -> Array:
     """Weights of the rows, (k, n), 1/(N^2 m^2)."""
     left = equations.torque - equations.columns @ values
     scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
-    found: Array = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
+    found: Array = (
+        np.minimum(1.0, IDENTIFY.huber * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
+    )
     return found
 
 
@@ -236,11 +229,11 @@ def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: 
         coulomb, load = (sought.places(f"motors.{what}_{way}") for what in ("coulomb", "load"))
         # the friction of a joint adds to the load of its motor's friction or takes from it, by the way of the load
         by_joint = best.values[load] * through / np.sqrt(3.0)
-        variance[coulomb] = (LAW * best.values[coulomb]) ** 2 + by_joint**2
+        variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2 + by_joint**2
     white = np.linalg.inv(best.normal.information.sum(0) + np.diag(sought.prior_sd**-2))
     # what the estimate takes for other friction, were there one sd of the asymmetry
     weighted = equations.columns * _weights(equations, best.values)[..., None]
-    size = ASYMMETRY * best.values[sought.places("joints.load")]
+    size = IDENTIFY.asymmetry * best.values[sought.places("joints.load")]
     taken = white @ np.einsum("knp,knj->pj", weighted, asymmetric * size)
     moved = _moved_by_averaging(best)
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
@@ -254,14 +247,14 @@ def _moved_by_averaging(best: _Estimate) -> Array:
     sign in all parts of the motion.  Averaging takes most of it out.
     """
     equations, weights = best.equations, _weights(best.equations, best.values)
-    bell = np.hanning(AVERAGED + 2)[1:-1]
-    edge = AVERAGED // 2
+    bell = np.hanning(IDENTIFY.averaged + 2)[1:-1]
+    edge = IDENTIFY.averaged // 2
     middle = slice(edge, len(weights) - edge)
-    if len(weights) <= AVERAGED:
+    if len(weights) <= IDENTIFY.averaged:
         return np.zeros_like(best.values)
     span = equations.time[2 * edge :] - equations.time[: -2 * edge]
-    follow = span < (AVERAGED - 0.5) * np.median(np.diff(equations.time))
-    whole = sliding_window_view(equations.is_used, AVERAGED, 0).all(-1) & follow[:, None]
+    follow = span < (IDENTIFY.averaged - 0.5) * np.median(np.diff(equations.time))
+    whole = sliding_window_view(equations.is_used, IDENTIFY.averaged, 0).all(-1) & follow[:, None]
 
     def solved(torque: Array, columns: Array) -> Array:
         weighted = columns * (weights[middle] * whole)[..., None]
@@ -269,7 +262,7 @@ def _moved_by_averaging(best: _Estimate) -> Array:
         return _solve(information, np.einsum("knp,kn->p", weighted, torque), best.prior_sd**-2, best.values)
 
     averaged = [
-        np.asarray(sliding_window_view(each, AVERAGED, 0) @ (bell / bell.sum()), np.float64)
+        np.asarray(sliding_window_view(each, IDENTIFY.averaged, 0) @ (bell / bell.sum()), np.float64)
         for each in (equations.torque, equations.columns)
     ]
     found: Array = solved(*averaged) - solved(equations.torque[middle], equations.columns[middle])
@@ -284,11 +277,14 @@ def _result(
     left = equations.torque - equations.columns @ best.values
     scaled = information * np.outer(sought.prior_sd, sought.prior_sd)
     strength = np.linalg.eigvalsh(scaled)
-    shown = strength[strength >= IDENTIFIED**-2]
+    shown = strength[strength >= IDENTIFY.identified**-2]
     step = float(np.median(np.diff(equations.time)))
     moves = equations.columns[:, :, sought.places("motors.viscous")].diagonal(axis1=1, axis2=2)
     both = [
-        sum(bool((moves[best.part == i, m] > 0).any() and (moves[best.part == i, m] < 0).any()) for i in range(PARTS))
+        sum(
+            bool((moves[best.part == i, m] > 0).any() and (moves[best.part == i, m] < 0).any())
+            for i in range(IDENTIFY.parts)
+        )
         for m in range(moves.shape[1])
     ]
     return Identification(

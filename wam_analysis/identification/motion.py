@@ -11,23 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import IDENTIFY, STREAM
 from wam_bag.bag import BagError
 from wam_description.arm import Arm
 from wam_sim.recording import RecordedRun
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.05  # s
-THINNING = 0.5  # windows from one sample to the next
-SHORTEST = 10.0  # s of motion
-LARGEST_GAP = 3.5  # periods that are bridged
 LOADS = {
     "sim/disturbance": "the simulator pushed the arm",
     "contact/wrench": "a contact was estimated",
 }  # topics of forces that the equation of motion does not have, and what each is
-LEAST_SHARE = 1e-3  # of the time of a recording, below which such a force is not reported
-HELD = 100_000_000  # ns, for which a message of such a topic is taken to hold where no other follows
-BRAKED = 1e-9  # N m; the torque of a motor that has no current
 
 
 class MotorRecord(NamedTuple):
@@ -103,9 +97,9 @@ def loaded(run: RecordedRun) -> Iterator[str]:
         forces = run.wrench(topic)
         if states is None or forces is None or not len(forces.stamp_ns):
             continue
-        lasted = np.clip(np.diff(forces.stamp_ns, append=states.stamp_ns[-1]), 0, HELD)
+        lasted = np.clip(np.diff(forces.stamp_ns, append=states.stamp_ns[-1]), 0, STREAM.held)
         share = float(np.sum(lasted[np.any(forces.force != 0.0, axis=1)]) / max(np.ptp(states.stamp_ns), 1))
-        if share > LEAST_SHARE:
+        if share > IDENTIFY.least_contact:
             yield f"{what} in {100.0 * share:.2g} %"
 
 
@@ -127,19 +121,23 @@ def evenly(stamps: Array, theta: Array, effort: Array) -> MotorRecord:
     if (np.diff(stamps) < 0.0).any():
         raise ValueError("the stamps of motor_states go back; give a bag with one session")
     _, first = np.unique(stamps, return_index=True)
-    if len(first) < 3 or stamps[first[-1]] - stamps[first[0]] < SHORTEST:
+    if len(first) < 3 or stamps[first[-1]] - stamps[first[0]] < IDENTIFY.shortest:
         span = stamps.max() - stamps.min() if len(stamps) else 0.0
-        raise ValueError(f"{len(first)} motor states over {span:.3g} s; identification needs {SHORTEST:g} s or more")
+        raise ValueError(
+            f"{len(first)} motor states over {span:.3g} s; identification needs {IDENTIFY.shortest:g} s or more"
+        )
     stamps, theta, effort = stamps[first], theta[first], effort[first]
     period = float(np.median(np.diff(stamps)))
-    if period > WINDOW / 4.0:
-        raise ValueError(f"motor_states have a period of {period:g} s; identification needs {WINDOW / 4.0:g} s or less")
+    if period > IDENTIFY.window / 4.0:
+        raise ValueError(
+            f"motor_states have a period of {period:g} s; identification needs {IDENTIFY.window / 4.0:g} s or less"
+        )
     time = np.arange(stamps[0], stamps[-1], period)
     # torque acts in the period that ends at its stamp: it is that of the middle of the period
     theta = np.column_stack([np.interp(time, stamps, column) for column in theta.T])
     torque = np.column_stack([np.interp(time, stamps - 0.5 * period, column) for column in effort.T])
     late = np.diff(stamps, append=stamps[-1])[np.searchsorted(stamps, time + 0.01 * period, side="right") - 1]
-    is_used = (late <= LARGEST_GAP * period) & (np.abs(torque) > BRAKED).any(1)
+    is_used = (late <= IDENTIFY.largest_gap * period) & (np.abs(torque) > IDENTIFY.braked).any(1)
     return MotorRecord(time, theta, torque, is_used)
 
 
@@ -149,19 +147,19 @@ def motion(record: MotorRecord) -> MotionSamples:
     Raises
     ------
     ValueError
-        if less than `SHORTEST` of it can be used.
+        if less than `shortest` of it can be used.
     """
     period = float(record.time[1] - record.time[0])
-    half = max(2, round(0.5 * WINDOW / period))
+    half = max(2, round(0.5 * IDENTIFY.window / period))
     angle, rate, acceleration = _cubic(half, period)
-    step = max(1, round(THINNING * 2 * half))
+    step = max(1, round(IDENTIFY.thinning * 2 * half))
     centres = np.arange(2 * half, len(record.time) - 2 * half, step)
     spans = centres[:, None] + np.arange(-2 * half, 2 * half + 1)
     centres = centres[record.is_used[spans].all(1)]
-    if len(centres) * step * period < SHORTEST:
+    if len(centres) * step * period < IDENTIFY.shortest:
         raise ValueError(
             f"{len(centres) * step * period:.3g} s of free states without brakes and gaps; "
-            f"identification needs {SHORTEST:g} s or more"
+            f"identification needs {IDENTIFY.shortest:g} s or more"
         )
     windows = centres[:, None] + np.arange(-half, half + 1)
     torques = _smoothed(record.torque, angle)

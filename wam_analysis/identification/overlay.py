@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_analysis.thresholds import IDENTIFY, LAYOUT
 from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, SHARED, Configuration
 from wam_description.parameters import ParameterError
@@ -17,8 +18,6 @@ from wam_description.parameters import ParameterError
 Array = NDArray[np.float64]
 
 HEADING = "# The controllers' model as identified"  # of the file
-DIGITS = 6
-LIGHTEST = 1e-6  # kg m^2; an inertia that came out negative
 DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
 
 
@@ -126,12 +125,12 @@ def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Array
 def _link_values(groups: Mapping[str, Array]) -> dict[str, Any]:
     mass = groups["links.mass"]
     centre = np.column_stack([groups[f"links.moment_{axis}"] / mass for axis in AXES])
-    inertia = np.maximum(np.column_stack([groups[f"links.inertia_{axis}"] for axis in AXES]), LIGHTEST)
+    inertia = np.maximum(np.column_stack([groups[f"links.inertia_{axis}"] for axis in AXES]), IDENTIFY.least_inertia)
     named = {"mass": mass, "centre": centre.ravel(), "inertia": inertia.ravel()}
     return {f"model.links.{name}": _numbers(each, 9) for name, each in named.items()}
 
 
-def _numbers(values: Array, digits: int = DIGITS) -> list[float]:
+def _numbers(values: Array, digits: int = LAYOUT.digits) -> list[float]:
     return [float(f"{value:.{digits}g}") for value in values.tolist()]
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
 from wam_description.transmission_map import TransmissionMap
 
@@ -20,15 +21,6 @@ Array = NDArray[np.float64]
 DIRECTIONS = ("positive", "negative")
 AXES = ("x", "y", "z")
 # standard deviations of the prior, which decides only what the motion does not show
-FRICTION = 0.5  # of the present Coulomb friction
-LOAD = 0.1  # friction per transmitted torque
-VISCOUS = 1.0  # of the present viscous friction
-ROTOR = 0.2  # of the present rotor inertia
-DIFFERENCE = 0.012  # half the difference of two torque constants, each calibrated to 3 %, uniform
-MASS = 0.3  # of the present mass
-CENTRE = 0.05  # m
-INERTIA = 0.5  # of the present inertia of the link
-LEAST = 1e-6  # of everything whose present value is 0
 
 
 class Unknowns(NamedTuple):
@@ -76,7 +68,7 @@ def unknowns(shared: Shared) -> Unknowns:
     def add(group: str, of: list[str], values: Array, sds: Array) -> None:
         names.extend(f"{group}.{name}" for name in of)
         present.extend(values)
-        sd.extend(np.maximum(sds, LEAST))
+        sd.extend(np.maximum(sds, IDENTIFY.least_sd))
 
     every = list(arm.motors.names)
     through = lumped.T @ at_joints.coulomb
@@ -84,34 +76,44 @@ def unknowns(shared: Shared) -> Unknowns:
     drop_at_joints = np.subtract(at_joints.static, at_joints.coulomb)
     for way in DIRECTIONS:
         coulomb = np.array(getattr(motors, f"coulomb_{way}"))
-        add(f"motors.coulomb_{way}", every, coulomb + through, FRICTION * level)
+        add(f"motors.coulomb_{way}", every, coulomb + through, IDENTIFY.friction * level)
     for way in DIRECTIONS:
         drop = np.subtract(getattr(motors, f"static_{way}"), getattr(motors, f"coulomb_{way}"))
-        add(f"motors.static_{way}", every, drop + lumped.T @ drop_at_joints, FRICTION * level)
+        add(f"motors.static_{way}", every, drop + lumped.T @ drop_at_joints, IDENTIFY.friction * level)
     for way in DIRECTIONS:
         load = np.array(getattr(motors, f"load_{way}"))
-        add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, np.full(len(every), LOAD))
+        add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, np.full(len(every), IDENTIFY.load))
     viscous = np.array(motors.viscous) + (lumped**2).T @ at_joints.viscous
-    add("motors.viscous", every, viscous, VISCOUS * viscous)
-    add("motors.inertia", every, np.array(motors.inertia), ROTOR * np.array(motors.inertia))
+    add("motors.viscous", every, viscous, IDENTIFY.viscous * viscous)
+    add("motors.inertia", every, np.array(motors.inertia), IDENTIFY.rotor * np.array(motors.inertia))
     sharing = [int(m) for m in np.flatnonzero(matrix[list(joints)].any(axis=0))]
     add(
         "motors.torque_difference",
         [every[m] for m in sharing[1:]],
         np.zeros(len(sharing[1:])),
-        np.full(len(sharing[1:]), DIFFERENCE),
+        np.full(len(sharing[1:]), IDENTIFY.constants_difference),
     )
     chosen = [arm.joints.names[j] for j in joints]
     here = list(joints)
-    add("joints.coulomb", chosen, np.array(at_joints.coulomb)[here], FRICTION * np.array(at_joints.coulomb)[here])
-    add("joints.load", chosen, np.array(at_joints.load)[here], np.full(len(here), LOAD))
-    add("joints.viscous", chosen, np.array(at_joints.viscous)[here], VISCOUS * np.array(at_joints.viscous)[here])
+    add(
+        "joints.coulomb",
+        chosen,
+        np.array(at_joints.coulomb)[here],
+        IDENTIFY.friction * np.array(at_joints.coulomb)[here],
+    )
+    add("joints.load", chosen, np.array(at_joints.load)[here], np.full(len(here), IDENTIFY.load))
+    add(
+        "joints.viscous",
+        chosen,
+        np.array(at_joints.viscous)[here],
+        IDENTIFY.viscous * np.array(at_joints.viscous)[here],
+    )
     mass, n = np.array(links.mass), len(links.mass)
     centre, inertia = np.reshape(links.centre, (n, 3)), np.reshape(links.inertia, (n, 3))
     of_links = list(arm.links.names)
-    add("links.mass", of_links, mass, MASS * mass)
+    add("links.mass", of_links, mass, IDENTIFY.mass * mass)
     for i, axis in enumerate(AXES):
-        add(f"links.moment_{axis}", of_links, mass * centre[:, i], CENTRE * mass)
+        add(f"links.moment_{axis}", of_links, mass * centre[:, i], IDENTIFY.centre * mass)
     for i, axis in enumerate(AXES):
-        add(f"links.inertia_{axis}", of_links, inertia[:, i], INERTIA * inertia[:, i])
+        add(f"links.inertia_{axis}", of_links, inertia[:, i], IDENTIFY.inertia * inertia[:, i])
     return Unknowns(tuple(names), np.array(present), np.array(sd), joints, tuple(sharing))

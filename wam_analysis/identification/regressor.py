@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 
-SLOWEST_MOTOR = 0.3  # rad/s; below it, friction depends on what a shaft did before
-SLOWEST_JOINT = 0.02  # rad/s
 DIAGONAL = (4, 6, 9)  # inertia xx, yy, zz among the ten parameters of a link
 PRODUCTS = ((5, 0, 1), (7, 0, 2), (8, 1, 2))  # inertia xy, xz, yz: place, axes
 
@@ -66,9 +65,9 @@ class Regressor:
     def _steady(self) -> NDArray[np.bool_]:
         """(k, n), whether a motor and its joints turn in one direction during the window."""
         v, qd = self._motion.velocities, self._qd
-        motor = np.abs(v).min(1) > SLOWEST_MOTOR
+        motor = np.abs(v).min(1) > IDENTIFY.slowest_motor
         motor &= np.abs(np.sign(v).sum(1)) == v.shape[1]
-        joint = np.abs(qd).min(1) > SLOWEST_JOINT
+        joint = np.abs(qd).min(1) > IDENTIFY.slowest_joint
         joint &= np.abs(np.sign(qd).sum(1)) == v.shape[1]
         return motor & ~(~joint @ (self._matrix != 0.0))
 

@@ -5,20 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from wam_analysis.identification.base_set import gravity_base_set
-from wam_analysis.identification.fit import PARTS, Identification
+from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.overlay import identified
-from wam_analysis.identification.regressor import SLOWEST_MOTOR
 from wam_analysis.table import plain
+from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
 
 UNITS = {
     "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
     "moment": "kg m", "torque": "",
 }  # fmt: skip
-SHORT = 20.0  # s of motion in one direction, less of which is warned about
-FEW = 6  # parts of the motion in which a motor turns both ways
-UNEXPLAINED = 1.5  # rms of held-out motion per rms of the estimate's own
-LEFT = 0.1  # rms that stays unexplained, per Coulomb friction
 NOTES = """{rank} combinations of {count} parameters are identified, condition {condition:.3g}.
 'In combination': only together with others.
 '{by_shape}': static friction is where the fitted curve of friction ends at rest, with the error of that curve. Stiction
@@ -73,7 +69,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
 
 def _notes(found: Identification, count: int) -> str:
     return NOTES.format(
-        rank=found.rank, count=count, condition=found.condition, by_shape=BY_SHAPE, slowest=SLOWEST_MOTOR
+        rank=found.rank, count=count, condition=found.condition, by_shape=BY_SHAPE, slowest=IDENTIFY.slowest_motor
     )
 
 
@@ -81,20 +77,21 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
     """What the recording is too short or too slow for, and where the model does not fit."""
     level = np.array([found.values[found.unknowns.places(f"motors.coulomb_{way}")] for way in ("positive", "negative")])
     for i, name in enumerate(shared.arm.motors.names):
-        if found.seconds[i] < SHORT:
-            yield f"{name} turns freely for {found.seconds[i]:.1f} s only; record {SHORT:g} s or more"
-        if found.both_directions[i] < FEW:
+        if found.seconds[i] < IDENTIFY.short:
+            yield f"{name} turns freely for {found.seconds[i]:.1f} s only; record {IDENTIFY.short:g} s or more"
+        if found.both_directions[i] < IDENTIFY.few_parts:
             yield (
-                f"{name} turns in both directions in only {found.both_directions[i]} of the {PARTS} equal sections of "
+                f"{name} turns in both directions in only {found.both_directions[i]} of the {IDENTIFY.parts} equal "
+                "sections of "
                 "the recording from which standard errors are computed: its own are uncertain; let it reverse more"
             )
-        if found.held_out[i] > UNEXPLAINED * found.residual[i] + 1e-4:
+        if found.held_out[i] > IDENTIFY.unexplained * found.residual[i] + 1e-4:
             yield (
                 f"{name}: motion that was held out is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
                 f"{1e3 * found.residual[i]:.3g}: too little motion for so many parameters"
             )
         share = found.residual[i] / max(level[:, i].mean(), 1e-9)
-        if share > LEFT:
+        if share > IDENTIFY.remaining:
             yield (
                 f"{name}: {1e3 * found.residual[i]:.3g} mN m remain unexplained, {share:.0%} of its friction: "
                 "was the motion free of contact?"

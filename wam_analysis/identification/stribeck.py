@@ -5,10 +5,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import IDENTIFY
+
 Array = NDArray[np.float64]
 
 VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
-WORTH: Final = 0.04  # part of the squared error by which another v_s must be better than the present one
 
 
 class StribeckVelocities(NamedTuple):
@@ -28,7 +29,7 @@ def stribeck_velocities(present: Array, present_errors: Array, errors: Array) ->
     errors : (c, parts, n), those with each of `VELOCITIES`.
     """
     total = errors.sum(1)
-    is_better = total.min(0) < (1.0 - WORTH) * present_errors.sum(0)
+    is_better = total.min(0) < (1.0 - IDENTIFY.worth) * present_errors.sum(0)
     best = np.where(is_better, _minimum(total), present)
     left_out = np.array([_minimum(total - part) for part in errors.transpose(1, 0, 2)])
     return StribeckVelocities(best, np.where(is_better, left_out, present))

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.uncertainty import Uncertainty
+from wam_analysis.thresholds import IDENTIFY
 
 Array = NDArray[np.float64]
 
 THEMSELVES = ("motors.coulomb_", "motors.load_", "joints.coulomb.", "joints.load.")  # identified and tracked
 CONSTANTS = "motors.torque_"  # the estimator has errors of the torque constants that are not identified
-LEAST = 1e-12  # size of a column that the motion does not show
 
 
 class TrackedErrors(NamedTuple):
@@ -53,7 +53,7 @@ def tracked_errors(
     every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)), axis=2)
     tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
     columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
-    size = np.maximum(np.linalg.norm(tracked, axis=0), LEAST)
+    size = np.maximum(np.linalg.norm(tracked, axis=0), IDENTIFY.least_column)
     nearest = np.linalg.lstsq(tracked / size, columns, rcond=None)[0] / size[:, None]
     left = np.where(nearest.any(axis=0), equations.columns, 0.0) - every @ nearest
     rms = [

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wam_analysis.thresholds import IDENTIFY
 
-LEAST = 1e-30  # variance of a combination that has none
+Array = NDArray[np.float64]
 
 
 class Uncertainty(NamedTuple):
@@ -42,4 +42,4 @@ class Uncertainty(NamedTuple):
         """How many times the white variances, (t,), those of the combinations are."""
         apart = (self.without - self.without.mean(0)) @ combinations.T
         parts = len(apart)
-        return np.maximum((parts - 1) / parts * (apart**2).sum(0) / np.maximum(white, LEAST), 1.0)
+        return np.maximum((parts - 1) / parts * (apart**2).sum(0) / np.maximum(white, IDENTIFY.least_variance), 1.0)

@@ -8,16 +8,9 @@ from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import LimitCycle, limit_cycle
 from wam_analysis.measures.runs import runs, smoothed
+from wam_analysis.thresholds import CYCLE
 
 Numbers = NDArray[np.float64]
-
-SURE = 0.8  # confidence from which a cycle is reported
-FEWEST = 5  # cycles of an episode; fewer repeat by chance in one of many windows
-BRIEFEST = 64  # samples of a window
-SLOWEST = 4  # cycles in a window, slower changes are drift when a cycle is looked for
-SAME = 0.05  # relative difference of two periods that are the same
-STEADY = 0.95  # of its size: the second half of a limit cycle that follows a decaying motion has so much of the first
-EDGE = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
 
 
 class Episode(NamedTuple):
@@ -44,8 +37,8 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     free = np.ones(n, dtype=np.bool_)
     found: list[Episode] = []
     transients: list[_Transient] = []
-    while length >= min(BRIEFEST, n):
-        level = value - smoothed(value, length // SLOWEST)
+    while length >= min(CYCLE.window_samples, n):
+        level = value - smoothed(value, length // CYCLE.slowest_cycles)
         for begin in range(0, n - length + 1, max(length // 2, 1)):
             rows = slice(begin, begin + length)
             if not np.all(free[rows]):
@@ -86,8 +79,8 @@ class _Transient(NamedTuple):
     def goes_on(self, first: int, last: int, cycle: LimitCycle) -> bool:
         """Whether a cycle is another part of it: next to it, of the same period, and of a changing size."""
         is_next = first <= self.last + self.near and last >= self.first - self.near
-        is_alike = abs(cycle.period / self.period - 1.0) < SAME
-        return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < STEADY
+        is_alike = abs(cycle.period / self.period - 1.0) < CYCLE.same_period
+        return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < CYCLE.steady
 
 
 def _jumps(time: Numbers, value: Numbers, cycle: LimitCycle) -> NDArray[np.bool_]:
@@ -106,7 +99,11 @@ def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan
     if len(value) < 2 or not np.ptp(value) > least:
         return None
     cycle = limit_cycle(time, value, period)
-    return cycle if cycle.confidence >= SURE and cycle.cycles >= FEWEST and cycle.peak_to_peak > least else None
+    return (
+        cycle
+        if cycle.confidence >= CYCLE.sure and cycle.cycles >= CYCLE.episode_cycles and cycle.peak_to_peak > least
+        else None
+    )
 
 
 def _width(time: Numbers, period: float) -> int:
@@ -162,13 +159,13 @@ def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: ND
 
 def _evaluated(first: int, last: int, n: int, lag: float) -> slice:
     """Rows of an episode without its ends within the recording, unless too few cycles of `lag` samples are left."""
-    edge = round(EDGE * lag)
+    edge = round(CYCLE.edge * lag)
     inner = slice(first + edge if first else 0, last - edge if last < n else n)
-    return inner if inner.stop - inner.start >= FEWEST * lag else slice(first, last)
+    return inner if inner.stop - inner.start >= CYCLE.episode_cycles * lag else slice(first, last)
 
 
 def _changes(time: Numbers, flat: Numbers, period: float) -> bool:
     """Whether a motion repeats at a period, but decays or grows."""
     cycle = limit_cycle(time, flat, period)
     change = 1.0 - min(cycle.growth, 1.0 / cycle.growth) if cycle.growth > 0.0 else 1.0
-    return cycle.cycles > 0.0 and change > 1.0 - SURE and cycle.confidence + change >= SURE
+    return cycle.cycles > 0.0 and change > 1.0 - CYCLE.sure and cycle.confidence + change >= CYCLE.sure

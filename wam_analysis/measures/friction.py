@@ -9,23 +9,10 @@ from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.thresholds import SHAFT
 
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-FEWEST = 20  # samples in motion that are needed
-AGREEING = 3  # breakaways of which the least is taken for the highest: no single one decides
-STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
-PRECISE = 0.01  # of the torque: noise at a breakaway after the line
-SIGMAS = 3.0  # standard errors that are meant to hold the truth
-FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
-CREEP = 0.5  # of the rise of static above dynamic friction: what creep at a speed that is taken for rest may hide of it
-NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
-UNEVEN = 0.003  # of dry friction, by which it changes with load and position: over few speeds that looks like viscous
-SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
-SHARE = 1e-3  # of a direction that the recording does not show, from which on a factor is not determined
-REPEATED = 0.15  # of length and speed, by which a motion that repeats another may differ from it
-JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
 
 class Friction(NamedTuple):
@@ -100,7 +87,7 @@ def identify_friction(
     n = len(time)
     allowed = np.ones(n, dtype=np.bool_) if use is None else use.copy()
     allowed &= np.isfinite(velocity) & np.isfinite(torque)
-    if n < FEWEST or int(np.sum(allowed)) < FEWEST:
+    if n < SHAFT.fewest_samples or int(np.sum(allowed)) < SHAFT.fewest_samples:
         return _UNSEEN
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
     period = float(np.median(np.diff(time)))
@@ -144,7 +131,7 @@ def _in_motion(
     onward = np.convolve((allowed & (velocity > rest)).astype(float), reach, "same") > len(reach) - 0.5
     back = np.convolve((allowed & (velocity < -rest)).astype(float), reach, "same") > len(reach) - 0.5
     rows = np.flatnonzero(onward | back)
-    if len(rows) < FEWEST:
+    if len(rows) < SHAFT.fewest_samples:
         return nothing
     v = np.convolve(velocity, triangle, "same")[rows]
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
@@ -155,7 +142,7 @@ def _in_motion(
     disturbances = np.column_stack([np.empty((len(rows), 0)), *unknown])
     solution, errors, left = _robust(columns, wanted, disturbances, len(triangle), _halves(rows))
     scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
-    uneven = UNEVEN * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
+    uneven = SHAFT.uneven * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
     return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 
@@ -176,19 +163,19 @@ def _robust(
     used = _distinct(columns)
     solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
-        if int(np.sum(keep)) < FEWEST:
+        if int(np.sum(keep)) < SHAFT.fewest_samples:
             break
         used, solution, rest = _fit(columns, wanted, scale, keep)
         middle = float(np.median(rest[keep]))
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
-        keep = np.abs(rest - middle) <= max(JUMP * sd, 1e-12)
+        keep = np.abs(rest - middle) <= max(SHAFT.jump * sd, 1e-12)
     if _distinct(columns[keep]) != used:  # what was left out was all of one direction
         used, solution, rest = _fit(columns, wanted, scale, keep)
     a = columns[keep][:, used] / scale[used]
     products = a.T @ a
     inverse = np.linalg.pinv(products)
     alike = max(float(width), _correlation_length(rest[keep]))
-    freedom = max(len(a) / alike - len(used), FREEDOM)
+    freedom = max(len(a) / alike - len(used), SHAFT.freedom)
     covariance = inverse * float(np.sum(rest[keep] ** 2)) / freedom
     noisy = _few(freedom) * np.sqrt(np.diag(covariance))
     noisy[_undetermined(products)] = math.inf
@@ -196,7 +183,7 @@ def _robust(
     found[used] = solution / scale[used]
     errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
     errors[used] = np.hypot(errors[used], np.linalg.norm(inverse @ (a.T @ waves[keep]), axis=1) / scale[used])
-    errors = np.hypot(errors, NEGLECTED * found)
+    errors = np.hypot(errors, SHAFT.neglected * found)
     left = float(np.sqrt(np.mean(rest[keep] ** 2)))
     return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
 
@@ -219,8 +206,8 @@ def _undetermined(products: Numbers) -> Mask:
     """Factors, (p,), that can change without any change of the fit of these normal equations, (p, p)."""
     sizes = np.sqrt(np.maximum(np.diag(products), 1e-300))
     values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
-    free = vectors[:, values < values[-1] / SINGULAR]
-    return np.asarray(np.any(np.abs(free) > SHARE, axis=1), np.bool_)
+    free = vectors[:, values < values[-1] / SHAFT.singular]
+    return np.asarray(np.any(np.abs(free) > SHAFT.undetermined, axis=1), np.bool_)
 
 
 def _correlation_length(rest: Numbers) -> float:
@@ -275,7 +262,7 @@ def _sums(parts: Numbers, group: Sequence[int]) -> Numbers:
 def _spread(products: Numbers, targets: Numbers) -> Numbers | None:
     """Standard errors from solving normal equations without one of the parts each; None from less than two."""
     left, right = products.sum(axis=0) - products, targets.sum(axis=0) - targets
-    is_known = np.linalg.cond(left) < SINGULAR
+    is_known = np.linalg.cond(left) < SHAFT.singular
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
     if len(found) < 2:
         return None
@@ -291,7 +278,7 @@ def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
     marks = np.array([_mark(direction[0], np.abs(velocity)) for direction, velocity in halves])
     group, number = np.full(len(marks), -1), 0
     while (left := np.flatnonzero(group < 0)).size:
-        alike = np.all(np.abs(marks[left] - marks[left[0]]) < REPEATED, axis=1)
+        alike = np.all(np.abs(marks[left] - marks[left[0]]) < SHAFT.repeated, axis=1)
         alike[0] = True  # also where a speed is not finite
         group[left[alike]] = number
         number += 1
@@ -311,9 +298,9 @@ def _few(freedom: float) -> float:
 
     Student's t by the approximation of Wallace (1959), at most 7 % too large from three degrees of freedom on.
     """
-    n = max(freedom, FREEDOM)
-    deviate = SIGMAS * (8.0 * n + 3.0) / (8.0 * n + 1.0)
-    return math.sqrt(n * math.expm1(deviate**2 / n)) / SIGMAS
+    n = max(freedom, SHAFT.freedom)
+    deviate = SHAFT.sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0)
+    return math.sqrt(n * math.expm1(deviate**2 / n)) / SHAFT.sigmas
 
 
 class _Breakaways(NamedTuple):
@@ -333,29 +320,29 @@ def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) ->
     near = found.torque >= dynamic  # what moved at less was creeping; where it never slid, it was no breakaway
     if not np.any(near):
         return math.nan, math.nan, 0
-    count = found.torque >= (dynamic + float(np.min(np.sort(found.torque[near])[-AGREEING:]))) / 2.0
+    count = found.torque >= (dynamic + float(np.min(np.sort(found.torque[near])[-SHAFT.agreeing :]))) / 2.0
     torque = found.torque[count]
     static = float(np.median(torque))
     wave = float(np.sqrt(np.mean(np.sum(waves[found.row[count]] ** 2, axis=1))))
-    if not static - dynamic > SIGMAS * math.sqrt(max(noise**2 - wave**2, 0.0)):
+    if not static - dynamic > SHAFT.sigmas * math.sqrt(max(noise**2 - wave**2, 0.0)):
         return static, math.inf, len(torque)
     scatter = 1.4826 * float(np.median(np.abs(torque - static)))
     alike = _few(len(torque) - 1.0) * scatter / math.sqrt(len(torque))
     step = float(np.median(found.step[count]))
-    return static, math.hypot(alike, CREEP * (static - dynamic), step, wave), len(torque)
+    return static, math.hypot(alike, SHAFT.creep * (static - dynamic), step, wave), len(torque)
 
 
 def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> _Breakaways:
     """Torque against the rest at the end of each stick, with the sign of the slip that follows."""
     sd = noise(velocity[np.abs(velocity) <= rest])
-    phases = stick_slip_phases(velocity, max(3.0 * sd, STILL * rest), max(window // 4, 1))
+    phases = stick_slip_phases(velocity, max(3.0 * sd, SHAFT.still * rest), max(window // 4, 1))
     begins = {int(begin): direction for (begin, _), direction in zip(phases.slips, phases.directions, strict=True)}
     level = float(np.percentile(np.abs(torque), 90.0))
-    needed = (2.0 * noise(torque) / (PRECISE * level)) ** 2 if level > 0.0 else 0.0
+    needed = (2.0 * noise(torque) / (SHAFT.precise * level)) ** 2 if level > 0.0 else 0.0
     length = int(np.clip(needed, max(window // 4, 4), max(window, 4)))
     found = []
     for begin, end in phases.sticks:
-        still = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, STILL * rest))
+        still = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, SHAFT.still * rest))
         last = int(begin + still[-1]) + 1 if len(still) else int(begin)
         first = max(int(begin), last - length)
         # counts of an encoder in these rows are too few for a motion, and still one

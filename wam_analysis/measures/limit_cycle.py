@@ -8,15 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import noise
+from wam_analysis.thresholds import CYCLE
 
 Numbers = NDArray[np.float64]
-
-PHASES = 192  # of a cycle that are resolved, if there are enough samples
-LEAST = 8  # samples for each of them
-FEWEST = 3  # cycles that are needed
-SHORTEST = 2.0  # samples; what repeats faster cannot be seen
-GAP = 2.5  # periods between two samples from which some are missing
-ALIKE = 0.9  # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
 
 
 class LimitCycle(NamedTuple):
@@ -67,17 +61,17 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
         with confidence 0 if nothing repeats at least three times, or the times have gaps.
     """
     n = len(value)
-    if n < 4 * FEWEST or float(np.ptp(value)) == 0.0 or _has_gaps(time):
+    if n < 4 * CYCLE.cycles or float(np.ptp(value)) == 0.0 or _has_gaps(time):
         return NO_CYCLE
     seconds = float(time[-1] - time[0]) / (n - 1)
     centre = np.linspace(-1.0, 1.0, n)
     flat = value - np.mean(value)
     flat = flat - centre * float(centre @ flat) / float(centre @ centre)
     lag = _period(flat) if math.isnan(period) else period / seconds
-    if not lag >= SHORTEST:
+    if not lag >= CYCLE.shortest_period:
         return NO_CYCLE
     phase = np.arange(n) / lag % 1.0
-    phases = max(min(PHASES, n // LEAST), 2)
+    phases = max(min(CYCLE.phases, n // CYCLE.phase_samples), 2)
     folded = _fold(flat, phase, phases)
     half = n // 2
     first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
@@ -102,7 +96,7 @@ def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
     value : (n,), the signal without drift.
     period : s.
     """
-    phases = max(min(PHASES, len(value) // LEAST), 2)
+    phases = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples), 2)
     return _fold(value - np.mean(value), time / period % 1.0, phases).size
 
 
@@ -115,7 +109,7 @@ def error_of_size(time: Numbers, value: Numbers, period: float) -> float:
     value : (n,), the signal without drift.
     period : s.
     """
-    cells = max(min(PHASES, len(value) // LEAST) // 4, 2)
+    cells = max(min(CYCLE.phases, len(value) // CYCLE.phase_samples) // 4, 2)
     cell = np.minimum((time / period % 1.0 * cells).astype(np.int64), cells - 1)
     parts = [value[cell == i] for i in range(cells)]
     sizes = [float(np.ptp([middle(part) for part in parts if len(part)])) for middle in (np.mean, np.median)]
@@ -125,7 +119,7 @@ def error_of_size(time: Numbers, value: Numbers, period: float) -> float:
 def _has_gaps(time: Numbers) -> bool:
     """Whether samples are missing, so that a number of samples is no time."""
     steps = np.diff(time)
-    return bool(steps.max() > GAP * float(np.median(steps)))
+    return bool(steps.max() > CYCLE.gap * float(np.median(steps)))
 
 
 class CycleExtent(NamedTuple):
@@ -175,7 +169,7 @@ def _period(flat: Numbers) -> float:
     n = len(flat)
     size = 1 << (2 * n - 1).bit_length()
     power = np.abs(np.fft.rfft(flat, size)) ** 2
-    longest = n // FEWEST + 1
+    longest = n // CYCLE.cycles + 1
     likeness = np.fft.irfft(power, size)[: n // 2 + 2] / (n - np.arange(n // 2 + 2))
     negative = np.flatnonzero(likeness[:longest] < 0.0)
     if not len(negative):
@@ -190,7 +184,7 @@ def _period(flat: Numbers) -> float:
     peaks = peaks[likeness[peaks] > 0.0]
     if not len(peaks):
         return math.nan
-    guess = _top(likeness, int(peaks[likeness[peaks] >= ALIKE * np.max(likeness[peaks])][0]))
+    guess = _top(likeness, int(peaks[likeness[peaks] >= CYCLE.correlated * np.max(likeness[peaks])][0]))
     times = 2
     while guess >= 1.0 and times * guess < n / 2.0 - 1.0:
         reach = max(2, int(guess / 4.0))

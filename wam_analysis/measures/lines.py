@@ -6,14 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from wam_analysis.thresholds import CYCLE
 
-BRIEFEST = 64  # samples
-FIRST = 5  # lowest frequency, in 1/duration: below it a drift is no line
-NEIGHBOURS = 8, 24  # bins on each side at least and at most, half of the frequency, from which the noise is known
-GAMMA = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
-SURE = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
-CLEAR = 0.05  # of the largest line: smaller ones are not reported
+Numbers = NDArray[np.float64]
 
 
 class SpectralLine(NamedTuple):
@@ -37,7 +32,7 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     most : lines that are returned at most.
     """
     n = len(value)
-    if n < BRIEFEST or not np.ptp(value) > 0.0:
+    if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
         return []
     steps = np.linspace(-1.0, 1.0, n)
     flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
@@ -49,9 +44,13 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     found: list[SpectralLine] = []
     width = float(time[-1] - time[0]) * n / (n - 1)
     for k in peaks[np.argsort(-power[peaks])].tolist():
-        if k < FIRST or len(found) == most or (found and amplitude[k] < CLEAR * found[0].amplitude):
+        if (
+            k < CYCLE.first_line
+            or len(found) == most
+            or (found and amplitude[k] < CYCLE.clear_line * found[0].amplitude)
+        ):
             continue
-        if power[k] < (math.log(n / 2) + SURE) * _noise(power, k):
+        if power[k] < (math.log(n / 2) + CYCLE.sure_line) * _noise(power, k):
             continue
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
@@ -66,8 +65,8 @@ def _noise(power: Numbers, k: int) -> float:
 
     The mean of the nearest bins is taken if it is higher, as next to the hump of a transient.
     """
-    reach = min(max(k // 2, NEIGHBOURS[0]), NEIGHBOURS[1])
+    reach = min(max(k // 2, CYCLE.neighbours[0]), CYCLE.neighbours[1])
     rows = np.r_[max(k - reach, 1) : k - 2, k + 3 : min(k + reach + 1, len(power))]
     line = np.polynomial.polynomial.polyfit(np.log(rows / k), np.log(np.maximum(power[rows], 1e-300)), 1)
     near = np.r_[max(k - 4, 1) : k - 2, k + 3 : min(k + 5, len(power))]
-    return max(math.exp(float(line[0]) + GAMMA), float(np.mean(power[near])))
+    return max(math.exp(float(line[0]) + CYCLE.euler_gamma), float(np.mean(power[near])))

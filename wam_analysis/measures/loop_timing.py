@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import STREAM
+
 Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
-
-BURST = 0.1  # of a period: messages that come so soon after the one before waited for their reader
-LAGGED = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
 
 
 class StampTiming(NamedTuple):
@@ -116,7 +115,7 @@ def has_lagged(stamp: Times, received: Times) -> bool:
     if len(stamp) < 2:
         return False
     period = float(np.median(np.diff(np.sort(stamp))))
-    return float(np.mean(np.diff(np.sort(received)) < round(BURST * period))) > LAGGED
+    return float(np.mean(np.diff(np.sort(received)) < round(STREAM.burst * period))) > STREAM.lagged
 
 
 def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:

@@ -7,13 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import noise, smoothed
+from wam_analysis.thresholds import CYCLE
 
 Numbers = NDArray[np.float64]
-
-QUIET = 0.1  # part of the settling band that noise may fill after smoothing, four standard deviations of it
-LOUDEST = 0.5  # the same, where so much smoothing would make the rise longer
-SHARP = 4.0  # widths of the smoothing in a rise: it is longer by 2 % then
-TOP = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
 
 
 class StepResponse(NamedTuple):
@@ -68,11 +64,14 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     if step == 0.0 or not math.isfinite(step):
         raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to evaluate")
     sd = noise(value) / abs(step)
-    least, width = (min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50 or 1) for q in (LOUDEST, QUIET))
+    least, width = (
+        min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50 or 1)
+        for q in (CYCLE.step_loudest, CYCLE.step_quiet)
+    )
     while True:
         part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
         low, high = _crossing(time, part, 0.1), _crossing(time, part, 0.9)
-        if width <= least or not high - low < SHARP * width * float(time[1] - time[0]):
+        if width <= least or not high - low < CYCLE.sharp * width * float(time[1] - time[0]):
             break
         width = max(width // 2, least)
     peak, at = _peak(time, (value - begin) / step, part)
@@ -117,7 +116,7 @@ def _peak(time: Numbers, raw: Numbers, part: Numbers) -> tuple[float, float]:
     excess = float(part[top]) - 1.0
     if excess <= 0.0:
         return 0.0, math.nan
-    below = np.flatnonzero(part < 1.0 + TOP * excess)
+    below = np.flatnonzero(part < 1.0 + CYCLE.top * excess)
     first = int(below[below < top][-1]) + 1 if np.any(below < top) else 0
     last = int(below[below > top][0]) if np.any(below > top) else len(part)
     if last - first < 5 or top in (first, last - 1):

@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from wam_analysis.thresholds import SHAFT
 
-CELLS = 4  # per turn and order, into which angles are binned
-DETERMINED = 100.0  # condition number above which the angles have gaps that make ripple of any error of the torque
+Numbers = NDArray[np.float64]
 
 
 class Ripple(NamedTuple):
@@ -54,7 +53,7 @@ def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     if not len(angle):
         return NO_RIPPLE
     turns = float(np.ptp(angle)) / (2.0 * math.pi)
-    cell = np.floor((angle - np.min(angle)) * (2.0 * CELLS * orders / (2.0 * math.pi))).astype(np.int64)
+    cell = np.floor((angle - np.min(angle)) * (2.0 * SHAFT.cells * orders / (2.0 * math.pi))).astype(np.int64)
     count = np.bincount(cell)
     seen = np.flatnonzero(count)
     drift = 4
@@ -68,7 +67,7 @@ def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     columns = np.hstack([np.sin(np.outer(at, k)), np.cos(np.outer(at, k)), steady])
     weight = np.sqrt(number)[:, np.newaxis]
     solution, _, _, singular = np.linalg.lstsq(weight * columns, weight[:, 0] * mean, rcond=None)
-    if singular[0] > DETERMINED * singular[-1]:
+    if singular[0] > SHAFT.determined * singular[-1]:
         return NO_RIPPLE._replace(turns=turns)
     sine, cosine = solution[:orders], solution[orders : 2 * orders]
     rest = mean - columns @ solution

@@ -5,11 +5,11 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.thresholds import STREAM
+
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.int64]
-
-FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 
 
 def after_gaps(time: Numbers | Rows) -> Mask:
@@ -20,7 +20,7 @@ def after_gaps(time: Numbers | Rows) -> Mask:
     time : (n,), rising, in any unit.
     """
     steps = np.diff(time)
-    late = steps > FILLED * np.median(steps) if len(steps) else np.zeros(0, np.bool_)
+    late = steps > STREAM.filled * np.median(steps) if len(steps) else np.zeros(0, np.bool_)
     return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
 
 

@@ -7,14 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import require_usable
+from wam_analysis.thresholds import CYCLE
 from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
-
-TRANSIENT = 2  # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
-FEWEST = 3  # further peaks that a trend needs
-STEADY = 0.002  # growth per half cycle below which the amplitude is constant
-FLATTENED = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
 
 
 class Stability(NamedTuple):
@@ -56,21 +52,21 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
     if quiet:
         return Stability(Verdict.SETTLED, math.nan, 1.0, peaks)
-    late = peaks[TRANSIENT:]
-    if len(late) < FEWEST:
+    late = peaks[CYCLE.transient :]
+    if len(late) < CYCLE.peaks:
         return Stability(Verdict.UNDECIDED, math.nan, 0.0, peaks)
-    late = late[-max(len(late) // 2 + 1, FEWEST) :]
+    late = late[-max(len(late) // 2 + 1, CYCLE.peaks) :]
     slope, error_of_slope = trend(np.log(late))
     sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
-    last = trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
-    if slope > STEADY and sure > 2.0:
+    last = trend(np.log(late[-max(len(late) // 2, CYCLE.peaks) :]))[0]
+    if slope > CYCLE.steady_growth and sure > 2.0:
         verdict = Verdict.DIVERGED
-    elif abs(last) <= STEADY or sure <= 2.0 or (slope < 0.0 and last > FLATTENED * slope):
+    elif abs(last) <= CYCLE.steady_growth or sure <= 2.0 or (slope < 0.0 and last > CYCLE.flattened * slope):
         verdict = Verdict.LIMIT_CYCLE
-        sure = STEADY / error_of_slope if error_of_slope > 0.0 else math.inf
+        sure = CYCLE.steady_growth / error_of_slope if error_of_slope > 0.0 else math.inf
     else:
         verdict = Verdict.SETTLED
-    confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - TRANSIENT) / 5.0)
+    confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - CYCLE.transient) / 5.0)
     return Stability(verdict, math.exp(slope), confidence, peaks)
 
 

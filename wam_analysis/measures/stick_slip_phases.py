@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import require_usable, runs, without_short
+from wam_analysis.thresholds import SHAFT
 
 Numbers = NDArray[np.float64]
-PASSING = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
 Rows = NDArray[np.int64]
 
 
@@ -75,7 +75,7 @@ def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
         [
             a in ends
             and b in begins
-            and np.percentile(np.abs(velocity[a:b]), 50.0 if ends[a] != begins[b] else 5.0) > PASSING * rest
+            and np.percentile(np.abs(velocity[a:b]), 50.0 if ends[a] != begins[b] else 5.0) > SHAFT.passing * rest
             for a, b in phases.sticks.tolist()
         ],
         dtype=np.bool_,

@@ -7,15 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.stability import trend
+from wam_analysis.thresholds import CYCLE
 from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
-
-FEWEST = 3  # swings that a verdict needs
-ALIKE = 0.05  # of their mean: swings that differ by less are those of one cycle
-SURE = 3.0  # standard errors of a trend
-QUIET = 1.5  # longest of the last swings; after so long without another one the motion has ended
 
 
 class Swings(NamedTuple):
@@ -55,17 +51,17 @@ def swings(time: Numbers, value: Numbers, least: float) -> Swings:
         raise ValueError(f"least is {least!r}; it must be above zero, above the noise of the signal")
     rows = turning_points(value, least)
     sizes, lengths = np.abs(np.diff(value[rows])), np.diff(time[rows])
-    if len(sizes) < FEWEST:
+    if len(sizes) < CYCLE.swings:
         return Swings(Verdict.UNDECIDED, math.nan, math.nan, math.nan, len(sizes))
-    late = sizes[-max(len(sizes) // 2, FEWEST) :]
+    late = sizes[-max(len(sizes) // 2, CYCLE.swings) :]
     slope, error = trend(np.log(late))
-    ended = float(time[-1] - time[rows[-1]]) > QUIET * float(np.max(lengths[-FEWEST:]))
-    changes = abs(slope) * (len(late) - 1) > ALIKE and abs(slope) > SURE * error
+    ended = float(time[-1] - time[rows[-1]]) > CYCLE.quiet * float(np.max(lengths[-CYCLE.swings :]))
+    changes = abs(slope) * (len(late) - 1) > CYCLE.swings_alike and abs(slope) > CYCLE.sure_trend * error
     if ended or (changes and slope < 0.0):
         verdict = Verdict.SETTLED
     elif changes:
         verdict = Verdict.DIVERGED
-    elif float(np.ptp(late)) <= 2.0 * ALIKE * float(np.mean(late)):
+    elif float(np.ptp(late)) <= 2.0 * CYCLE.swings_alike * float(np.mean(late)):
         verdict = Verdict.LIMIT_CYCLE
     else:
         verdict = Verdict.UNDECIDED

@@ -1,0 +1,293 @@
+"""Thresholds of the analysis, by concern, each with its unit and reason; and the layout of its reports."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftThresholds:
+    """When a shaft is at rest, what its friction and ripple can be known from, and when they are certain."""
+
+    # rest and motion
+    motor_rest: float = 0.05  # rad/s; a slower motor is at rest
+    joint_rest: float = 0.002  # rad/s or m/s; a slower joint is at rest
+    shortest_phase: float = 0.01  # s; a shorter stick or slip is chatter
+    window: float = 0.03  # s over which friction is averaged
+    noisy: float = 6.0  # standard deviations of the noise of a velocity: a joint that is slower is at rest
+    far: float = 20.0  # resolutions of a position, or seconds at the speed `joint_rest`: who moves so far has moved
+    brief: float = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
+    turns: float = 0.8  # of the rests of such a joint have motion to the other side behind them
+    window_samples: int = 6  # in that window
+    disobeyed: float = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
+    turning: float = 5.0  # % of the time at rest that a motion back and forth has where it turns
+    passing: float = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
+    still: float = 0.01  # of the speed of rest: below it the shaft has not begun to move
+    # friction
+    fewest_samples: int = 20  # below which a signal is not evaluated
+    agreeing: int = 3  # breakaways of which the least is taken for the highest: no single one decides
+    precise: float = 0.01  # of the torque: noise at a breakaway after the line
+    sigmas: float = 3.0  # standard errors by which a number may differ from its prediction, or from the truth
+    neglected: float = 2e-3  # of a number: what its fit neglects, where a recording without noise leaves no error
+    freedom: float = 2.0  # least degrees of freedom: with fewer, an error could be anything
+    # of the rise of static above dynamic friction: what creep at a speed that is taken for rest may hide of it
+    creep: float = 0.5
+    # of dry friction, by which it changes with load and position: over few speeds that looks like viscous
+    uneven: float = 0.003
+    singular: float = 1e12  # condition of normal equations beyond which a column has no information
+    # of a direction that the recording does not show, from which on a factor is not determined
+    undetermined: float = 1e-3
+    repeated: float = 0.15  # of length and speed, by which a motion that repeats another may differ from it
+    # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
+    jump: float = 6.0
+    unsure: float = 0.25  # of a number; with a larger standard error it is not identifiable
+    below_zero: float = 3.0  # standard errors: a number so negative shows more than friction
+    drowned: float = 10.0  # times the torque of the cables; rotors that take more hide every loss
+    better: float = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
+    much_better: float = 0.5  # likewise, with a drag or a lag
+    longest_effort_lag: float = 0.06  # s of the effort behind the motion, or before it
+    # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
+    apart: float = 0.1
+    agree: float = 0.2  # by which a recorded velocity may differ from the rate of the position
+    least_work: float = 1e-3  # J below which no efficiency is given
+    # ripple
+    orders: int = 48  # of the ripple, cycles per turn
+    enough_turns: float = 1.2  # turns that determine it where they have no gaps
+    faint_ripple: float = 3.0  # times the median order; smaller ripple is not reported
+    slight_ripple: float = 0.05  # of the dry friction; smaller ripple is not reported either
+    cells: int = 4  # per turn and order, into which angles are binned
+    # condition number above which the angles have gaps that make ripple of any error of the torque
+    determined: float = 100.0
+    release: int = 200_000_000  # ns after the brakes were released
+    # s; with a longer period, cable torques do not show what a resonance does between samples
+    slowest_period: float = 0.006
+    # ns before and after a push or an estimated contact: it begins before it is detected, cables swing
+    around_contact: int = 200_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class CycleThresholds:
+    """When a signal repeats, steps, settles or responds, and how certain that is."""
+
+    # limit cycles
+    phases: int = 192  # of a cycle that are resolved, if there are enough samples
+    phase_samples: int = 8  # samples for each of them
+    cycles: int = 3  # cycles that are needed
+    shortest_period: float = 2.0  # samples; what repeats faster cannot be seen
+    gap: float = 2.5  # periods between two samples from which some are missing
+    # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
+    correlated: float = 0.9
+    sure: float = 0.8  # confidence from which a limit cycle is reported as one
+    seen: float = 0.02  # of the force; a smaller cycle is not reported
+    episode_cycles: int = 5  # cycles of an episode; fewer repeat by chance in one of many windows
+    window_samples: int = 64  # samples of a window, at least
+    slowest_cycles: int = 4  # cycles in a window, slower changes are drift when a cycle is looked for
+    same_period: float = 0.05  # relative difference of two periods that are the same
+    # of its size: the second half of a limit cycle that follows a decaying motion has so much of the first
+    steady: float = 0.95
+    edge: float = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
+    swings: int = 3  # swings that a verdict needs
+    swings_alike: float = 0.05  # of their mean: swings that differ by less are those of one cycle
+    sure_trend: float = 3.0  # standard errors of a trend
+    quiet: float = 1.5  # longest of the last swings; after so long without another one the motion has ended
+    late_part: float = 0.7  # of a hold, at its end: its range is that of a cycle, without the approach
+    least_swing: float = 0.05  # of the range: a smaller change is no swing
+    loud_swing: float = 8.0  # standard deviations of the noise: likewise
+    still_shaft: float = 1e-4  # rad; a shaft that moves less does not swing
+    loud: float = 4.0  # standard deviations of the noise: a smaller cycle is not reported
+    same_frequency: float = 0.03  # relative difference of two frequencies that are the same
+    commanded: float = 0.2  # of a cycle: a command that is smaller does not cause it
+    longest_lag: float = 0.15  # s by which a joint may follow its command
+    lags: int = 40  # steps of that lag at most
+    command_filters: tuple[float, ...] = (0.03, 0.1, 0.3)  # s, of the filters through which it may follow
+    singular: float = 1e-8  # of the largest singular value: smaller ones of a command are rounding
+    harmonics: int = 20  # of a commanded motion that are taken off before another cycle is looked for
+    # of a frequency: what remains so near to the first harmonics is the command with a changing size
+    near_harmonic: float = 0.1
+    lines: int = 3  # of a spectrum, that are reported
+    unsure: float = 0.02  # of the size of a cycle: a larger error is printed
+    # of a size: a cycle whose second half has less of the first, or more, is reported as changing
+    changing: float = 0.9
+    # lines of a spectrum, frequency response
+    first_line: int = 5  # lowest frequency, in 1/duration: below it a drift is no line
+    # bins on each side at least and at most, half of the frequency, from which the noise is known
+    neighbours: tuple[int, ...] = (8, 24)
+    euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
+    sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
+    clear_line: float = 0.05  # of the largest line: smaller ones are not reported
+    coherent: float = 0.8  # coherence from which a response is taken
+    excited: float = 1e-4  # of the strongest part of the input
+    segment: float = 2.0  # s, of the signals whose spectra are averaged
+    segments: int = 6  # that are averaged at least: of fewer, noise is often coherent
+    # steps and stability
+    # part of the settling band that noise may fill after smoothing, four standard deviations of it
+    step_quiet: float = 0.1
+    step_loudest: float = 0.5  # the same, where so much smoothing would make the rise longer
+    sharp: float = 4.0  # widths of the smoothing in a rise: it is longer by 2 % then
+    top: float = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
+    # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
+    transient: int = 2
+    peaks: int = 3  # further peaks that a trend needs
+    steady_growth: float = 0.002  # growth per half cycle below which the amplitude is constant
+    flattened: float = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
+
+
+@dataclass(frozen=True, slots=True)
+class HoldThresholds:
+    """Which commanded forces are evaluated, and what of them."""
+
+    shortest: float = 0.3  # s; a shorter one is part of a ramp
+    equal_force: float = 0.01  # N; commanded forces that differ by less are equal
+    steady: float = 0.4  # fraction of a hold, at its end, taken as steady
+    band: float = 0.05  # of the step: settled within it
+    before: float = 0.1  # s before a step, whose mean is where it begins
+    loud: float = 0.1  # of the force: an error that stays within it has settled
+    least_step: float = 0.1  # of the force; a smaller change is not evaluated as a step
+    fresh: float = 0.2  # s; the force of a more recent contact is that of the impact
+    # of a force: where the loop measured less by that of what acted before a command, it had no measurement
+    far: float = 0.5
+    typical_press: float = 10.0  # N, of a press
+    certain: float = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough for a comparison
+    force_tolerance: float = 10.0  # % of the commanded force
+
+
+@dataclass(frozen=True, slots=True)
+class TouchThresholds:
+    """Which contacts are one, which command they belong to, and how well they are estimated."""
+
+    touch: int = 500_000_000  # ns, within which a contact that began before a pressing step belongs to that step
+    # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
+    bounce: int = 100_000_000
+    plateau: int = 500_000_000  # ns, for which a commanded force is the same
+    lasting: float = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
+    steady_link: float = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
+    samples: int = 9  # of a steady state
+    after_command: int = 100_000_000  # ns, for which the force of a push or a press may last after its command
+    position_tolerance: float = 0.04  # m
+    false_tolerance: float = 10.0  # % of the time without contact, in which one may be estimated
+    ending: float = 0.2  # s: one of less may be a contact that has just ended, before a recording did
+    missed: float = 2.0  # of an answer about the link: worse than another link, which is 1
+    # N, below which a true force is printed as 0.00 N: a spring at its rest, which touches nothing
+    least_force: float = 5e-3
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationThresholds:
+    """What a recording of free motion can identify, and what is assumed before it."""
+
+    # the motion
+    window: float = 0.05  # s, over which the equations of motion are averaged
+    thinning: float = 0.5  # windows from one sample to the next
+    shortest: float = 10.0  # s of motion
+    largest_gap: float = 3.5  # periods that are bridged
+    least_contact: float = 1e-3  # of the time of a recording, below which such a force is not reported
+    braked: float = 1e-9  # N m; the torque of a motor that has no current
+    slowest_motor: float = 0.3  # rad/s; below it, friction depends on what a shaft did before
+    slowest_joint: float = 0.02  # rad/s, the same of a joint
+    short: float = 20.0  # s of motion in one direction, less of which is warned about
+    few_parts: int = 6  # parts of the motion in which a motor turns both ways
+    # assumed before it: standard deviations
+    friction: float = 0.5  # of the present Coulomb friction
+    load: float = 0.1  # friction per transmitted torque
+    viscous: float = 1.0  # of the present viscous friction
+    rotor: float = 0.2  # of the present rotor inertia
+    constants_difference: float = 0.012  # half the difference of two torque constants, each calibrated to 3 %, uniform
+    mass: float = 0.3  # of the present mass
+    centre: float = 0.05  # m
+    inertia: float = 0.5  # of the present inertia of the link
+    least_sd: float = 1e-6  # of everything whose present value is 0
+    # the fit
+    parts: int = 20  # of the motion
+    iterations: int = 5  # the load on friction and the links' inertia are not linear in the parameters
+    huber: float = 1.5  # standard deviations from which a residual counts less
+    law: float = 0.003  # standard deviation of friction, per friction, by what its law leaves out
+    asymmetry: float = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
+    warm_iterations: int = 2  # iterations that start near the solution
+    averaged: int = 5  # windows, over which equations are averaged to see what the estimate depends on
+    identified: float = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
+    pinned: float = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
+    lightest: float = 0.1  # of the present mass of a link and inertia of a rotor, below which no estimate goes
+    unexplained: float = 1.5  # rms of held-out motion per rms of the estimate's own
+    remaining: float = 0.1  # rms that stays unexplained, per Coulomb friction
+    worth: float = 0.04  # part of the squared error by which another v_s must be better than the present one
+    least_inertia: float = 1e-6  # kg m^2; an inertia that came out negative
+    least_column: float = 1e-12  # size of a column that the motion does not show
+    least_variance: float = 1e-30  # variance of a combination that has none
+    # combinations that gravity depends on
+    poses: int = 100  # random ones, in which the columns are compared
+    seed: int = 1  # of these poses
+    dependent: float = 1e-8  # of the largest column
+    shown: float = 1e-6  # factor of a parameter in a combination, up to which it is left out
+
+
+@dataclass(frozen=True, slots=True)
+class StreamThresholds:
+    """Which messages and stamps are used, and for how long a message holds."""
+
+    held: int = 100_000_000  # ns for which a message is held; after that the signal is unknown
+    thinned: int = 2  # periods of a thinned topic for which a message is held
+    fewest: int = 10  # messages of which the period of a topic is known
+    burst: float = 0.1  # of a period: messages that come so soon after the one before waited for their reader
+    lagged: float = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
+    filled: float = 5.5  # periods of the longest gap that is filled by interpolation
+    shown: int = 3  # messages of a topic that is shown
+    pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
+    # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
+    reset: int = 1_000_000_000
+    away: int = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
+    live: float = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
+    near: int = 20  # messages on both sides of a stamp that goes back, whose ages show whether the clock was set back
+    faster: float = 30.0  # times the receptions: stamps that go on so fast are not in s
+    seconds: float = 1e17  # an integer time below this is in seconds or less, above it in ns since 1970
+    absent: float = 1.5  # periods between two messages of a frame, from which one is absent
+    alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
+    irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
+    loud: float = 1e3  # roundings of a number: smaller changes are none
+    precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
+    widest: float = 0.03  # s about each sample that such a velocity is taken from
+
+
+@dataclass(frozen=True, slots=True)
+class ReportLayout:
+    """Sizes of reports and pictures."""
+
+    # text
+    width: int = 100  # columns of text, at most
+    step: int = 24  # columns of the name of a step
+    narrowest: int = 40  # columns of text, at least
+    name: float = 0.4  # width of a name in a table at most, of all
+    column: int = 12  # width of a number in a table at least, columns
+    changes: int = 4  # of parameters that are named
+    note: int = 160  # characters of a note on the parameters
+    # pictures
+    points: int = 6000  # points of a line
+    digits: int = 6  # of a number
+    narrow_page: int = 640  # px; up to this width the narrow pictures are shown
+    wide: float = 9.6  # inches, of a picture
+    narrow: float = 4.1  # inches, of a picture for a small page
+    png_dpi: int = 130  # of a picture on a page
+    ticks: int = 5  # at most, across a small picture
+    amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
+    dpi: int = 200  # of the demonstration's picture
+    size: tuple[float, float] = (9.0, 4.0)  # inches
+    labels: float = 0.08  # m, for the labels beyond the tips of the arrows
+    name_lines: int = 3  # of the name of a step: more would cover the forces
+    still: float = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
+    flat: float = 1e-4  # of the value; a smaller range of a plot is not blown up
+    pedestal: float = 0.07  # m, radius of the drawn base, which is not in the parameters
+    floor: float = -1.0  # m, height of the foot of the drawn base
+    metres_per_newton: float = 0.015  # length of an arrow
+    render_timeout: float = 30.0  # s, of the process that renders
+    pixels_per_metre: int = 1500  # of the rendered arm
+    floor_gap: float = 0.002  # m below the obstacles, so that surfaces do not flicker
+    # of the plots and of the status: a legend has up to four lines
+    plot_heights: tuple[float, ...] = (1.9, 1.0, 1.5, 0.9)
+    eye_distance: float = 1.3  # of the eye, in heights of what it sees
+    poses: float = 100.0  # poses of the arm in a second at most
+
+
+SHAFT = ShaftThresholds()
+CYCLE = CycleThresholds()
+HOLD = HoldThresholds()
+TOUCH = TouchThresholds()
+IDENTIFY = IdentificationThresholds()
+STREAM = StreamThresholds()
+LAYOUT = ReportLayout()
