@@ -25,6 +25,7 @@ COMPILED = (
     "wam_control/contact/contact_fusion.py",
     "wam_control/contact/contact_inference.py",
     "wam_control/contact/contact_table.py",
+    "wam_control/contact/error_effects.py",
     "wam_control/force/force_axis.py",
     "wam_control/force/force_command.py",
     "wam_control/force/force_hold.py",

@@ -57,6 +57,28 @@ OF_MASS = (
 )  # what MuJoCo's model keeps of the masses
 
 
+class _View:
+    """Views into MuJoCo's memory of n rotors and n joints: to fetch them in each step costs more than its own work.
+
+    Free bodies and doors come after rotors and joints.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, n: int) -> None:
+        joints, shafts = slice(n, 2 * n), slice(2 * n)
+        self.position, self.every_velocity, self.velocities = data.qpos, data.qvel, data.qvel[shafts]
+        self.theta, self.thetad = data.qpos[:n], data.qvel[:n]
+        self.q, self.qd, self.qdd = data.qpos[joints], data.qvel[joints], data.qacc[joints]
+        self.bias, self.spring = data.qfrc_bias[joints], data.qfrc_spring[joints]
+        self.constraint, self.applied = data.qfrc_constraint[shafts], data.qfrc_applied
+        self.friction_loss, self.plastic, self.warnings = (
+            model.dof_frictionloss[shafts],
+            data.plastic,
+            data.warning.number,
+        )
+        self.damping: list[float] = model.dof_damping[joints].tolist()
+        self.armature: list[float] = model.dof_armature[joints].tolist()
+
+
 class Plant:
     """The arm in MuJoCo, stepped with motor torques, without ROS and without a clock.
 
@@ -88,67 +110,49 @@ class Plant:
         self.model = mujoco.MjModel.from_xml_string(self._xml_of(arm))
         self.data = mujoco.MjData(self.model)
         mujoco.set_mju_user_warning(_unheard)
-        n = len(arm.motors.names)
-        self._n = n
-        self._brakes = [brake_torque] * n
-        self._start = arm.joints.start
-        self._slack, self._play = effects.slack, [effects.play(i) for i in range(n)]
+        n = self._n = len(arm.motors.names)
+        self._brakes, self._effects = [brake_torque] * n, effects
         self._arm, self._carried = arm, 0.0
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)
-        self._pushes = self._loads.pushes
         self._moving = moving_obstacles(self.model, self.data, world)
         self._objects = TrueObjects(self.model, self.data, arm, world, {one.name: one for one in self._moving})
         self._pushers = pushers(self.model, self.data, arm, world.pushers, step)
-        self._movers: list[Mover] = [*self._pushers, *self._moving]
-        self._surfaces = Surfaces(self.model, self.data, arm, world, self._movers, step)
-        # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
-        data, model = self.data, self.model
-        joints = self._joints = slice(n, 2 * n)  # free bodies and doors come after rotors and joints
-        self._qvel, self._every_velocity = data.qvel[: 2 * n], data.qvel
-        self._theta, self._thetad, self._q, self._qd = (
-            data.qpos[:n],
-            data.qvel[:n],
-            data.qpos[joints],
-            data.qvel[joints],
-        )
-        self._qdd = data.qacc[joints]
-        self._joint_damping, self._armature = model.dof_damping[joints].tolist(), model.dof_armature[joints].tolist()
-        self._constraint, self._applied = data.qfrc_constraint[: 2 * n], data.qfrc_applied
+        movers: list[Mover] = [*self._pushers, *self._moving]
+        self._surfaces = Surfaces(self.model, self.data, arm, world, movers, step)
+        self._view = _View(self.model, self.data, n)
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
-        self._frictionloss = self.model.dof_frictionloss[: 2 * n]
-        self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
-        is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
-        shared = self._surfaces.laws, self._friction, self._circuits, self._pushes
-        self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
+        is_plain = self._friction.is_steady and not movers  # what the steps in C do
+        shared = self._surfaces.laws, self._friction, self._circuits, self._loads.pushes
+        self._advance = compiled_steps(self.model, self.data, *shared, step) if is_plain else None
         # to look them up in each step costs 3 % of it
         bounds, after_step = (*self._friction.bounds, self._friction.direction), self._circuits.after_step
-        touching = self._pushes, self._surfaces.may_touch, self._movers
-        self._in_steps = model, data, *touching, self._qvel.tolist, *bounds, after_step
+        touching = self._loads.pushes, self._surfaces.may_touch, movers
+        self._in_steps = self.model, self.data, *touching, self._view.velocities.tolist, *bounds, after_step
         self._rest()
         require_free_start(self.model, self.data, arm, world)
-        self._kept = self._position.tolist(), self._plastic.tolist()
+        self._kept = self._view.position.tolist(), self._view.plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
             self.set_pretension(effects.pretension_share)
         require_fitting_step(self.model, arm, world, step)
 
     def _rest(self) -> None:
         """Put the arm at its start pose, braked, with the cables stretched so that they carry the links."""
-        data, joints = self.data, self._joints
+        data, view, effects, arm = self.data, self._view, self._effects, self._arm
         mujoco.mj_resetData(self.model, data)
         self._circuits.rest()
         for one in self._moving:
             one.lead(0.0)
-        self._q[:] = self._start
-        self._theta[:] = self._motor_from_joint @ self._q
+        view.q[:] = arm.joints.start
+        view.theta[:] = self._motor_from_joint @ view.q
         mujoco.mj_forward(self.model, data)
-        load = data.qfrc_bias[joints] - data.qfrc_spring[joints]
+        load = view.bias - view.spring
         torque = np.linalg.solve(self._motor_from_joint.T, load)
-        self._theta[:] = self._motor_from_joint @ self._q + [
-            _stretch(tau, circuit, self._slack, play)
-            for tau, circuit, play in zip(torque.tolist(), self._arm.circuits, self._play, strict=True)
+        view.theta[:] = self._motor_from_joint @ view.q + [
+            _stretch(tau, circuit, effects.slack, effects.play(i))
+            for i, (tau, circuit) in enumerate(zip(torque.tolist(), arm.circuits, strict=True))
         ]
         self._begin()
 
@@ -160,7 +164,8 @@ class Plant:
         self._braked = True
         self._is_set = False  # whether MuJoCo has the present levels of friction
         self._set_friction()
-        self._velocity: list[float] = self._qvel.tolist()  # of rotors and joints at the start of the last step, rad/s
+        # of rotors and joints at the start of the last step, rad/s
+        self._velocity: list[float] = self._view.velocities.tolist()
         mujoco.mj_step1(self.model, data)
         if data.ncon:
             self._surfaces.apply()
@@ -174,13 +179,13 @@ class Plant:
 
     def trouble(self) -> str:
         """Why the arm's simulation cannot go on; '' if it can, and `recover` then comes back to the present angles."""
-        if any(self._warnings.tolist()):
-            names = [name for name, count in zip(WARNINGS, self._warnings.tolist(), strict=True) if count]
+        if any(self._view.warnings.tolist()):
+            names = [name for name, count in zip(WARNINGS, self._view.warnings.tolist(), strict=True) if count]
             return " and ".join(WARNINGS[name] for name in names)
-        position: list[float] = self._position.tolist()
-        if not math.isfinite(sum(self._every_velocity.tolist()) + sum(position)):
+        position: list[float] = self._view.position.tolist()
+        if not math.isfinite(sum(self._view.every_velocity.tolist()) + sum(position)):
             return WARNINGS["badqvel"]
-        self._kept = position, self._plastic.tolist()
+        self._kept = position, self._view.plastic.tolist()
         return ""
 
     def recover(self) -> None:
@@ -188,7 +193,7 @@ class Plant:
         self.release()
         time = self.data.time
         mujoco.mj_resetData(self.model, self.data)
-        self._position[:], self._plastic[:] = self._kept
+        self._view.position[:], self._view.plastic[:] = self._kept
         self.data.time = time
         for one in self._moving:
             one.lead(time)
@@ -221,7 +226,7 @@ class Plant:
     def pushes_in_words(self) -> str:
         """How hard which covers are pushed, by whom if a pusher does; '' where none is."""
         pressing = [pusher.words for pusher in self._pushers if pusher.is_pressing]
-        return ", ".join([self._loads.pushes_in_words(), *pressing] if self._pushes else pressing)
+        return ", ".join([self._loads.pushes_in_words(), *pressing] if self._loads.pushes else pressing)
 
     def carry(self, mass: float) -> None:
         """Carry a mass at the tool, kg, from now on, besides `arm.payload`: a point that already moves with it."""
@@ -245,10 +250,10 @@ class Plant:
         ValueError
             for a part that is below 0, or for another number of them; nothing is changed then.
         """
-        before = self._plastic.copy()
+        before = self._view.plastic.copy()
         self._friction.set_circuits(self._circuits.tighten(list(shares) if len(shares) > 1 else [*shares] * self._n))
         position, plastic = self._kept
-        self._kept = position, (plastic + (self._plastic - before)).tolist()
+        self._kept = position, (plastic + (self._view.plastic - before)).tolist()
         self._is_set = False
 
     def step(self, torque: Sequence[float], count: SupportsIndex = 1) -> None:
@@ -293,7 +298,7 @@ class Plant:
                     self._surfaces.apply()
                 mj_step2(model, data)
                 if pushes:
-                    self._applied.fill(0.0)
+                    self._view.applied.fill(0.0)
             else:  # nothing to do between the halves
                 mj_step(model, data)
             velocity = velocities()
@@ -304,17 +309,17 @@ class Plant:
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""
         friction, circuits = self._friction, self._circuits
-        velocity = self._qvel.tolist()
+        velocity = self._view.velocities.tolist()
         if friction.is_steady:
             changed = friction.follow(velocity)
         else:
             changed = friction.follow(velocity, self._transmitted_torque(), self._friction_torque())
             if friction.elastic:
-                self._applied[: 2 * self._n] = friction.elastic  # the rest is of free bodies and doors
+                self._view.applied[: 2 * self._n] = friction.elastic  # the rest is of free bodies and doors
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
             self._is_set = friction.is_steady and not circuits.is_slack
-            self._frictionloss[:] = self._brakes + levels[self._n :] if self._braked else levels
+            self._view.friction_loss[:] = self._brakes + levels[self._n :] if self._braked else levels
 
     def _transmitted_torque(self) -> list[float]:
         """Elastic torque of the cables on rotors, then on joints, N m, (2 n,), at the start of the last step."""
@@ -327,7 +332,7 @@ class Plant:
         data = self.data
         elastic = self._friction.elastic
         if data.nefc == data.nf:  # no other constraint, so that MuJoCo's sum of all is that of dry friction
-            dry_friction: list[float] = self._constraint.tolist()
+            dry_friction: list[float] = self._view.constraint.tolist()
             return [a + b for a, b in zip(elastic, dry_friction, strict=True)] if elastic else dry_friction
         torque = elastic.copy() or [0.0] * (2 * self._n)
         dry = slice(data.ne, data.ne + data.nf)
@@ -339,22 +344,22 @@ class Plant:
     @property
     def theta(self) -> list[float]:
         """Rotor angles, rad."""
-        return self._theta.tolist()
+        return self._view.theta.tolist()
 
     @property
     def thetad(self) -> list[float]:
         """Rotor velocities, rad/s."""
-        return self._thetad.tolist()
+        return self._view.thetad.tolist()
 
     @property
     def q(self) -> list[float]:
         """Joint angles, rad: what an encoder at the joint reads."""
-        return self._q.tolist()
+        return self._view.q.tolist()
 
     @property
     def qd(self) -> list[float]:
         """Joint velocities, rad/s."""
-        return self._qd.tolist()
+        return self._view.qd.tolist()
 
     @property
     def circuit_torque(self) -> list[float]:
@@ -390,11 +395,11 @@ class Plant:
         root of the link reads it: M qdd + c(q, qd) + g - tau_ext of the links alone.
         """
         n = self._n
-        acceleration, velocity, dry = self._qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
+        acceleration, velocity, dry = self._view.qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
         return [
             torque - damping * speed - armature * qdd + friction
             for torque, damping, speed, armature, qdd, friction in zip(  # noqa: B905 - as long as the work
-                self.cable_torque, self._joint_damping, velocity, self._armature, acceleration, dry
+                self.cable_torque, self._view.damping, velocity, self._view.armature, acceleration, dry
             )
         ]
 

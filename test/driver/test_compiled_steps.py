@@ -176,8 +176,8 @@ def test_the_package_is_compiled_where_that_is_possible(
     wanted: str, is_there: bool, count: int | None, tmp_path: Path
 ) -> None:
     for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml"):
-        shutil.copy(SOURCE.parents[2] / name, tmp_path)
-    for path in [SOURCE.parents[2] / "scripts", *SOURCE.parents[2].glob("wam_*")]:
+        shutil.copy(SOURCE.parents[1] / name, tmp_path)
+    for path in [SOURCE.parents[1] / "scripts", *SOURCE.parents[1].glob("wam_*")]:
         (tmp_path / path.name).symlink_to(path)
     path = str(Path(shutil.which(COMPILER) or "").parent) if is_there else str(tmp_path)
     environment = {**os.environ, "PATH": path, "WAM_COMPILE": wanted, "PYTHONPATH": ""}

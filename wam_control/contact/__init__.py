@@ -7,6 +7,7 @@
 ``contact_fusion``          several moments of one contact that explain it together
 ``contact_inference``       which link is touched, where and how hard
 ``contact_table``           hypotheses as rows of numbers, as the topic carries them, and back
+``error_effects``           how the errors of the model act on the torques
 ``inference_parameters``    its parameters
 ``model_errors``            the errors of the model, tracked in free motion
 ``model_prior``             what is known of them before: stated, or identified

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
+from wam_control.contact.error_effects import ErrorEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
 from wam_control.contact.observer_parameters import ObserverParameters
@@ -60,7 +61,6 @@ class MomentumObserver:
 
     Attributes
     ----------
-    q : (n,), joint angles of the last sample, rad.
     age : s, since the first sample.
     is_ready : whether enough samples came.
     seen : the moment of which torques were last given; from joint sensors the effects are those of one sd.
@@ -91,59 +91,47 @@ class MomentumObserver:
         self._joints = ShaftFriction(arm.joints, parameters, parameters.joint_rest_velocity)
         self._velocity = VelocityFit(n, parameters.motor_rest_velocity)
         self._cycle = 0 if use_joint_sensors else dither_cycle
-        fast = parameters.detection_time
-        self._times = [parameters.time_constant]
+        fast, times = parameters.detection_time, [parameters.time_constant]
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not self._cycle:
-            self._times.append(fast)
-        self._is_payload_declared = parameters.payload[1] > 0.0
+            times.append(fast)
         self._load: ToolLoad | None = None
+        payload_sd = 0.0
         if self._is_payload_declared or (parameters.payload_uncertainty > 0.0 and not use_joint_sensors):
             self._load = ToolLoad(arm, parameters.payload)
-        half_levels = 0.5 * np.array([*self._motors.dynamic, *self._joints.dynamic])
-        statics = np.array([*self._motors.static, *self._joints.static])
-        self._rest_sd, self._shape_sd = parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics
-        self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
-        # the same of the errors of the model, and their sizes
-        self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -self._through, inverse.T))
-        self._sizes = np.concatenate((half_levels, half_levels, np.ones(4 * n)))
-        self._to_joints = inverse.T
-        payload_sd = 0.0
-        if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
+        gauges = np.diag(np.full(n, parameters.joint_torque_sd**2))
+        self._gauges = gauges, np.zeros(n), np.sqrt(gauges)  # covariance, motion and lasting errors
+        self._effects = ErrorEffects(self._map, parameters, self._motors, self._joints, times, self._cycle > 0)
         prior = model_prior(arm, parameters, payload_sd, model)
-        self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
-        self._sensors_sd = np.sqrt(self._sensors)
-        self._independent = np.eye(2 * n + (self._load is not None))  # covariance of effects of one sd
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
+        self._filters = _Filters(n, times, self._cycle)
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
         n = self._n
-        self.q: list[float] = [0.0] * n
-        # of each filter the residual and the torque of the model, (2 n,), N m, the pose, (n,), rad, then the signals of
-        # the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s
-        self._filtered = np.zeros((len(self._times), 14 * n))
-        # strain gauges lie behind the friction: no signals, and so few numbers that a list takes half the time
-        self._of_links = [0.0] * (3 * n)
-        self._decay = _Decay.over(math.inf, self._times, 14 * n)
-        self._ring = np.zeros((max(1, self._cycle), 13 * n))
-        self._filled = 0
+        self._filters = _Filters(n, self._filters.times, self._cycle)
+        self._last = _Sample([0.0] * n, [], self._carried, [0.0] * n, [0.0] * n)
+        self._torque: Sequence[float] = ()
         if self._load is not None:
             self._load.reset()
-        self._momentum: list[float] | None = None
-        self._torque: Sequence[float] = ()
-        self._inertia = self._carried
         self._motors.reset()
         self._joints.reset()
         self._velocity.reset()
         self._errors.reset()
-        self._known: list[float] = [0.0] * n
-        self._bias: list[float] = [0.0] * n
         self._gap = self.age = self._followed = 0.0
         self.seen: Observation | None = None
         self.is_ready = False
+
+    @property
+    def q(self) -> list[float]:
+        """Joint angles of the last sample, (n,), rad."""
+        return self._last.q
+
+    @property
+    def _is_payload_declared(self) -> bool:
+        return self._parameters.payload[1] > 0.0
 
     def learn(self, other: "MomentumObserver") -> None:
         """Take over what another one of the same parameters has learned and keeps at a reset."""
@@ -220,58 +208,30 @@ class MomentumObserver:
         inertia = body.mass_matrix(at) if self._link_side else body.mass_matrix(at) + self._carried
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
-        before, span, n = self._momentum, dt + self._gap, self._n
-        if before is None:
+        last, span, n = self._last, dt + self._gap, self._n
+        is_first = not last.momentum
+        if is_first:
             external, model = [0.0] * n, [-torque for torque in bias]
         else:
             # map and a plain zip: strict=True takes as long as the work on four numbers
-            rates = [change / span for change in map(sub, momentum, before)]
-            left = model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, self._bias))]  # noqa: B905
+            rates = [change / span for change in map(sub, momentum, last.momentum)]
+            left = model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
             if friction:
-                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, self._known))]  # noqa: B905
+                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
             external = list(map(sub, left, tau))
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        if span != self._decay.span:
-            self._decay = _Decay.over(span, self._times, 14 * n)
-        self._filter(external + model + q, signals, before is None)
+        keep = self._filters.take(external + model + q, signals, span, is_first, span > self._parameters.time_constant)
         if self._load is not None:
-            keep = 0.0 if before is None else self._decay.keep
             self._load.observe(q, qd, span, keep)
-        self.q, self._inertia = q, inertia
-        self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
-        if self._cycle:
-            kept = self._ring[self._filled % self._cycle]
-            kept[:n], kept[n:] = self._filtered[0, :n], self._filtered[0, 2 * n :]
-            self._filled += 1
+        self._last, self._gap = _Sample(q, momentum, inertia, known, bias), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
-        settled = self.age > CONTACT.settled * self._parameters.time_constant and self._filled >= 2 * self._cycle
-        self.is_ready = self.is_ready or (before is not None and settled)
+        settled = self.age > CONTACT.settled * self._parameters.time_constant and self._filters.count >= 2 * self._cycle
+        self.is_ready = self.is_ready or (settled and not is_first)
         return True
-
-    def _filter(self, torques: list[float], signals: list[float], is_first: bool) -> None:
-        """Take torques and pose, (3 n,), and signals of the shafts into the filters."""
-        (span, keep, keeps, takes), filtered, n = self._decay, self._filtered, self._n
-        is_gap = span > self._parameters.time_constant and not is_first  # torques in so long a gap are unknown
-        if self._link_side:
-            if is_first:
-                self._of_links = torques
-            elif not is_gap:
-                take = 1.0 - keep
-                self._of_links = [keep * old + take * new for old, new in zip(self._of_links, torques)]  # noqa: B905
-            return
-        present = np.array(torques + signals)
-        if is_first:
-            filtered[:] = present
-            return
-        before_gap = filtered[:, : 3 * n].copy() if is_gap else None
-        filtered *= keeps
-        filtered += takes * present
-        if before_gap is not None:  # continue from here
-            filtered[:, : 3 * n] = before_gap
 
     def torques(self) -> tuple[list[float], Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
@@ -280,30 +240,26 @@ class MomentumObserver:
         uncertainty u of the model torque, the payload.  From the motors see `ModelErrors`.
         """
         if not self._link_side:
-            self._expect()
+            sd = self._velocity.sd
+            self._motors.expect(sd)
+            self._joints.expect(np.sqrt(self._squared.dot(np.square(sd))).tolist())
             self.seen = self._observation()
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), self._errors.size * covariance
-        uncertainty, load = self._parameters.mass_uncertainty, self._load
-        filtered = self._of_links
-        residual, sizes = filtered[: self._n], [uncertainty * torque for torque in filtered[self._n : 2 * self._n]]
-        covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
-        diagonal = slice(None, None, self._n + 1)
-        covariance.ravel()[diagonal] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
+        parameters, load, n = self._parameters, self._load, self._n
+        filtered = self._filters.of_links
+        residual, sizes = filtered[:n], [parameters.mass_uncertainty * torque for torque in filtered[n : 2 * n]]
+        covariance, effects = np.zeros((n, n)), np.zeros((n, n))
+        diagonal = slice(None, None, n + 1)
+        covariance.ravel()[diagonal] = [parameters.joint_torque_sd**2 + size**2 for size in sizes]
         effects.ravel()[diagonal] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
             sized = (np.array(load.torque) * load.sd)[:, None]
             covariance = covariance + sized * sized.T
             effects = np.concatenate((effects, sized), axis=1)
-        self.seen = Observation(
-            np.array(residual),
-            effects,
-            self._sensors,
-            self._at_rest,
-            np.array(filtered[2 * self._n :]),
-            self._sensors_sd,
-        )
+        own, motion, lasting = self._gauges
+        self.seen = Observation(np.array(residual), effects, own, motion, np.array(filtered[2 * n :]), lasting)
         return residual, covariance
 
     def moment(self) -> Torques:
@@ -314,7 +270,7 @@ class MomentumObserver:
         if not self._link_side:
             return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        return Torques(self.age, seen.residual, effects, self._independent, seen.rest, seen.pose)
+        return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
 
     def change(self, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""
@@ -332,7 +288,7 @@ class MomentumObserver:
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
-        if len(self._times) == 1:
+        if len(self._filters.times) == 1:
             return None
         torques, covariance = self._errors.corrected(self._observation(1))
         return torques.tolist(), self._errors.size * covariance
@@ -364,47 +320,10 @@ class MomentumObserver:
         beyond = [] if self._link_side else self._errors.beyond
         return f"the model is off: {beyond[0]}; see /diagnostics, run 'wam identify'" if beyond else ""
 
-    def _expect(self) -> None:
-        """Let the friction know how certain the velocities are."""
-        sd = self._velocity.sd
-        self._motors.expect(sd)
-        self._joints.expect(np.sqrt(self._squared.dot(np.square(sd))).tolist())
-
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        n, given, filtered = self._n, self._parameters, self._filtered[which].copy()
-        residual, model = filtered[:n], filtered[n : 2 * n].tolist()
-        pose, signals = filtered[2 * n : 3 * n], filtered[3 * n :]
-        if self._cycle and self._filled:
-            mean = self._ring[: self._filled].mean(axis=0)
-            residual, pose, signals = mean[:n], mean[n : 2 * n], mean[2 * n :]
-        sliding, moving, resting, shape = signals[: 8 * n].reshape(4, 2 * n)
-        if self._cycle:
-            # a shaft that slips in both directions within a cycle stops at both limits of its stiction
-            resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
-        load = self._load
-        effects = np.zeros((n, 8 * n + 2))
-        modelled = self._map.motor_torques(model)
-        pairs = zip(modelled, self._map.motor_torques(residual.tolist()), strict=True)
-        driving = [torque - external for torque, external in pairs]
-        sizes = self._sizes * np.concatenate(
-            (moving + sliding, moving - sliding, model, signals[8 * n : 10 * n], driving)
-        )
-        np.multiply(self._through_errors, sizes, out=effects[:, :-2])
-        effects[:, -2] = self._to_joints.dot(signals[10 * n :])
-        if load is not None:
-            effects[:, -1] = load.torque
-            residual -= load.mass * effects[:, -1]
-        variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
-        lasting = self._through * np.sqrt(variance)
-        # a faster filter averages less of what is noise
-        less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
-        sds = [given.motor_torque_fraction * torque for torque in modelled]
-        variance[:n] += [less * (least + sd * sd) for sd in sds]
-        rest = (self._through * variance).dot(self._through.T)
-        speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
-        momentum = self._inertia.dot(speed)
-        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n], pose, lasting)
+        means, load = self._filters.means(which), self._load
+        return self._effects.observation(means, load, self._last.inertia, self._velocity.sd, which)
 
     def identify_payload(self) -> str:
         """Identify the payload from the torques of joint sensors; '' or why that is not possible."""
@@ -417,6 +336,97 @@ class MomentumObserver:
             return "too few samples yet"
         torques, covariance = self.torques()
         return self._load.identify_payload(torques, covariance)
+
+
+class _Sample(NamedTuple):
+    """The last sample that was taken.
+
+    Attributes
+    ----------
+    q : joint angles, (n,), rad.
+    momentum : (n,), N m s; empty before the first sample.
+    inertia : (n, n), kg m^2.
+    known : torques of the model, (n,), N m, with friction.
+    bias : the same without friction.
+    """
+
+    q: list[float]
+    momentum: list[float]
+    inertia: Array
+    known: list[float]
+    bias: list[float]
+
+
+class _Filters:
+    """First-order filters of what a sample shows, and its mean over a cycle of a dither.
+
+    Each number is filtered with every time constant: the residual and the torque of the model, (2 n,), N m, the pose,
+    (n,), rad, then the signals of the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s.  Strain gauges
+    lie behind the friction: no signals, and so few numbers that a list takes half the time.
+
+    Parameters
+    ----------
+    n : number of joints.
+    times : time constants, s.
+    cycle : samples in a cycle of the dither, 0 where there is none.
+
+    Attributes
+    ----------
+    of_links : (3 n,), residual, torque of the model and pose on the link side.
+    count : samples in the means over a cycle.
+    """
+
+    def __init__(self, n: int, times: list[float], cycle: int) -> None:
+        self.times, self.of_links, self.count = times, [0.0] * (3 * n), 0
+        self._n, self._cycle = n, cycle
+        self._values = np.zeros((len(times), 14 * n))
+        self._ring = np.zeros((max(1, cycle), 13 * n))
+        self._decay = _Decay.over(math.inf, times, 14 * n)
+
+    def take(self, torques: list[float], signals: list[float], span: float, is_first: bool, is_gap: bool) -> float:
+        """Take a sample; what the first filter keeps of the one before, 0..1.
+
+        Parameters
+        ----------
+        torques : residual, torque of the model and pose, (3 n,).
+        signals : of the shafts, (11 n,); empty on the link side.
+        span : time since the sample before, s.
+        is_first : whether there was none before.
+        is_gap : whether the span is so long that the torques in it are unknown.
+        """
+        if span != self._decay.span:
+            self._decay = _Decay.over(span, self.times, 14 * self._n)
+        keep = 0.0 if is_first else self._decay.keep
+        if not signals:
+            if is_first:
+                self.of_links = torques
+            elif not is_gap:
+                take = 1.0 - keep
+                self.of_links = [keep * old + take * new for old, new in zip(self.of_links, torques)]  # noqa: B905
+            return keep
+        values, n, present = self._values, self._n, np.array(torques + signals)
+        if is_first:
+            values[:] = present
+        else:
+            before_gap = values[:, : 3 * n].copy() if is_gap else None
+            values *= self._decay.keeps
+            values += self._decay.takes * present
+            if before_gap is not None:  # continue from here
+                values[:, : 3 * n] = before_gap
+        if self._cycle:
+            kept = self._ring[self.count % self._cycle]
+            kept[:n], kept[n:] = values[0, :n], values[0, 2 * n :]
+            self.count += 1
+        return keep
+
+    def means(self, which: int) -> tuple[Array, list[float], Array, Array]:
+        """Residual and torque of the model, N m, pose, rad, each (n,), and signals, (11 n,), of one time constant."""
+        n, filtered = self._n, self._values[which].copy()
+        model: list[float] = filtered[n : 2 * n].tolist()
+        if not (self._cycle and self.count):
+            return filtered[:n], model, filtered[2 * n : 3 * n], filtered[3 * n :]
+        mean = self._ring[: self.count].mean(axis=0)
+        return mean[:n], model, mean[n : 2 * n], mean[2 * n :]
 
 
 class _Decay(NamedTuple):
