@@ -17,7 +17,7 @@ from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
 from wam_analysis.findings.page import page
 from wam_bag.bag import raw, read
 from wam_bag.bag_writer import BagWriter
-from wam_bag.message_layout import stamp_reader
+from wam_bag.cdr import stamp_reader
 from wam_description.configuration import Configuration, packaged
 from wam_description.topics import TOPICS
 from wam_ros.topics import qos

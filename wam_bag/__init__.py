@@ -3,7 +3,6 @@
 For users:
 
 - `bag`: `read` makes numpy columns of a bag, `raw` returns its serialized messages; `Bag`, `BagError`.
-- `series`: a topic as named series, for a DataFrame: `Bag.to_pandas`.
 - `contents`: `contents` lists topics, times and attachments without reading messages; `mode_of`.
 - `losses`: `losses` is what a bag lacks, from the records of the recorder and of repairs.
 - `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.
@@ -15,10 +14,8 @@ For users:
 Messages:
 
 - `columns`: the columns of each message type. `point_clouds`: points of PointCloud2 as a table.
-- `message_groups`: messages of equal layout decoded together. `cdr`: layouts, and messages decoded one by one.
-- `cdr_encoder`: messages serialized without ROS, whose definitions for that are in `messages.json`.
-- `message_layout`: exact length and stamp of a serialized message, for the recorder.
-- `message_text`: fields of a type from its definition. `definitions`: definitions as ROS installs them.
+- `message_groups`: messages of equal layout decoded together. `cdr`: the codec.
+- `message_text`: fields of a type from its definition. `definitions`: as ROS installs them, or of `messages.json`.
 
 Files:
 

@@ -27,6 +27,7 @@ from wam_bag.columns import (
     JointColumns,
     Messages,
     PointColumns,
+    Series,
     TableColumns,
     WrenchColumns,
 )
@@ -35,7 +36,6 @@ from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.message_groups import Times
 from wam_bag.message_search import NEVER, log_times, messages
-from wam_bag.series import Series
 
 __all__ = [
     "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",

@@ -18,10 +18,10 @@ from typing import Any, BinaryIO, Final, NamedTuple, Self
 from mcap.records import Attachment
 
 from wam_bag import safe_yaml
+from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError
 from wam_bag.mcap_writer import McapWriter
-from wam_bag.message_layout import ExactLength
 from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata
 
 __all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "exact_cdr", "policies", "release"]

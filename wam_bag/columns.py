@@ -4,7 +4,7 @@ Messages of a topic mostly have the same counts and strings.  Then every number 
 of them, and a column is a view of many records at once.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
@@ -17,10 +17,25 @@ from wam_bag.mcap_records import Bytes
 from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 from wam_bag.message_search import DATA, Found, log_times, messages
 from wam_bag.point_clouds import table_columns, tables
-from wam_bag.series import Series, split, stamped
 
 Texts = NDArray[np.object_]
+Series = dict[str, NDArray[Any]]
 AXES = ("x", "y", "z")
+
+
+def stamped(times: NDArray[np.int64]) -> Series:
+    """The series 'time', s, of times in ns."""
+    return {"time": times / 1e9}
+
+
+def split(fields: Mapping[str, NDArray[Any]], names: Iterable[object]) -> Series:
+    """A series 'field.name' for each column of each field; none of a field that is empty."""
+    names = list(names)
+    return {
+        f"{field}.{name}": column
+        for field, values in fields.items()
+        for name, column in zip(names, values.T, strict=False)
+    }
 
 
 def _listed(frames: Texts) -> str:

@@ -7,8 +7,8 @@ from functools import cache, partial
 from typing import Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
+from wam_bag.cdr import stamp_reader
 from wam_bag.losses import LOST_AT_END, UNFINISHED
-from wam_bag.message_layout import stamp_reader
 from wam_bag.printable import printable
 from wam_description.status import diagnosed_name
 from wam_description.topics import EVERY_NODE, Topic

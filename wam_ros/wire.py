@@ -5,57 +5,48 @@ the expected layout (another byte order, other names or their order, other array
 refuse the same.  Padding is written as zeros.  benchmarks/speed.py shows the gain.
 """
 
-import struct
 from collections.abc import Callable
-from functools import cache
-from typing import Any
+from functools import cache, lru_cache
+from itertools import chain, product
+from typing import Any, TypeVar
 
 from rclpy.serialization import deserialize_message, serialize_message
 
+from wam_bag.cdr import Pattern, first_stamp
 from wam_description.arm import Shared
 from wam_description.signals import BASE, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, TIME, WRENCH, Topic, columns_of
 from wam_ros.messages import Refused, message_type, reader, writer
 
-LITTLE_ENDIAN = b"\0\1\0\0"
-HEAD = struct.Struct("<4siI")  # encapsulation, seconds, nanoseconds
-SECOND = 1_000_000_000
-_COUNT = struct.Struct("<I")
 _LARGEST = tuple(LARGEST[name] for name in State._fields)
 _LARGEST_WRENCH = (LARGEST["force"],) * 3 + (LARGEST["torque"],) * 3
+_NO_HEADER = ((0, 0), "")  # stamp and frame
+_FLOAT64 = 8  # sensor_msgs/PointField
 
 Encode = Callable[[int, Any], bytes]
 Decode = Callable[[bytes], Any]
+Key = TypeVar("Key")
 
 
 def stamp_of(data: bytes) -> int:
     """Stamp of a serialized message with a header, ns; 0 where it is too short to have one."""
-    if len(data) < HEAD.size:
-        return 0
-    if not data[1] & 1:  # big-endian
-        sec, nanosec = struct.unpack_from(">iI", data, 4)
-    else:
-        _, sec, nanosec = HEAD.unpack_from(data)
-    return int(sec * SECOND + nanosec)
+    return first_stamp(data) or 0
 
 
 def encoder(topic: Topic, shared: Shared) -> Encode:
     """What turns a stamp in ns and a value into a serialized message of a topic."""
     if topic.type == JOINT_STATE:
-        names = _strings(_names(topic, shared))
+        names = _names(topic, shared)
         return lambda stamp, value: _joint_state(names, stamp, value)
     if topic.type == WRENCH:
-        return lambda stamp, value: _framed(value.frame, 6).pack(
-            LITTLE_ENDIAN, *divmod(stamp, SECOND), *_string(value.frame), *value.force, *value.torque
-        )
+        return lambda stamp, value: _wrench(value.frame).pack(stamp, (*value.force, *value.torque))
     if topic.type == POINT:
-        return lambda stamp, value: _framed(value.frame, 3).pack(
-            LITTLE_ENDIAN, *divmod(stamp, SECOND), *_string(value.frame), *value.position
-        )
+        return lambda stamp, value: _point(value.frame).pack(stamp, value.position)
     if topic.type == TABLE:
-        return lambda stamp, value: _table(topic.columns, stamp, value)
+        return lambda stamp, value: _packed_table(topic.columns, stamp, value)
     if topic.type == TIME:
-        return lambda stamp, value: HEAD.pack(LITTLE_ENDIAN, *divmod(stamp, SECOND))
+        clock = Pattern(TIME, _NO_HEADER[:1])
+        return lambda stamp, value: clock.pack(stamp)
     write = writer(topic, shared)
     return lambda stamp, value: bytes(serialize_message(write(stamp, value)))
 
@@ -78,15 +69,18 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
             raise Refused(f"{len(data)} bytes are no {topic.type}; send one of that type") from error
         return read(message)
 
+    frames = (BASE, *shared.arm.covers.names)
     if topic.type == JOINT_STATE:
         wanted = arrays.split()
-        names, count = _strings(_names(topic, shared)), len(_names(topic, shared))
-        needed = [name in wanted for name in State._fields]
+        names = _names(topic, shared)
+        # which arrays are filled, as far as that is allowed
+        filled = product(*((True,) if name in wanted else (True, False) for name in State._fields))
+        states = [(there, _state(names, tuple(len(names) * each for each in there))) for there in filled]
         taken = [name in wanted or name + "?" in wanted for name in State._fields]
-        return lambda data: _read_joint_state(data, names, count, needed, taken) or slowly(data)
-    frames = frozenset((BASE, *shared.arm.covers.names))
+        return lambda data: _read_state(data, states, taken) or slowly(data)
     if topic.type == WRENCH:
-        return lambda data: _read_wrench(data, frames) or slowly(data)
+        wrenches = [(frame, _wrench(frame)) for frame in frames]
+        return lambda data: _read_wrench(data, wrenches) or slowly(data)
     if topic.type == TABLE:
         return lambda data: _read_table(data, topic.columns, frames) or slowly(data)
     return slowly
@@ -96,139 +90,80 @@ def _names(topic: Topic, shared: Shared) -> tuple[str, ...]:
     return shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names
 
 
-# JointState: stamp, empty frame, names, then three arrays, each a count and, aligned to 8, its numbers
+@cache
+def _state(names: tuple[str, ...], counts: tuple[int, ...]) -> Pattern:
+    return Pattern(JOINT_STATE, (_NO_HEADER, names, *((0.0,) * count for count in counts)))
 
 
 @cache
-def _strings(names: tuple[str, ...]) -> bytes:
-    """An empty frame and a sequence of strings as they follow the stamp; padded to 4 bytes."""
-    parts = bytearray(_COUNT.pack(1) + b"\0" + bytes(3) + _COUNT.pack(len(names)))
-    for name in names:
-        text = name.encode() + b"\0"
-        parts += _COUNT.pack(len(text)) + text + bytes(-len(text) % 4)
-    return bytes(parts)
+def _wrench(frame: str) -> Pattern:
+    return Pattern(WRENCH, (((0, 0), frame), ((0.0,) * 3, (0.0,) * 3)))
 
 
 @cache
-def _doubles(count: int) -> struct.Struct:
-    return struct.Struct(f"<{count}d")
+def _point(frame: str) -> Pattern:
+    return Pattern(POINT, (((0, 0), frame), (0.0,) * 3))
 
 
-@cache
-def _joint_state_layout(size: int, counts: tuple[int, ...]) -> struct.Struct:
-    layout, at = f"<4siI{size}s", 8 + size  # `at` counts from behind the encapsulation
-    for count in counts:
-        layout, at = layout + "I", at + 4
-        if count:
-            padding = -at % 8
-            layout, at = f"{layout}{padding}x{count}d", at + padding + 8 * count
-    return struct.Struct(layout)
+@lru_cache(maxsize=256)
+def _table(columns: tuple[str, ...], frame: str, rows: int) -> Pattern:
+    fields = [(name, 8 * i, _FLOAT64, 1) for i, name in enumerate(columns)]
+    step = 8 * len(columns)
+    return Pattern(
+        TABLE, (((0, 0), frame), 1, rows, fields, False, step, step * rows, bytes(step * rows), False), "data"
+    )
 
 
-def _joint_state(names: bytes, stamp: int, value: State) -> bytes:
+def _joint_state(names: tuple[str, ...], stamp: int, value: State) -> bytes:
     position, velocity, effort = value
-    p, v, e = len(position), len(velocity), len(effort)
-    layout = _joint_state_layout(len(names), (p, v, e))
-    return layout.pack(LITTLE_ENDIAN, *divmod(stamp, SECOND), names, p, *position, v, *velocity, e, *effort)
+    counts = len(position), len(velocity), len(effort)
+    return _state(names, counts).pack(stamp, position, velocity, effort)
 
 
-def _read_joint_state(data: bytes, names: bytes, count: int, needed: list[bool], taken: list[bool]) -> State | None:
+def _packed_table(columns: tuple[str, ...], stamp: int, value: Table) -> bytes:
+    rows = value.rows
+    return _table(columns, value.frame, len(rows)).pack(stamp, tuple(chain.from_iterable(rows)))
+
+
+def _found(data: bytes, patterns: list[tuple[Key, Pattern]]) -> tuple[Key, list[tuple[float, ...]]] | None:
+    """The key of the pattern of a message and its numbers, None where it has none; the newest is tried first."""
+    for i, (key, pattern) in enumerate(patterns):
+        numbers = pattern.numbers(data)
+        if numbers is not None:
+            if i:
+                patterns.insert(0, patterns.pop(i))
+            return key, numbers
+    return None
+
+
+def _read_state(data: bytes, patterns: list[tuple[tuple[bool, ...], Pattern]], taken: list[bool]) -> State | None:
     """The value, None where the message has to be looked at more closely."""
-    at = 12 + len(names)
-    if data[:4] != LITTLE_ENDIAN or data[12:at] != names:
+    found = _found(data, patterns)
+    if found is None:
         return None
+    _, numbers = found
     arrays: list[list[float]] = []
     for i in range(3):
-        if len(data) < at + 4:
-            return None
-        (found,) = _COUNT.unpack_from(data, at)
-        at += 4
-        values: list[float] = []
-        if found:
-            at += -(at - 4) % 8
-            if found != count or len(data) < at + 8 * count:
+        values = list(numbers[i])
+        limit = _LARGEST[i]
+        for value in values:
+            if not -limit <= value <= limit:  # NaN, too
                 return None
-            values = list(_doubles(count).unpack_from(data, at))
-            at += 8 * count
-            limit = _LARGEST[i]
-            for value in values:
-                if not -limit <= value <= limit:  # NaN, too
-                    return None
-        elif needed[i]:
-            return None
         arrays.append(values if taken[i] else [])
     return State(*arrays)
 
 
-# WrenchStamped and PointStamped: stamp, frame, then numbers aligned to 8
-
-
-@cache
-def _string(text: str) -> tuple[int, bytes]:
-    data = text.encode() + b"\0"
-    return len(data), data
-
-
-@cache
-def _framed(frame: str, numbers: int) -> struct.Struct:
-    size, _ = _string(frame)
-    return struct.Struct(f"<4siII{size}s{-(12 + size) % 8}x{numbers}d")
-
-
-def _frame(data: bytes, size: int) -> str:
-    """The frame in a header, '' where it does not end as a string does."""
-    text = data[16 : 16 + size]
-    return text[:-1].decode("ascii", "replace") if text[-1:] == b"\0" else ""
-
-
-def _read_wrench(data: bytes, frames: frozenset[str]) -> Wrench | None:
+def _read_wrench(data: bytes, patterns: list[tuple[str, Pattern]]) -> Wrench | None:
     """The value, None where the message has to be looked at more closely."""
-    if len(data) < 16 or data[:4] != LITTLE_ENDIAN:
+    found = _found(data, patterns)
+    if found is None:
         return None
-    (size,) = _COUNT.unpack_from(data, 12)
-    at = 16 + size
-    at += -(at - 4) % 8
-    if len(data) < at + 48:
-        return None
-    frame = _frame(data, size)
-    fx, fy, fz, tx, ty, tz = numbers = struct.unpack_from("<6d", data, at)
-    if frame not in frames:
-        return None
+    frame, (numbers,) = found
     for value, limit in zip(numbers, _LARGEST_WRENCH, strict=True):
         if not -limit <= value <= limit:  # NaN, too
             return None
+    fx, fy, fz, tx, ty, tz = numbers
     return Wrench(frame, (fx, fy, fz), (tx, ty, tz))
-
-
-# PointCloud2 as a table of float64 columns
-
-
-@cache
-def _fields(columns: tuple[str, ...]) -> bytes:
-    """The sequence of fields, as it begins at a multiple of 4."""
-    parts = bytearray(_COUNT.pack(len(columns)))
-    for i, name in enumerate(columns):
-        text = name.encode() + b"\0"
-        parts += _COUNT.pack(len(text)) + text + bytes(-len(text) % 4)
-        parts += struct.pack("<IB3xI", 8 * i, 8, 1)  # offset, FLOAT64, count
-    return bytes(parts)
-
-
-def _table(columns: tuple[str, ...], stamp: int, value: Table) -> bytes:
-    rows, step = len(value.rows), 8 * len(columns)
-    size, frame = _string(value.frame)
-    numbers = [number for row in value.rows for number in row]
-    return b"".join(
-        (
-            HEAD.pack(LITTLE_ENDIAN, *divmod(stamp, SECOND)),
-            _COUNT.pack(size) + frame + bytes(-size % 4),
-            struct.pack("<II", 1, rows),
-            _fields(columns),
-            struct.pack("<B3xIII", 0, step, step * rows, step * rows),
-            struct.pack(f"<{len(numbers)}d", *numbers),
-            b"\0",  # is_dense
-        )
-    )
 
 
 @cache
@@ -240,26 +175,17 @@ def _table_limits(columns: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[in
     )
 
 
-def _read_table(data: bytes, columns: tuple[str, ...], frames: frozenset[str]) -> Table | None:
+def _read_table(data: bytes, columns: tuple[str, ...], frames: tuple[str, ...]) -> Table | None:
     """The value, None where the message has to be looked at more closely."""
-    if len(data) < 16 or data[:4] != LITTLE_ENDIAN:
+    step = 8 * len(columns)
+    for frame in frames:
+        count = (len(data) - _table(columns, frame, 0).size) // step
+        numbers = _table(columns, frame, max(count, 0)).numbers(data)
+        if numbers is not None:
+            break
+    else:
         return None
-    (size,) = _COUNT.unpack_from(data, 12)
-    frame = _frame(data, size)
-    at = 16 + size + -size % 4
-    fields, step = _fields(columns), 8 * len(columns)
-    start = at + 8 + len(fields)
-    if frame not in frames or data[at + 8 : start] != fields or len(data) < start + 16:
-        return None
-    height, width = struct.unpack_from("<II", data, at)
-    big, point_step, row_step, count = struct.unpack_from("<B3xIII", data, start)
-    expected = step * width
-    if (height, big, point_step, row_step, count) != (1, 0, step, expected, expected):
-        return None
-    numbers = data[start + 16 : start + 16 + count]
-    if len(numbers) != count:
-        return None
-    rows = tuple(struct.iter_unpack(f"<{len(columns)}d", numbers))
+    rows = tuple(zip(*[iter(numbers[0])] * len(columns), strict=True))
     largest, known = _table_limits(columns)
     for row in rows:
         for number, limit in zip(row, largest, strict=True):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from wam_bag.bag_writer import BagWriter
-from wam_bag.cdr_encoder import encoded
+from wam_bag.cdr import encoded
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_bag.losses import RECORDING
 from wam_bag.metadata import INFINITE

@@ -30,9 +30,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import wam_bag
 from wam_bag.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
 from wam_bag.bag_writer import BagWriter, RecordingError, exact_cdr, policies
+from wam_bag.cdr import ExactLength, stamp_reader
 from wam_bag.definitions import DefinitionError, definition, schema, type_hash
 from wam_bag.mcap_writer import McapWriter
-from wam_bag.message_layout import ExactLength, stamp_reader
 from wam_bag.metadata import INFINITE
 from wam_description.topics import TOPICS
 

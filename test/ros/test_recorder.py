@@ -35,9 +35,9 @@ from std_msgs.msg import Bool, String
 
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
+from wam_bag.cdr import stamp_reader
 from wam_bag.contents import contents
 from wam_bag.losses import losses
-from wam_bag.message_layout import stamp_reader
 from wam_description.agreement import DIGESTS, digests
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten

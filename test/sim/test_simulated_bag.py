@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 from wam_bag import definitions
 from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_bag.bag_writer import exact_cdr
-from wam_bag.cdr_encoder import encoded
+from wam_bag.cdr import encoded
 from wam_bag.contents import contents
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_control.task.scenario_settings import Setting

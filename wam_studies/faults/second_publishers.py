@@ -12,9 +12,10 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
+from wam_bag.cdr import LITTLE_ENDIAN
 from wam_description.configuration import Configuration
 from wam_ros.topics import NAMESPACE
-from wam_ros.wire import LITTLE_ENDIAN, stamp_of
+from wam_ros.wire import stamp_of
 from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
 from wam_studies.faults.trials import FaultTrial
 from wam_studies.faults.watched_stack import StackSource, WatchedStack
