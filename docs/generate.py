@@ -36,7 +36,7 @@ from wam_description.wiring import Input
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies import design_choices
-from wam_studies.contact_benchmark import resting_push
+from wam_studies.contact import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers
 from wam_studies.figures.catalogue import table as figures_table

@@ -4,8 +4,7 @@ harness             a study is cases of a seed, a run of each, and scores; page 
 thesis              experiments of the thesis: runs as YAML, evaluations as functions, predicted against measured
 tasks               whole-arm tasks: pushing, sweeping, holding, a door, a moving surface
 figures             the thesis's figures that carry data: theory as lines, the plant as circles
-contact_benchmark   scenarios with true contacts, and the metrics of contact estimation
-contact_robustness  contact estimation on arms and signals that differ from what the estimator states
+contact             contact estimation with true contacts, on the arm as stated and on others
 identification      a motion that shows the arm's parameters; identified against true ones
 faults              broken messages, lost nodes, full disks, Ctrl-C, a long run, on watched nodes; docs/reliability.md
 plant               the plant's effects, each measured alone and compared with theory
@@ -13,6 +12,5 @@ force_benchmark     random forces on random surfaces: outcomes, true force again
 stability           the stability guard validated by Monte Carlo simulation; the stability map of figure 5.8
 design_choices      4.4 and 5.7 with numbers: stiffness of the arm, less friction against more stiffness
 experiment_runs     the runs of an experiment over topics, recorded
-contact_scenarios   scenarios of the contact benchmark over topics
 scorecard           the arm of a configuration compared with the requisites of chapter 3
 """

@@ -26,6 +26,7 @@ Record = TypeVar("Record")
 
 # name: where its class is
 STUDIES: Final = {
+    "contact": "wam_studies.contact.study:ContactStudy",
     "force": "wam_studies.force_benchmark.study:ForceStudy",
     "identify": "wam_studies.identification.study:IdentificationStudy",
 }
@@ -88,6 +89,10 @@ class Study(ABC, Generic[Case, Record]):
         """Draw the records into a file; False where the study has no picture."""
         return False
 
+    def failure(self, record: Record) -> str:
+        """Why a case is to be looked at; '' where it is as it should be."""
+        return ""
+
     def details(self, record: Record) -> str:
         """One record in full."""
         return str(record)
@@ -124,6 +129,13 @@ class Measurement(NamedTuple):
     def scores(self) -> Scores:
         """Of all seeds together."""
         return self.study.score(self.total)
+
+    @property
+    def failures(self) -> list[tuple[int, int, str]]:
+        """Seed, number and reason of each case that is to be looked at."""
+        cases = ((seed, number, record) for seed, own in self.records.items() for number, record in enumerate(own))
+        every = ((seed, number, self.study.failure(record)) for seed, number, record in cases)
+        return [one for one in every if one[2]]
 
     @property
     def by_seed(self) -> dict[int, Scores]:

@@ -21,13 +21,13 @@ def report(measured: Measurement, command: str) -> str:
     scores, by_seed = measured.scores, measured.by_seed
     rows = rows_table(scores.rows, {seed: own.rows for seed, own in by_seed.items()}) if scores.rows else ""
     parts = [rows, *(table.text() for table in scores.tables)]
+    failures = measured.failures
     lines = [
-        f"* seed {failed.seed}, case {failed.number}: {failed.reason}\n"
-        f"  `{command} --seeds {failed.seed} --only {failed.number}`"
-        for failed in scores.failures[:LISTED]
+        f"* seed {seed}, case {number}: {reason}\n  `{command} --seeds {seed} --only {number}`"
+        for seed, number, reason in failures[:LISTED]
     ]
-    if len(scores.failures) > LISTED:
-        lines.append(f"* {len(scores.failures) - LISTED} more")
+    if len(failures) > LISTED:
+        lines.append(f"* {len(failures) - LISTED} more")
     if lines:
         parts.append("## Failures\n\n" + "\n".join(lines) + "\n")
     return "\n".join(filter(None, parts))
@@ -68,7 +68,7 @@ def with_section(file: Path, name: str, text: str, title: str = "") -> str:
         for a page without the section.
     """
     begin = f"<!-- written: {name} -->\n"
-    page = file.read_text(encoding="utf-8") if file.exists() else f"# {title}\n\n{begin}{END}\n"
+    page = file.read_text(encoding="utf-8") if file.exists() else f"# {title[:1].upper()}{title[1:]}\n\n{begin}{END}\n"
     pattern = re.compile(re.escape(begin) + ".*?" + re.escape(END), re.DOTALL)
     if not pattern.search(page):
         raise ValueError(f"{file} has no line '{begin.strip()}'; remove the file, or write into another one")

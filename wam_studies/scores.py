@@ -170,14 +170,6 @@ class ScoreTable(NamedTuple):
         return "\n\n".join(filter(None, parts))
 
 
-class FailedCase(NamedTuple):
-    """A case that failed: its seed and number, which repeat it, and why."""
-
-    seed: int
-    number: int
-    reason: str
-
-
 class Scores(NamedTuple):
     """What follows from the records of a study.
 
@@ -185,12 +177,10 @@ class Scores(NamedTuple):
     ----------
     rows : what is required, and other quantities.
     tables : further tables.
-    failures : cases to be looked at, named with the command that repeats each.
     """
 
     rows: Sequence[Row]
     tables: Sequence[ScoreTable] = ()
-    failures: Sequence[FailedCase] = ()
 
     @property
     def missed(self) -> list[str]:

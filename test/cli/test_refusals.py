@@ -29,7 +29,7 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
         ("evaluate contact --contacts 0", "wam evaluate: --contacts is 0; it must be at least 1"),
         ("evaluate contact --jobs 0", "wam evaluate: --jobs is 0; it must be at least 1"),
         ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
-        ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
+        ("evaluate contact --seeds 1 -1", "wam evaluate: --seeds is -1; it must be at least 0"),
         ("evaluate figures --jobs 0", "wam evaluate: --jobs is 0; it must be at least 1"),
         ("evaluate force --jobs 99999", "wam evaluate: --jobs is 99999; it must be at most 1024"),
         (

@@ -28,7 +28,7 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 from wam_sim.simulated_bag import record
 from wam_sim.simulation import Simulation
-from wam_studies.contact_benchmark.scenarios import base_values
+from wam_studies.contact.scenarios import base_values
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[2] / "config" / "wam.yaml")
 ARM, TIMING = CONFIGURATION.shared.arm, CONFIGURATION.shared.timing

@@ -17,7 +17,7 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_sim.simulation import Simulation
-from wam_studies.contact_benchmark.scenarios import ScenarioGenerator
+from wam_studies.contact.scenarios import ScenarioGenerator
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[2] / "config" / "wam.yaml")
 ARM = CONFIGURATION.shared.arm

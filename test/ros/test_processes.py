@@ -529,12 +529,12 @@ def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys:
 
 @pytest.mark.slow
 def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> None:
-    begin = [sys.executable, "-m", "wam_cli.main", "evaluate", "contact", "--seed", "1"]
+    begin = [sys.executable, "-m", "wam_cli.main", "evaluate", "contact", "--seeds", "1"]
     begin += ["--results", str(tmp_path / "kept.jsonl")]
     with subprocess.Popen(begin, stderr=subprocess.PIPE, text=True, start_new_session=True) as battery:
         assert battery.stderr is not None
         assert battery.stderr.readline().startswith("evaluate: 0 of ")
-        wait(lambda: (tmp_path / "kept").exists() and any((tmp_path / "kept").iterdir()), "a first scene")
+        wait((tmp_path / "kept.jsonl").exists, "a first scene")
         battery.terminate()
         assert battery.wait(LONG) == 128 + signal.SIGTERM
         assert "leaked" not in battery.stderr.read()

@@ -30,7 +30,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_description.urdf import urdf
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.limit_watch import LimitWatch
-from wam_studies.contact_benchmark.scenarios import ScenarioGenerator
+from wam_studies.contact.scenarios import ScenarioGenerator
 
 # alpha / pi, a, d: joint i turns about z of frame i-1, then d along it, a along x, alpha about x
 SHOULDER = [(-0.5, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.045, 0.55), (0.5, -0.045, 0.0)]

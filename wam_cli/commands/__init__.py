@@ -313,29 +313,6 @@ def topic_map_of(given: argparse.Namespace) -> TopicMap:
     return topic_map(given.only_topic, given.only_joint, given.only_command, given.only_map, given.only_unit)
 
 
-def take_evaluation(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str, page: str) -> None:
-    """Let a command take several seeds of what is drawn, a page, a configuration and a batch.
-
-    `evaluation_of` is the configuration, and checks the first two.
-    """
-    words = f"seeds of {of}, default {' '.join(str(seed) for seed in seeds)}"  # `map` is a command here
-    parser.add_argument("--seed", type=int, nargs="+", default=list(seeds), help=words)
-    parser.add_argument("--write", type=Path, help=f"page to write, for example {page}")
-    take_configuration(parser)
-    take_batch(parser, "evaluate")
-
-
-def evaluation_of(given: argparse.Namespace) -> Configuration:
-    """The configuration that --config names; refuses a seed that is negative and a page that could not be written."""
-    for seed in given.seed:
-        at_least("--seed", seed, 0)
-    if given.write:
-        writable_file("--write", given.write, PAGE)
-        refuse_source(given, "--write", given.write)
-    require_effect("--set", option_values(given.values))
-    return configuration_of(given)
-
-
 def require_effect(option: str, names: Iterable[str]) -> None:
     """Refuse parameters that do nothing in runs without ROS.
 

@@ -15,7 +15,7 @@ from wam_bag.losses import losses
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
-from wam_studies.contact_benchmark.moves import MoveGenerator
+from wam_studies.contact.moves import MoveGenerator
 
 STEP: Final = 2.0  # s of a move
 POSTURES: Final = 4  # that are gone to, one after the other

@@ -24,7 +24,7 @@ from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd
 from wam_studies.force_benchmark.tasks import RANGES, draw, task_values
 from wam_studies.force_benchmark.trial import ForceTaskCase, ForceTrial, play
 from wam_studies.harness import Study, option
-from wam_studies.scores import NONE_AT_ALL, FailedCase, Row, Scores, ScoreTable, exact, share
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, share
 
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
 NUMBER = re.compile(r"(?:(?<!\+)[-+])?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -57,8 +57,14 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     def score(self, records: Sequence[ForceTrial]) -> Scores:
         """Shares of accepted tasks, what must not happen, outcomes by class, reasons."""
         rows = [*_accepted(records), *_forbidden(records), *_further(records)]
-        failures = [FailedCase(trial.seed, trial.number, _failure(trial)) for trial in records if _kinds(trial)]
-        return Scores(rows, [_outcomes(records), _reasons(records)], failures)
+        return Scores(rows, [_outcomes(records), _reasons(records)])
+
+    def failure(self, record: ForceTrial) -> str:
+        """A wrong force without a reason, a force above the limit, an unreported cycle."""
+        task = record.task
+        what = FEEDBACK.of(task), POSE.of(task), contact_of(task), POSITION.of(task)
+        kinds = " and ".join(_kinds(record))
+        return f"{kinds}: {', '.join(what)}, {_numbers(record)}" if kinds else ""
 
     def picture(self, records: Sequence[ForceTrial], file: Path) -> bool:
         """True against commanded force, outcomes by class, peaks."""
@@ -161,11 +167,6 @@ def _kinds(trial: ForceTrial) -> list[str]:
         ("unreported cycle", result.cycles_silently),
     )
     return [text for text, holds in kinds if holds]
-
-
-def _failure(trial: ForceTrial) -> str:
-    what = [grouping.of(trial.task) for grouping in (FEEDBACK, POSE, GROUPINGS[4], POSITION)]
-    return f"{' and '.join(_kinds(trial))}: {', '.join(what)}, {_numbers(trial)}"
 
 
 def _numbers(trial: ForceTrial) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wam_studies.harness import Study, option
 from wam_studies.identification.plants import KINDS
 from wam_studies.identification.trial import IdentificationResult, IdentificationTrial, run_trial
-from wam_studies.scores import FailedCase, Row, Scores, ScoreTable, exact
+from wam_studies.scores import Row, Scores, ScoreTable, exact
 
 Array = NDArray[np.float64]
 
@@ -45,8 +45,11 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
 
     def score(self, records: Sequence[IdentificationResult]) -> Scores:
         """Largest errors, errors by stated ones of each kind, and all of them as a table."""
-        failures = [FailedCase(r.seed, KINDS.index(r.kind), r.failure) for r in records if r.failure]
-        return Scores(list(_rows(records)), [_errors(records)], failures)
+        return Scores(list(_rows(records)), [_errors(records)])
+
+    def failure(self, record: IdentificationResult) -> str:
+        """Why the motion ended early."""
+        return record.failure
 
 
 def _rows(records: Sequence[IdentificationResult]) -> Iterator[Row]:

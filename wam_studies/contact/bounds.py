@@ -5,6 +5,7 @@ inferred with a covariance that is just that of the errors.  Friction of the con
 cannot distinguish it from position and force.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,15 +16,24 @@ from wam_control.contact.contact_inference import ContactInference
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
-from wam_studies.contact_benchmark.moves import MoveGenerator
-from wam_studies.contact_robustness.touches import LEVEL_KINDS, LEVELS, axis_of, touches
+from wam_studies.contact.moves import MoveGenerator
+from wam_studies.contact.rows import STATED
+from wam_studies.contact.touches import LEVEL_KINDS, TOUCHES, axis_of, touches
 from wam_studies.scores import quantile
 
 Array = NDArray[np.float64]
-COUNT = 1200  # contacts
-EXACT = 2e-3  # N m, sd that stands for none
-CONSTANT = 0.02  # largest error of a torque constant, as in the realistic mix
-SMALL_SD, NEAR = 0.02, 0.2  # m; of a force
+
+
+@dataclass(frozen=True)
+class BoundErrors:
+    """What the inference alone is given."""
+
+    count: int = 1200  # contacts
+    exact: float = 2e-3  # N m, sd that stands for none
+    constant: float = 0.02  # largest error of a torque constant, as in the realistic mix
+
+
+ERRORS = BoundErrors()
 BOUNDS = (
     "errors of the torques", "median 5/10/20 N, cm", "95 %", "sd < 2 cm, %", "90 % set contains the truth, %",
     "inner link, 10 N, %",
@@ -45,9 +55,9 @@ class BoundRow(NamedTuple):
         random, moves = np.random.default_rng((seed, 4)), MoveGenerator(arm)
         matrix = np.array(TransmissionMap.of(arm).joint_from_motor)
         to_joints = np.linalg.inv(matrix).T
-        errors: dict[float, list[float]] = {force: [] for force in LEVELS}
+        errors: dict[float, list[float]] = {force: [] for force in TOUCHES.levels}
         small, held, count, detected = 0, 0, 0, []
-        for touch in touches(arm, random, [float(i) for i in range(COUNT)], LEVEL_KINDS):
+        for touch in touches(arm, random, [float(i) for i in range(ERRORS.count)], LEVEL_KINDS):
             q, wrong = np.array(moves.pose(random)), self.constant * random.uniform(-1.0, 1.0, len(matrix))
             wrench = np.concatenate(touch.wrench(touch.begin + 0.1, axis_of(arm, touch.cover, touch.position)))
             true = wrench @ body.cover_jacobian(q, touch.cover)
@@ -56,20 +66,20 @@ class BoundRow(NamedTuple):
             scaled = to_joints * (self.constant / np.sqrt(3.0) * at_motors)
             precision = np.linalg.inv(np.diag(self.sd**2) + scaled @ scaled.T)
             force = float(np.linalg.norm(touch.force))
-            level = next((level for level in LEVELS if abs(force - level) <= NEAR * level), None)
+            level = next((level for level in TOUCHES.levels if abs(force - level) <= STATED.near * level), None)
             if touch.kind == "inner":
-                if level == LEVELS[1]:
+                if level == TOUCHES.levels[1]:
                     detected.append(float(torques @ (torques / self.sd**2)) > own.detect)
                 continue
             found = inference.infer(q.tolist(), torques.tolist(), precision)
             best, right = found[0], [each for each in found if each.cover == touch.cover]
             known = best.cover == touch.cover and not np.isnan(best.position)
-            count, small = count + 1, small + (known and best.position_sd < SMALL_SD)
+            count, small = count + 1, small + (known and best.position_sd < STATED.small_sd)
             held += any(each.low <= touch.position <= each.high for each in right)
             if level is not None:
                 errors[level].append(abs(best.position - touch.position) if known else np.inf)
         middle, most = (
-            " / ".join(f"{100.0 * quantile(errors[force], part).value:.1f}" for force in LEVELS) for part in (0.5, 0.95)
+            " / ".join(f"{100.0 * quantile(own, part).value:.1f}" for own in errors.values()) for part in (0.5, 0.95)
         )
         shares = [f"{100.0 * part / whole:.0f}" for part, whole in ((small, count), (held, count))]
         return [self.name, middle, most, *shares, f"{100.0 * np.mean(detected):.0f}"]
@@ -77,12 +87,14 @@ class BoundRow(NamedTuple):
 
 def bounds(configuration: Configuration, seed: int, errors: Array) -> list[list[str]]:
     """Rows of `BOUNDS` as text; `errors` as `ReplayScore.torque_errors`."""
-    exact = np.full(errors.shape[1], EXACT)
+    exact = np.full(errors.shape[1], ERRORS.exact)
+    sliding, every = errors
+    constant = ERRORS.constant
     rows = [
         BoundRow("none", exact, 0.0),
-        BoundRow("torque constants within 2 %", exact, CONSTANT),
-        BoundRow("and those in free motion, all motors sliding, mean of four moments", errors[0] / 2.0, CONSTANT),
-        BoundRow("the same, of one moment", errors[0], CONSTANT),
-        BoundRow("the same, some motors at rest", errors[1], CONSTANT),
+        BoundRow("torque constants within 2 %", exact, constant),
+        BoundRow("and those in free motion, all motors sliding, mean of four moments", sliding / 2.0, constant),
+        BoundRow("the same, of one moment", sliding, constant),
+        BoundRow("the same, some motors at rest", every, constant),
     ]
     return [row.cells(configuration, seed) for row in rows]

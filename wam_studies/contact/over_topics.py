@@ -1,18 +1,22 @@
-"""Scenarios over topics: the script for the scenario node, and the records from the bag."""
+"""Scenarios on the nodes in this process, in lockstep: their script, and the records from the bag."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import yaml
 
 from wam_bag.bag import JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_control.contact.contact_table import hypotheses_of
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
+from wam_description.configuration import Configuration
 from wam_description.signals import Load
+from wam_ros.bring_up import Composition
 from wam_sim.replay import tables
-from wam_studies.contact_benchmark.scenarios import BenchmarkScenario
-from wam_studies.contact_benchmark.simulation import LoadTorques, Played, Record, hypothesis
+from wam_studies.contact.scenarios import BenchmarkScenario
+from wam_studies.contact.simulation import LoadTorques, Played, Record, hypothesis
 
 TOPICS = (
     "sim/joint_states",
@@ -23,6 +27,27 @@ TOPICS = (
     "external_joint_torques_sd",
     "contact/hypotheses",
 )
+
+
+def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, domain_id: int | None = None) -> Played:
+    """Play one scenario in a ROS domain, the one of the environment where None."""
+    shared = configuration.shared
+    with TemporaryDirectory(prefix="wam_benchmark_") as folder:
+        steps = Path(folder) / "scenario.yaml"
+        steps.write_text(yaml.safe_dump(script(scenario)), encoding="utf-8")
+        own = {
+            "nodes": [*shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
+            "timing.timeout": 60.0,
+            "timing.display_divisor": 1,
+            "scenario:script": str(steps),
+            "recorder:directory": folder,
+            "recorder:name": "scenario",
+        }
+        with Composition(configuration.with_values({**scenario.values, **own}), domain_id=domain_id) as composition:
+            failure = composition.play().failure
+        return recorded(scenario, Path(folder) / "scenario", shared.arm, failure)
 
 
 def script(scenario: BenchmarkScenario) -> dict[str, Any]:

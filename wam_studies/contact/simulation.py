@@ -16,7 +16,7 @@ from wam_description.signals import Load
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
-from wam_studies.contact_benchmark.scenarios import BenchmarkScenario
+from wam_studies.contact.scenarios import BenchmarkScenario
 
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -12,21 +13,32 @@ from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
 from wam_description.units import STANDARD_GRAVITY
-from wam_studies.contact_benchmark.contacts import EDGE, MOVING
-from wam_studies.contact_benchmark.scenarios import base_values
-from wam_studies.contact_robustness.recording import DriveRecording
-from wam_studies.contact_robustness.touches import Touch
+from wam_studies.contact.contacts import EVALUATION
+from wam_studies.contact.recording import DriveRecording
+from wam_studies.contact.scenarios import base_values
+from wam_studies.contact.touches import Touch
 
-SETTLED, LATE = 0.2, 0.45  # s after the start of a contact
-SECOND_WITHIN = 0.25  # s
-HIT = 0.1  # s after the start of a contact in which a change is its own
-START_AFTER = 0.1  # s, of an estimator that starts in contact
-START_WITHIN = 0.3  # s
-SLIDING = 0.3  # rad/s, slowest motor
 PAYLOAD = "payload"  # how hypotheses, reasons and warnings name a mass at the tool
-SURE = 0.95  # probability of a link
-OUTSIDE = 0.1  # largest probability of what a 90 % set may lack
-SETTING_DOWN = 0.5  # s after a mass is set down, in which the model is still that with it
+
+
+@dataclass(frozen=True)
+class ReplayLimits:
+    """When an estimate of a recording is evaluated, and what counts."""
+
+    late: float = 0.45  # s after the start of a contact, until which it is detected
+    second_within: float = 0.25  # s
+    hit: float = 0.1  # s after the start of a contact in which a change is its own
+    start_after: float = 0.1  # s, of an estimator that starts in contact
+    start_within: float = 0.3  # s
+    start_force: float = 9.0  # N
+    sliding: float = 0.3  # rad/s, slowest motor
+    sure: float = 0.95  # probability of a link
+    outside: float = 0.1  # largest probability of what a 90 % set may lack
+    setting_down: float = 0.5  # s after a mass is set down, in which the model is still that with it
+    observer: float = 1.0  # s at the start, whose torques are the observer's own transient
+
+
+REPLAY = ReplayLimits()
 
 
 class TouchOutcome(NamedTuple):
@@ -63,7 +75,7 @@ class TouchOutcome(NamedTuple):
 
 
 class SecondOutcome(NamedTuple):
-    """A second contact: kind of both, and s until it is reported, inf if it is not within `SECOND_WITHIN`."""
+    """A second contact: kind of both, and s until it is reported, inf if it is not within `REPLAY.second_within`."""
 
     kind: str
     latency: float
@@ -77,7 +89,7 @@ class MassOutcome(NamedTuple):
     mass : kg.
     detected : whether there was any report, of a contact or of a payload.
     named : whether it was reported as a payload: the most probable hypothesis, its reason, or the warning.
-    wrong : whether a link was ever reported with more than `SURE` that the tool is not on.
+    wrong : whether a link was ever reported with more than `REPLAY.sure` that the tool is not on.
     lasting : whether it is reported as a contact of a link at the end.
     """
 
@@ -172,14 +184,16 @@ def replay(configuration: Configuration, name: str, recording: DriveRecording, s
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
     estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
     rows: list[_Row] = []
-    singles = [t for t in recording.touches if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= 9.0]
+    singles = [
+        t for t in recording.touches if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= REPLAY.start_force
+    ]
     trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
     started: dict[int, tuple[bool, bool]] = {}
     for i, state, dt in SignalFaults(recording, period, seed):
         time = i * period
         estimator.observe(state, None, dt)
         for number, touch in enumerate(singles):
-            if touch.begin + START_AFTER <= time < touch.begin + START_AFTER + START_WITHIN:
+            if touch.begin + REPLAY.start_after <= time < touch.begin + REPLAY.start_after + REPLAY.start_within:
                 if number not in trials:
                     cold = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
                     trials[number] = estimator.restarted_copy(), cold
@@ -212,28 +226,28 @@ def _scored(
     touches = [touch for touch in recording.touches if touch.end < ended]
     busy = np.zeros(len(rows), bool)
     for touch in touches:
-        busy |= _during(rows, touch.begin, touch.end + (SETTING_DOWN if touch.mass else EDGE))
-    moving = np.array([recording.speed[row.sample] > MOVING for row in rows])
+        busy |= _during(rows, touch.begin, touch.end + (REPLAY.setting_down if touch.mass else EVALUATION.edge))
+    moving = np.array([recording.speed[row.sample] > EVALUATION.moving for row in rows])
     alarm = np.array([row.estimate.in_contact for row in rows])
     # a detection that continues from a true contact ends late, and is no new alarm
     alarms = np.flatnonzero(alarm[1:] & ~alarm[:-1] & ~busy[1:]) + 1
-    free = ~busy & moving & (np.array([row.time for row in rows]) > 1.0)
+    free = ~busy & moving & (np.array([row.time for row in rows]) > REPLAY.observer)
     found = np.array([row.estimate.external_torques for row in rows])
     z = (found / np.array([row.estimate.torque_sd for row in rows]))[free]
     slowest = np.abs(recording.thetad[[row.sample for row in rows]]).min(axis=1)
-    sliding = free & (slowest > SLIDING)
+    sliding = free & (slowest > REPLAY.sliding)
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
     reported = np.array([row.estimate.contacts > 1 for row in rows])
     reported[1:] &= ~reported[:-1]
     steady, changes, second = 0.0, 0, []
     for i, touch in enumerate(touches):
         if touch.kind == "second":
-            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN) & reported
+            within = _during(rows, touch.begin, touch.begin + REPLAY.second_within) & reported
             latency = rows[int(within.argmax())].time - touch.begin if within.any() else math.inf
             second.append(SecondOutcome(touches[i - 1].kind, latency))
             continue
         followed = i + 1 < len(touches) and touches[i + 1].kind == "second"
-        during = _during(rows, touch.begin + HIT, touches[i + 1].begin if followed else touch.end)
+        during = _during(rows, touch.begin + REPLAY.hit, touches[i + 1].begin if followed else touch.end)
         steady += step * int(during.sum())
         changes += int(reported[during].sum())
     return ReplayScore(
@@ -280,7 +294,7 @@ def _mass_outcome(touch: Touch, rows: Sequence[_Row]) -> MassOutcome:
         detected=any(linked) or any(named),
         named=any(named),
         wrong=any(
-            has_link and one.probability > SURE and one.link != touch.cover
+            has_link and one.probability > REPLAY.sure and one.link != touch.cover
             for one, has_link in zip(during, linked, strict=True)
         ),
         lasting=linked[-1] and not named[-1],
@@ -296,8 +310,10 @@ def _outcome(
     touch: Touch, rows: Sequence[_Row], moving: np.ndarray, slowest: np.ndarray, lengths: dict[str, float]
 ) -> TouchOutcome:
     first = next(i for i, row in enumerate(rows) if row.time >= touch.begin)
-    due = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + SETTLED, touch.end)), len(rows) - 1)
-    late = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + LATE, touch.end)), len(rows) - 1)
+    due, late = (
+        next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + wait, touch.end)), len(rows) - 1)
+        for wait in (EVALUATION.settled, REPLAY.late)
+    )
     now = rows[due].estimate
     best = now.hypotheses[0] if now.hypotheses else None
     carries = payload_probability(now) if touch.mass else 0.0
@@ -321,7 +337,8 @@ def _outcome(
         right_link=right,
         error=_error(now, touch.cover, true),
         position_sd=now.position_sd if right else math.nan,
-        in_set=carries > OUTSIDE or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
+        in_set=carries > REPLAY.outside
+        or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
         set_length=sum(sizes),
         reason=now.reason,
     )

@@ -2,20 +2,30 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
-from wam_studies.contact_benchmark.moves import Move
+from wam_studies.contact.moves import Move
 
-DEPTH = (0.02, 0.04)  # m, of the foam at the end of the unimpeded move
-RADIUS, HALF_LENGTH = 0.06, 0.10  # m, of the post, which is normal to the link
-DAMPING = 5.0  # N s/m
-CLEARANCE = 0.02  # m between the post and everything else
-LATE = 0.6  # of the path; the motion after it gives the direction of the collision
-SAMPLES = 12  # along the path, and along each link
+
+@dataclass(frozen=True)
+class FoamShape:
+    """The post, and what is kept clear of it."""
+
+    depth: tuple[float, float] = (0.02, 0.04)  # m, of the foam at the end of the unimpeded move
+    radius: float = 0.06  # m, of the post, which is normal to the link
+    half_length: float = 0.10  # m
+    damping: float = 5.0  # N s/m
+    clearance: float = 0.02  # m between the post and everything else
+    late: float = 0.6  # of the path; the motion after it gives the direction of the collision
+    samples: int = 12  # along the path, and along each link
+
+
+SHAPE = FoamShape()
 
 
 class Foam(NamedTuple):
@@ -44,15 +54,15 @@ class FoamCollision:
         """A post that meets the link at a position, m; None if it would meet anything else."""
         name = self._arm.covers.names[cover]
         axis = self._body.cover_pose(self._end, name).rotation[:, 0]
-        last, late = (self._body.point(self._pose(s), name, (position, 0.0, 0.0)) for s in (1.0, LATE))
+        last, late = (self._body.point(self._pose(s), name, (position, 0.0, 0.0)) for s in (1.0, SHAPE.late))
         way = last - late
         way -= axis * (axis @ way)
         length = float(np.linalg.norm(way))
         if length < 1e-3:
             return None
         way /= length
-        depth = float(random.uniform(*DEPTH))
-        centre = last + way * (self._arm.covers.radius[cover] - depth + RADIUS)
+        depth = float(random.uniform(*SHAPE.depth))
+        centre = last + way * (self._arm.covers.radius[cover] - depth + SHAPE.radius)
         rotation = np.column_stack((axis, -way, np.cross(way, axis)))
         if not self._meets_only(cover, centre, rotation, depth):
             return None
@@ -63,14 +73,14 @@ class FoamCollision:
 
     def _meets_only(self, cover: int, centre: np.ndarray, rotation: np.ndarray, depth: float) -> bool:
         covers = self._arm.covers
-        for s in np.linspace(0.0, 1.0, SAMPLES):
+        for s in np.linspace(0.0, 1.0, SHAPE.samples):
             for i, name in enumerate(covers.names):
                 pose = self._body.cover_pose(self._pose(s), name)
-                along = np.linspace(0.0, covers.length[i], SAMPLES)[:, None] * pose.rotation[:, 0] + pose.position
+                along = np.linspace(0.0, covers.length[i], SHAPE.samples)[:, None] * pose.rotation[:, 0] + pose.position
                 seen = (along - centre) @ rotation
-                outside = np.hypot(seen[:, 0], seen[:, 1]) - RADIUS
-                gap = float(np.maximum(outside, np.abs(seen[:, 2]) - HALF_LENGTH).min()) - covers.radius[i]
-                if gap < (CLEARANCE if i != cover or s < 0.5 else -1.2 * depth):
+                outside = np.hypot(seen[:, 0], seen[:, 1]) - SHAPE.radius
+                gap = float(np.maximum(outside, np.abs(seen[:, 2]) - SHAPE.half_length).min()) - covers.radius[i]
+                if gap < (SHAPE.clearance if i != cover or s < 0.5 else -1.2 * depth):
                     return False
         return True
 
@@ -82,9 +92,9 @@ def foam_values(foam: Foam, force: float, friction: float) -> dict[str, Any]:
         "driver:world.obstacles.shapes": ["cylinder"],
         "driver:world.obstacles.positions": list(foam.position),
         "driver:world.obstacles.rotations": list(foam.rotation),
-        "driver:world.obstacles.sizes": [RADIUS, HALF_LENGTH, 0.0],
+        "driver:world.obstacles.sizes": [SHAPE.radius, SHAPE.half_length, 0.0],
         "driver:world.obstacles.stiffness": [force / foam.depth],
-        "driver:world.obstacles.damping": [DAMPING],
+        "driver:world.obstacles.damping": [SHAPE.damping],
         "driver:world.obstacles.hardening": [0.0],
         "driver:world.obstacles.friction": [friction],
     }

@@ -2,18 +2,40 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_description.arm import Arm
 
-LEVELS = (5.0, 10.0, 20.0)  # N, half of the contacts of most recordings
-WEAKEST, STRONGEST = 1.0, 60.0  # N, the others, uniform in the logarithm
-ROUGHEST = 0.8  # coefficient of friction
-RISE = 0.005  # s
-MARGIN, NEAR_ELBOW = 0.02, 0.01  # m
-SLIDE = 0.2  # m/s
+
+@dataclass(frozen=True)
+class TouchRanges:
+    """What is drawn of contacts and masses; forces, masses uniform in the logarithm."""
+
+    levels: tuple[float, ...] = (5.0, 10.0, 20.0)  # N, half of the contacts of most recordings
+    weakest: float = 1.0  # N, the others
+    strongest: float = 60.0  # N
+    roughest: float = 0.8  # coefficient of friction
+    rise: float = 0.005  # s
+    margin: float = 0.02  # m, from the ends of a cover
+    near_elbow: float = 0.01  # m
+    slide: float = 0.2  # m/s
+    lightest: float = 0.1  # kg
+    heaviest: float = 1.0  # kg
+    hold_of_mass: float = 3.0  # s
+    hold: float = 0.5  # s
+    hold_of_first: float = 1.0  # s
+    impact: float = 0.03  # s
+    harder: tuple[float, float] = (1.5, 3.0)  # times the force
+    harder_after: float = 0.4  # s after the start
+    harder_within: tuple[float, float] = (0.05, 0.4)  # s
+    second_after: float = 0.5  # s, of the second contact after the first
+    second_hold: float = 0.4  # s
+
+
+TOUCHES = TouchRanges()
 # how often each kind is drawn
 KINDS = {
     "outer": 0.38,
@@ -41,15 +63,10 @@ SECOND_KINDS = {
     "second on the same link": 0.2,
     "second on the other link": 0.2,
 }
-# how often in the recordings of an arm that was identified, whose forces are all of `LEVELS`
+# how often in the recordings of an arm that was identified, whose forces are all of the levels
 LEVEL_KINDS = {"outer": 0.75, "inner": 0.25}
 PICKING_UP = "picking up"
 MASS_KINDS = {PICKING_UP: 1.0}  # in the recordings in which the tool picks up a mass, carries it and sets it down
-LIGHTEST, HEAVIEST = 0.1, 1.0  # kg, uniform in the logarithm
-HOLD_OF_MASS = 3.0  # s
-HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
-HARDER, HARDER_AFTER, HARDER_WITHIN = (1.5, 3.0), 0.4, (0.05, 0.4)  # times the force, s after the start, s
-SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
 
 
 class Touch(NamedTuple):
@@ -66,7 +83,7 @@ class Touch(NamedTuple):
     speed : m/s, of the position.
     begin, end : s.
     friction : coefficient; tangential over normal force.
-    harder, within : factor by which the force grows, `HARDER_AFTER` the start, and s that this takes.
+    harder, within : factor by which the force grows, `TOUCHES.harder_after` the start, and s that this takes.
     mass : kg, picked up by the tool; its force is 0.
     """
 
@@ -86,8 +103,8 @@ class Touch(NamedTuple):
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
-        rise = min(RISE, 0.5 * (self.end - self.begin))
-        grown = min(max((time - self.begin - HARDER_AFTER) / self.within, 0.0), 1.0)
+        rise = min(TOUCHES.rise, 0.5 * (self.end - self.begin))
+        grown = min(max((time - self.begin - TOUCHES.harder_after) / self.within, 0.0), 1.0)
         share = max(0.0, min(1.0, (time - self.begin) / rise, (self.end - time) / rise))
         return share * (1.0 + (self.harder - 1.0) * grown)
 
@@ -119,7 +136,7 @@ def touches(
         kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
         drawn = _drawn(arm, random, kind, begin, 1.0 if kinds is LEVEL_KINDS else 0.5)
         lasting = kinds is SECOND_KINDS and len(drawn) == 1
-        found += [drawn[0]._replace(end=begin + HOLD_OF_FIRST)] if lasting else drawn
+        found += [drawn[0]._replace(end=begin + TOUCHES.hold_of_first)] if lasting else drawn
     return found
 
 
@@ -134,15 +151,22 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
     inner, outer = _neighbours(arm, random)
     size = _size(random, of_levels)
     if kind == PICKING_UP:
-        mass = float(np.exp(random.uniform(math.log(LIGHTEST), math.log(HEAVIEST))))
-        none, end = (0.0, 0.0, 0.0), begin + HOLD_OF_MASS
+        mass = float(np.exp(random.uniform(math.log(TOUCHES.lightest), math.log(TOUCHES.heaviest))))
+        none, end = (0.0, 0.0, 0.0), begin + TOUCHES.hold_of_mass
         return [Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)]
     if kind.startswith("second"):
         first_cover = str(random.choice((inner, outer)))
         same = kind.endswith("same link")
         second_cover = first_cover if same else outer if first_cover == inner else inner
-        first = _side(arm, random, first_cover, max(size, 4.0), begin, HOLD_OF_FIRST)._replace(kind=kind)
-        second = _side(arm, random, second_cover, max(_size(random, of_levels), 4.0), begin + SECOND_AFTER, SECOND_HOLD)
+        first = _side(arm, random, first_cover, max(size, 4.0), begin, TOUCHES.hold_of_first)._replace(kind=kind)
+        second = _side(
+            arm,
+            random,
+            second_cover,
+            max(_size(random, of_levels), 4.0),
+            begin + TOUCHES.second_after,
+            TOUCHES.second_hold,
+        )
         return [first, second._replace(kind="second")]
     if kind in ("tip along the tube", "end cap, oblique"):
         lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
@@ -153,29 +177,29 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
             size * math.sin(lean) * math.cos(angle),
             size * math.sin(lean) * math.sin(angle),
         )
-        return [Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + HOLD, 0.0)]
+        return [Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + TOUCHES.hold, 0.0)]
     if kind == "elbow":
         cover = str(random.choice((inner, outer)))
-        touch = _side(arm, random, cover, size, begin, HOLD)
-        place = float(random.uniform(0.0, NEAR_ELBOW))
+        touch = _side(arm, random, cover, size, begin, TOUCHES.hold)
+        place = float(random.uniform(0.0, TOUCHES.near_elbow))
         return [touch._replace(kind=kind, position=place if cover == outer else _length(arm, inner) - place)]
     if kind == "drag along the tube":
-        touch = _side(arm, random, outer, size, begin, HOLD)
+        touch = _side(arm, random, outer, size, begin, TOUCHES.hold)
         along = float(random.choice((-1.0, 1.0))) * size
         return [touch._replace(kind=kind, force=(along, 0.0, 0.0), friction=math.inf)]
-    touch = _side(arm, random, inner if kind == "inner" else outer, size, begin, HOLD)
+    touch = _side(arm, random, inner if kind == "inner" else outer, size, begin, TOUCHES.hold)
     if kind == "twist":
         touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
     if kind == "sliding":
         middle = 0.5 * _length(arm, outer)
-        touch = touch._replace(speed=SLIDE if touch.position < middle else -SLIDE)
+        touch = touch._replace(speed=TOUCHES.slide if touch.position < middle else -TOUCHES.slide)
     if kind == "harder":
-        low, high = HARDER_WITHIN
-        factor, within = float(random.uniform(*HARDER)), float(random.uniform(low, high))
+        low, high = TOUCHES.harder_within
+        factor, within = float(random.uniform(*TOUCHES.harder)), float(random.uniform(low, high))
         x, y, z = touch.force
         touch = touch._replace(force=(x / factor, y / factor, z / factor), harder=factor, within=within)
     if kind == "impact":
-        touch = touch._replace(end=begin + IMPACT)
+        touch = touch._replace(end=begin + TOUCHES.impact)
     return [touch._replace(kind=kind)]
 
 
@@ -185,15 +209,15 @@ def _length(arm: Arm, cover: str) -> float:
 
 def _size(random: np.random.Generator, of_levels: float) -> float:
     if random.random() < of_levels:
-        return float(random.choice(LEVELS)) * float(random.uniform(0.95, 1.05))
-    return float(np.exp(random.uniform(math.log(WEAKEST), math.log(STRONGEST))))
+        return float(random.choice(TOUCHES.levels)) * float(random.uniform(0.95, 1.05))
+    return float(np.exp(random.uniform(math.log(TOUCHES.weakest), math.log(TOUCHES.strongest))))
 
 
 def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin: float, hold: float) -> Touch:
     """A normal force with friction in any direction, at the surface of the tube."""
     i = arm.covers.names.index(cover)
     angle, way = random.uniform(-math.pi, math.pi, 2)
-    friction = ROUGHEST if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+    friction = TOUCHES.roughest if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
     normal = np.array([0.0, math.cos(angle), math.sin(angle)])
     around = np.array([0.0, -math.sin(angle), math.cos(angle)])
     tangent = math.cos(way) * np.array([1.0, 0.0, 0.0]) + math.sin(way) * around
@@ -202,7 +226,7 @@ def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin:
     return Touch(
         kind="outer" if i else "inner",
         cover=cover,
-        position=float(random.uniform(MARGIN, arm.covers.length[i] - MARGIN)),
+        position=float(random.uniform(TOUCHES.margin, arm.covers.length[i] - TOUCHES.margin)),
         force=(float(force[0]), float(force[1]), float(force[2])),
         arm=(float(lever[0]), float(lever[1]), float(lever[2])),
         twist=0.0,

@@ -9,16 +9,19 @@ from matplotlib.axes import Axes
 
 from wam_analysis.drawing import SHAFTS
 from wam_description.arm import Arm
-from wam_studies.contact_benchmark.contacts import EvaluatedContact
-from wam_studies.contact_benchmark.scenarios import KINDS
-from wam_studies.contact_benchmark.score import (
+from wam_studies.contact.contacts import EvaluatedContact
+from wam_studies.contact.rows import (
     IN_MOTION,
-    TORQUE_LIMITS,
+    STATED,
+    TORQUES,
+    EstimatedContact,
     ScenarioScore,
     contacts_of,
+    near,
     on_outer_link,
     outer_links,
 )
+from wam_studies.contact.scenarios import KINDS
 from wam_studies.figures.style import panels
 
 NO_POSITION = 60.0  # cm, at which contacts without a position are drawn
@@ -34,7 +37,7 @@ def figure(scores: Sequence[ScenarioScore], arm: Arm, file: Path) -> None:
         _standard_deviations(flat[1], found)
         _reliability(flat[2], contacts_of(scores), found)
         _torques(flat[3], scores, arm)
-        _latency(flat[4], on_outer_link(scores, arm, force=5.0), outer_links(arm))
+        _latency(flat[4], near(found, 5.0), outer_links(arm))
         _links(flat[5], contacts_of(scores), arm)
 
 
@@ -43,7 +46,8 @@ def _errors(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
         own = [contact for contact in found if contact.kind == kind]
         error = [min(100.0 * abs(contact.error), NO_POSITION) for contact in own]
         axes.plot([contact.force for contact in own], error, "o", color=colour, ms=3, alpha=0.5, label=kind)
-    for force, limit in ((5.0, 3.0), (10.0, 2.0), (20.0, 1.3)):
+    for force, allowed in STATED.median.items():
+        limit = 100.0 * allowed[0][1]
         axes.plot([0.8 * force, 1.2 * force], [limit, limit], color="black", lw=2)
     axes.set(
         title="position in motion; bars: required medians",
@@ -78,9 +82,9 @@ def _standard_deviations(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
 
 def _reliability(axes: Axes, every: Sequence[EvaluatedContact], found: Sequence[EvaluatedContact]) -> None:
     detected = [contact for contact in every if contact.detected]
-    order = np.argsort([contact.link_probability for contact in detected])
+    order = np.argsort([contact.probability for contact in detected])
     groups = np.array_split(order, BINS) if len(detected) >= BINS else []
-    reported = [float(np.mean([detected[i].link_probability for i in group])) for group in groups]
+    reported = [float(np.mean([detected[i].probability for i in group])) for group in groups]
     right = [float(np.mean([detected[i].right_link for i in group])) for group in groups]
     levels = np.linspace(0.0, 1.0, 51)
     outer = [contact for contact in found if contact.detected]
@@ -109,7 +113,7 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
             axes.bar(
                 np.arange(len(names)) + 0.2 * (k - 1.5), np.sqrt(squares / count), 0.18, color=SHAFTS[k], label=label
             )
-    required, _ = TORQUE_LIMITS.get(arm.name, ((), ()))
+    required, _ = TORQUES.get(arm.name, ((), ()))
     for i, limit in enumerate(required):
         axes.plot([i - 0.4, i + 0.4], [limit, limit], color="black", lw=2)
     axes.set(title="external torque, rms error; bars: required", ylabel="[N m]")
@@ -117,7 +121,7 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
     axes.legend(frameon=False, fontsize=8)
 
 
-def _latency(axes: Axes, found: Sequence[EvaluatedContact], links: str) -> None:
+def _latency(axes: Axes, found: Sequence[EstimatedContact], links: str) -> None:
     times = sorted(1e3 * contact.latency for contact in found if not math.isnan(contact.latency))
     axes.step(times, (np.arange(len(times)) + 1.0) / max(len(times), 1), color=SHAFTS[0], where="post")
     axes.plot(60.0, 0.95, "_", color="black", ms=14, mew=2)

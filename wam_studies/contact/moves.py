@@ -1,6 +1,7 @@
 """Random moves of the arm that stay within its limits."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -8,14 +9,26 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 
-SLOWEST, FASTEST = 0.4, 2.5  # rad/s, peak of the fastest joint
-SHORTEST, LONGEST = 0.7, 1.1  # s
-ELBOW_SPEED, TIP_SPEED = 1.9, 3.2  # m/s, well below the driver's limits
-PEAK = 1.875  # greatest speed of a minimum-jerk path over its mean speed
+
+@dataclass(frozen=True)
+class MoveRanges:
+    """How moves are drawn, and how fast parts of the arm may be."""
+
+    slowest: float = 0.4  # rad/s, peak of the fastest joint
+    fastest: float = 2.5  # rad/s
+    shortest: float = 0.7  # s
+    longest: float = 1.1  # s
+    elbow_speed: float = 1.9  # m/s, well below the driver's limit, as the next
+    tip_speed: float = 3.2  # m/s
+    peak: float = 1.875  # greatest speed of a minimum-jerk path over its mean speed
+    share: float = 0.6  # of the range of a joint, about its middle, of an arm without poses of its own
+    margin: float = 0.1  # rad, from the ends of the joints
+    return_probability: float = 0.3  # of a move back to the start of the last one
+
+
+MOVES = MoveRanges()
 # rad, middle of the poses of each joint and range each way from it, by arm
 POSES = {"wam": ((0.0, 0.0, 0.0, 0.5), (1.5, 1.8, 1.5, 1.2))}
-SHARE = 0.6  # of the range of a joint, about its middle, of any other arm
-RETURN_PROBABILITY = 0.3  # of a move back to the start of the last one
 
 
 class Move(NamedTuple):
@@ -31,9 +44,9 @@ class MoveGenerator:
     def __init__(self, arm: Arm) -> None:
         self._body = RigidBody(arm)
         lower, upper = np.array(arm.joints.lower), np.array(arm.joints.upper)
-        middle, span = map(np.array, POSES.get(arm.name, (0.5 * (lower + upper), 0.5 * SHARE * (upper - lower))))
-        self._low = np.maximum(middle - span, lower + 0.1)
-        self._high = np.minimum(middle + span, upper - 0.1)
+        middle, span = map(np.array, POSES.get(arm.name, (0.5 * (lower + upper), 0.5 * MOVES.share * (upper - lower))))
+        self._low = np.maximum(middle - span, lower + MOVES.margin)
+        self._high = np.minimum(middle + span, upper - MOVES.margin)
 
     def pose(self, random: np.random.Generator) -> tuple[float, ...]:
         """A pose within the range, rad."""
@@ -52,12 +65,13 @@ class MoveGenerator:
         result: list[Move] = []
         last, here = np.array(before), np.array(start)
         for _ in range(count):
-            seconds = float(random.uniform(SHORTEST, LONGEST))
+            seconds = float(random.uniform(MOVES.shortest, MOVES.longest))
             target = np.array(self.pose(random))
-            if last.size and random.random() < RETURN_PROBABILITY and np.abs(last - here).max() > 0.1:
+            if last.size and random.random() < MOVES.return_probability and np.abs(last - here).max() > 0.1:
                 target = last
             way = target - here
-            way *= min(1.0, float(random.uniform(SLOWEST, FASTEST)) * seconds / PEAK / float(np.abs(way).max()))
+            peak = float(random.uniform(MOVES.slowest, MOVES.fastest))
+            way *= min(1.0, peak * seconds / MOVES.peak / float(np.abs(way).max()))
             way *= min(1.0, 1.0 / self._speed_ratio(here, way, seconds))
             last, here = here, here + way
             result.append(Move(tuple(here.tolist()), round(seconds, 3)))
@@ -70,7 +84,7 @@ class MoveGenerator:
             q = here + way * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
             qd = way * 30.0 * s * s * (1.0 - s) ** 2 / seconds
             for velocity in self._body.start_velocities(q, qd).values():
-                worst = max(worst, float(np.linalg.norm(velocity)) / ELBOW_SPEED)
+                worst = max(worst, float(np.linalg.norm(velocity)) / MOVES.elbow_speed)
             tip = self._body.tool_jacobian(q) @ qd
-            worst = max(worst, float(np.linalg.norm(tip)) / TIP_SPEED)
+            worst = max(worst, float(np.linalg.norm(tip)) / MOVES.tip_speed)
         return worst

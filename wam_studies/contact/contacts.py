@@ -2,25 +2,35 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_description.signals import Load
-from wam_studies.contact_benchmark.scenarios import PlannedContact
-from wam_studies.contact_benchmark.simulation import EstimatedHypothesis, Played, Record
+from wam_studies.contact.scenarios import PlannedContact
+from wam_studies.contact.simulation import EstimatedHypothesis, Played, Record
 
-LEAST_FORCE = 0.3  # N, of a true contact
-GAP = 1  # records without force within one contact
-GREATEST_FORCE = 25.0  # N; contacts with a greater force are excluded
-SETTLED = 0.2  # s from the start of a contact until the estimate is evaluated
-SETTLED_IN_FOAM = 0.12  # s, the same in foam, which soon stops the arm
-SETTLED_AT_REST = 0.4  # s, the same at rest, where the estimate averages over the dither
-SHORTEST = 0.12  # s; shorter contacts are excluded
-EDGE = 0.1  # s after the start or end of a contact in which the observer lags
-MOVING = 0.1  # rad/s of the fastest joint
-LEVEL = 0.9  # of the credible set
-CELLS = 400  # of a link, to integrate the posterior density
+
+@dataclass(frozen=True)
+class EvaluationLimits:
+    """Which true contacts count, when an estimate is evaluated, and what counts as motion."""
+
+    least_force: float = 0.3  # N, of a true contact
+    gap: int = 1  # records without force within one contact
+    greatest_force: float = 25.0  # N; contacts with a greater force are excluded
+    settled: float = 0.2  # s from the start of a contact until the estimate is evaluated
+    settled_in_foam: float = 0.12  # s, the same in foam, which soon stops the arm
+    settled_at_rest: float = 0.4  # s, the same at rest, where the estimate averages over the dither
+    shortest: float = 0.12  # s; shorter contacts are excluded
+    edge: float = 0.1  # s after the start or end of a contact in which the observer lags
+    moving: float = 0.1  # rad/s of the fastest joint
+    sliding: float = 1.0  # rad/s of the slowest motor
+    level: float = 0.9  # of the credible set
+    cells: int = 400  # of a link, to integrate the posterior density
+
+
+EVALUATION = EvaluationLimits()
 
 
 class EvaluatedContact(NamedTuple):
@@ -35,7 +45,7 @@ class EvaluatedContact(NamedTuple):
     latency : s from the last period without contact to the detection; inf without detection, NaN if there was a
         detection before the contact.
     detected : whether the estimator reported a contact.
-    link_probability : of the most probable link, NaN if not detected.
+    probability : of the most probable link, NaN if not detected.
     right_link : whether that link is the true one.
     link : that link, '' if not detected.
     error : m, signed, of the position; inf without a position, on the wrong link or if not detected.
@@ -58,7 +68,7 @@ class EvaluatedContact(NamedTuple):
     began_moving: bool
     latency: float
     detected: bool
-    link_probability: float
+    probability: float
     right_link: bool
     link: str
     error: float
@@ -87,9 +97,9 @@ def spans(records: Sequence[Record]) -> list[Span]:
     """True contacts, in order of time."""
     found: list[Span] = []
     for i, record in enumerate(records):
-        if force_of(record.load) < LEAST_FORCE:
+        if force_of(record.load) < EVALUATION.least_force:
             continue
-        if found and found[-1].cover == record.load.cover and i - found[-1].last <= 1 + GAP:
+        if found and found[-1].cover == record.load.cover and i - found[-1].last <= 1 + EVALUATION.gap:
             found[-1] = found[-1]._replace(last=i)
         else:
             found.append(Span(record.load.cover, i, i))
@@ -107,15 +117,22 @@ def evaluate_contacts(played: Played, lengths: dict[str, float]) -> tuple[list[E
     for span in spans(records):
         first = records[span.first]
         hardest = max(force_of(record.load) for record in records[span.first : span.last + 1])
-        if records[span.last].stamp - first.stamp < SHORTEST * 1e9 or hardest > GREATEST_FORCE:
+        if records[span.last].stamp - first.stamp < EVALUATION.shortest * 1e9 or hardest > EVALUATION.greatest_force:
             excluded += 1
             continue
         planned = _planned(played.scenario.planned, first.stamp * 1e-9)
         kind = planned.kind if planned else ""
-        wait = SETTLED_IN_FOAM if kind == "foam" else SETTLED if played.scenario.group == "moving" else SETTLED_AT_REST
+        wait = _wait(kind, played.scenario.group)
         due = [i for i in range(span.first, span.last) if records[i].stamp - first.stamp <= wait * 1e9]
         result.append(_evaluate(played, span, due[-1], planned, lengths))
     return result, excluded
+
+
+def _wait(kind: str, group: str) -> float:
+    """Time from the start of a contact until its estimate is evaluated, s."""
+    if kind == "foam":
+        return EVALUATION.settled_in_foam
+    return EVALUATION.settled if group == "moving" else EVALUATION.settled_at_rest
 
 
 def _evaluate(
@@ -143,7 +160,7 @@ def _evaluate(
         began_moving=is_moving(records[span.first]),
         latency=_latency(records, span, before),
         detected=now.in_contact,
-        link_probability=named.probability if named else math.nan,
+        probability=named.probability if named else math.nan,
         right_link=right,
         link=named.cover if named else "",
         error=error,
@@ -158,7 +175,7 @@ def _evaluate(
 
 def is_moving(record: Record) -> bool:
     """Whether a joint truly moves."""
-    return max(map(abs, record.qd)) > MOVING
+    return max(map(abs, record.qd)) > EVALUATION.moving
 
 
 def _planned(planned: Sequence[PlannedContact], time: float) -> PlannedContact | None:
@@ -186,22 +203,22 @@ def credibility(
     """
     if not hypotheses:
         return 1.0
-    density = {name: np.zeros(CELLS) for name in lengths}  # per metre
+    density = {name: np.zeros(EVALUATION.cells) for name in lengths}  # per metre
     for hypothesis in hypotheses:
         length = lengths[hypothesis.cover]
-        at = (np.arange(CELLS) + 0.5) * length / CELLS
+        at = (np.arange(EVALUATION.cells) + 0.5) * length / EVALUATION.cells
         if math.isnan(hypothesis.position):
-            shape = np.ones(CELLS)
+            shape = np.ones(EVALUATION.cells)
         else:
             shape = np.exp(-0.5 * ((at - hypothesis.position) / max(hypothesis.position_sd, 1e-4)) ** 2)
         total = float(shape.sum())
         if total > 0.0:
-            density[hypothesis.cover] += hypothesis.probability * shape / (total * length / CELLS)
-    cell = min(max(int(position / lengths[cover] * CELLS), 0), CELLS - 1)
+            density[hypothesis.cover] += hypothesis.probability * shape / (total * length / EVALUATION.cells)
+    cell = min(max(int(position / lengths[cover] * EVALUATION.cells), 0), EVALUATION.cells - 1)
     truth = float(density[cover][cell])
     more, same = 0.0, 0.0
     for name, values in density.items():
-        width = lengths[name] / CELLS
+        width = lengths[name] / EVALUATION.cells
         more += float(values[values > truth * (1.0 + 1e-9)].sum()) * width
         same += float(values[np.abs(values - truth) <= truth * 1e-9].sum()) * width
     return more + 0.5 * same
@@ -209,5 +226,5 @@ def credibility(
 
 def _in_set(hypotheses: Sequence[EstimatedHypothesis], cover: str, position: float, level: float) -> bool:
     if all(math.isnan(hypothesis.low) for hypothesis in hypotheses):
-        return level <= LEVEL
+        return level <= EVALUATION.level
     return any(hypothesis.cover == cover and hypothesis.low <= position <= hypothesis.high for hypothesis in hypotheses)

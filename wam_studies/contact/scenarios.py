@@ -5,6 +5,7 @@ The true arm of each scenario has its own model mismatch within the declared ran
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +14,37 @@ from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
-from wam_studies.contact_benchmark.foam import Foam, FoamCollision, foam_values
-from wam_studies.contact_benchmark.moves import MoveGenerator
+from wam_studies.contact.foam import Foam, FoamCollision, foam_values
+from wam_studies.contact.moves import MoveGenerator
 
-# the declared range of the model mismatch, uniform in +- this
-FRICTION, MASS, STIFFNESS = 0.10, 0.02, 0.10
-PAYLOAD = 0.05  # kg, unmodelled, in free motion only
+
+@dataclass(frozen=True)
+class ScenarioRanges:
+    """What is drawn of a scenario; a number of the model mismatch is the largest error, uniform in +- this."""
+
+    friction: float = 0.10  # of each motor and joint
+    mass: float = 0.02  # of each link
+    stiffness: float = 0.10  # of each cable
+    payload: float = 0.05  # kg, unmodelled, in free motion only
+    release: float = 0.05  # s, to release the brakes
+    settle: float = 0.3  # s, before the first move
+    hold: float = 0.32  # s of contact in motion
+    rest: float = 0.6  # s at rest before a contact
+    rest_hold: float = 0.6  # s of contact at rest
+    free_seconds: float = 12.0  # length of one scenario without contact
+    levels: tuple[float, ...] = (5.0, 10.0, 20.0)  # N, in the table
+    weakest: float = 1.0  # N
+    strongest: float = 20.0  # N
+    rough: float = 0.8  # the greatest coefficient of friction, of every fifth pusher
+    margin: float = 0.02  # m at the ends of a link without contacts
+    dither_cycle: float = 0.04  # s: 25 Hz
+    beyond_first: float = 0.7  # of the contacts are not on the first cover
+    foam_share: float = 0.15  # of the scenarios in motion
+
+
+RANGES = ScenarioRanges()
+KINDS = ("push", "sphere", "flat", "foam")
+AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
 
 # what the estimator states of an arm that was identified to this range, as standard deviations
 IDENTIFIED = {
@@ -29,21 +55,6 @@ IDENTIFIED = {
     "contact_estimator:observer.payload_uncertainty": 0.0,
     "contact_estimator:observer.motor_noise": 0.05,
 }
-
-RELEASE = 0.05  # s, to release the brakes
-SETTLE = 0.3  # s, before the first move
-HOLD = 0.32  # s of contact in motion
-REST_HOLD = 0.6  # s of contact at rest
-FREE_SECONDS = 12.0  # length of one scenario without contact
-LEVELS = (5.0, 10.0, 20.0)  # N, in the table
-WEAKEST, STRONGEST = 1.0, 20.0  # N
-ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
-MARGIN = 0.02  # m at the ends of a link without contacts
-DITHER_CYCLE = 0.04  # s: 25 Hz
-BEYOND_FIRST = 0.7  # of the contacts are not on the first cover
-FOAM_SHARE = 0.15  # of the scenarios in motion
-KINDS = ("push", "sphere", "flat", "foam")
-AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
 
 
 class PlannedContact(NamedTuple):
@@ -81,7 +92,7 @@ def dither_values(configuration: Configuration) -> dict[str, Any]:
     """Values that switch on the dither at rest; empty if the configuration has none."""
     shared = configuration.sections["/**"]
     return (
-        {"timing.dither_cycle": round(DITHER_CYCLE / shared["timing.period"])}
+        {"timing.dither_cycle": round(RANGES.dither_cycle / shared["timing.period"])}
         if "timing.dither_cycle" in shared
         else {}
     )
@@ -92,7 +103,7 @@ def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, 
     estimator = configuration.sections["contact_estimator"]
     joints = len(configuration.shared.arm.joints.names)
     values: dict[str, Any] = {
-        **foam_values(AWAY, WEAKEST, 0.0),
+        **foam_values(AWAY, RANGES.weakest, 0.0),
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
     }
@@ -127,22 +138,22 @@ class ScenarioGenerator:
 
     def free(self, seconds: float) -> list[BenchmarkScenario]:
         """Motion with stops and reversals and an unmodelled payload, without contact."""
-        return [self._free(i) for i in range(math.ceil(seconds / FREE_SECONDS - 1e-9))]
+        return [self._free(i) for i in range(math.ceil(seconds / RANGES.free_seconds - 1e-9))]
 
     def _random(self, group: int, i: int) -> np.random.Generator:
         return np.random.default_rng((self._seed, group, i))
 
     def _moving(self, i: int) -> BenchmarkScenario:
         random = self._random(0, i)
-        if random.random() < FOAM_SHARE:
+        if random.random() < RANGES.foam_share:
             return self._foam(random, i)
         start = self._moves.pose(random)
         moves = self._moves.moves(random, start, 2)
         steps, planned = _opening(), []
-        now = RELEASE + SETTLE
+        now = RANGES.release + RANGES.settle
         for number, move in enumerate(moves):
             begin = now + 0.3 * move.seconds
-            contact = self._contact(random, begin, begin + HOLD)
+            contact = self._contact(random, begin, begin + RANGES.hold)
             planned.append(contact)
             push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(ScenarioStep(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
@@ -157,10 +168,12 @@ class ScenarioGenerator:
         while foam is None:
             start = self._moves.pose(random)
             (move,) = self._moves.moves(random, start, 1)
-            contact = self._contact(random, RELEASE + SETTLE, RELEASE + SETTLE + move.seconds + 0.5)
+            contact = self._contact(
+                random, RANGES.release + RANGES.settle, RANGES.release + RANGES.settle + move.seconds + 0.5
+            )
             cover = self._arm.covers.names.index(contact.cover)
             foam = FoamCollision(self._arm, self._body, start, move).foam(random, cover, contact.position)
-        friction = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        friction = RANGES.rough if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
         contact = contact._replace(kind="foam", force=max(contact.force, 4.0), friction=friction)
         steps = [
             *_opening(),
@@ -176,13 +189,13 @@ class ScenarioGenerator:
         start = self._moves.pose(random)
         (move,) = self._moves.moves(random, start, 1)
         steps, planned = [*_opening(), ScenarioStep("move", move.seconds, posture=move.posture)], []
-        now = RELEASE + SETTLE + move.seconds
+        now = RANGES.release + RANGES.settle + move.seconds
         for number in range(2):
-            begin = now + 0.6
-            contact = self._contact(random, begin, begin + REST_HOLD)
+            begin = now + RANGES.rest
+            contact = self._contact(random, begin, begin + RANGES.rest_hold)
             planned.append(contact)
             push = self._push(contact, now) if contact.kind == "push" else None
-            steps.append(ScenarioStep(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
+            steps.append(ScenarioStep(f"rest {number + 1}", RANGES.rest + RANGES.rest_hold + 0.2, push=push))
             now += steps[-1].seconds
         still = dict.fromkeys(dither_values(self._configuration), 0)
         values = self._values(random, start, planned) | (still if dither is None else dict(dither))
@@ -192,7 +205,7 @@ class ScenarioGenerator:
     def _free(self, i: int) -> BenchmarkScenario:
         random = self._random(2, i)
         start = self._moves.pose(random)
-        steps, left = _opening(), FREE_SECONDS - RELEASE - SETTLE
+        steps, left = _opening(), RANGES.free_seconds - RANGES.release - RANGES.settle
         here = start
         while left > 0.0:
             (move,) = self._moves.moves(random, here, 1, before=steps[-1].posture)
@@ -204,21 +217,25 @@ class ScenarioGenerator:
             here = move.posture
         values = self._values(random, start, [])
         if i % 2:  # no payload in the others, as in the scenarios with contact
-            values["driver:mismatch.payload"] = float(random.uniform(0.0, PAYLOAD))
-            values["contact_estimator:observer.payload"] = [0.0, PAYLOAD]
+            values["driver:mismatch.payload"] = float(random.uniform(0.0, RANGES.payload))
+            values["contact_estimator:observer.payload"] = [0.0, RANGES.payload]
         return BenchmarkScenario(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
 
     def _contact(self, random: np.random.Generator, begin: float, end: float) -> PlannedContact:
         covers = self._arm.covers
         cover = _drawn_cover(random.random(), len(covers.names)) if len(covers.names) > 1 else 0
         kind = str(random.choice(("push", "sphere", "flat"), p=(0.4, 0.3, 0.3)))
-        level = float(random.choice((*LEVELS, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
-        force = level * float(random.uniform(0.95, 1.05)) if level else float(random.uniform(WEAKEST, STRONGEST))
-        friction = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        level = float(random.choice((*RANGES.levels, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
+        force = (
+            level * float(random.uniform(0.95, 1.05))
+            if level
+            else float(random.uniform(RANGES.weakest, RANGES.strongest))
+        )
+        friction = RANGES.rough if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
         return PlannedContact(
             kind=kind,
             cover=covers.names[cover],
-            position=float(random.uniform(MARGIN, covers.length[cover] - MARGIN)),
+            position=float(random.uniform(RANGES.margin, covers.length[cover] - RANGES.margin)),
             angle=float(random.uniform(-math.pi, math.pi)),
             force=force,
             begin=round(begin, 3),
@@ -244,12 +261,12 @@ class ScenarioGenerator:
 
 
 def _drawn_cover(share: float, covers: int) -> int:
-    """Index of the cover in contact for a number from 0 to 1: those behind the first one have `BEYOND_FIRST` of all."""
-    return 1 + int(share / BEYOND_FIRST * (covers - 1)) if share < BEYOND_FIRST else 0
+    """Index of the cover in contact for a number from 0 to 1."""
+    return 1 + int(share / RANGES.beyond_first * (covers - 1)) if share < RANGES.beyond_first else 0
 
 
 def _opening() -> list[ScenarioStep]:
-    return [ScenarioStep("release", RELEASE, request="enable"), ScenarioStep("settle", SETTLE)]
+    return [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("settle", RANGES.settle)]
 
 
 def _mismatch(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
@@ -258,10 +275,10 @@ def _mismatch(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
 
     motors, joints = len(arm.motors.names), len(arm.joints.names)
     return {
-        "driver:mismatch.mass": factors(MASS, len(arm.links.names)),
-        "driver:mismatch.motor_friction": factors(FRICTION, motors),
-        "driver:mismatch.joint_friction": factors(FRICTION, joints),
-        "driver:mismatch.stiffness": factors(STIFFNESS, motors),
+        "driver:mismatch.mass": factors(RANGES.mass, len(arm.links.names)),
+        "driver:mismatch.motor_friction": factors(RANGES.friction, motors),
+        "driver:mismatch.joint_friction": factors(RANGES.friction, joints),
+        "driver:mismatch.stiffness": factors(RANGES.stiffness, motors),
     }
 
 

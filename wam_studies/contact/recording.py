@@ -1,6 +1,7 @@
 """Play one drawn arm without ROS and keep the motors' signals and the true contacts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +14,10 @@ from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
-from wam_studies.contact_benchmark.moves import MoveGenerator
-from wam_studies.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
-from wam_studies.contact_robustness.degradations import Degradation, Values, drawn
-from wam_studies.contact_robustness.touches import (
+from wam_studies.contact.degradations import Degradation, Values, drawn
+from wam_studies.contact.moves import MoveGenerator
+from wam_studies.contact.scenarios import RANGES, base_values
+from wam_studies.contact.touches import (
     KINDS,
     LEVEL_KINDS,
     MASS_KINDS,
@@ -28,10 +29,20 @@ from wam_studies.contact_robustness.touches import (
 from wam_studies.identification.trial import play
 
 Array = NDArray[np.float64]
-WARM_UP = 6.0  # s of free motion before the first contact
-SPACING, SPACING_OF_MASSES = 1.9, 6.0  # s from one contact to the next
-EXCITATION = 20.0  # s of motion for an identification
-DRIFT_STEPS = 20  # of friction, over a recording
+
+
+@dataclass(frozen=True)
+class RecordingTimes:
+    """When contacts are, and for how long the arm is moved."""
+
+    warm_up: float = 6.0  # s of free motion before the first contact
+    spacing: float = 1.9  # s from one contact to the next
+    spacing_of_masses: float = 6.0  # s
+    excitation: float = 20.0  # s of motion for an identification
+    drift_steps: int = 20  # of friction, over a recording
+
+
+TIMES = RecordingTimes()
 CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
 
 
@@ -84,8 +95,8 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     random = np.random.default_rng((drive.seed, 2, name))
     moves = MoveGenerator(arm)
     start = here = moves.pose(random)
-    steps = [ScenarioStep("release", RELEASE, request="enable"), ScenarioStep("settle", SETTLE)]
-    left = drive.seconds - RELEASE - SETTLE
+    steps = [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("settle", RANGES.settle)]
+    left = drive.seconds - RANGES.release - RANGES.settle
     while left > 0.0:
         (move,) = moves.moves(random, here, 1, before=steps[-1].posture)
         steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
@@ -94,8 +105,8 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
             steps.append(ScenarioStep("stop", stop))
         left -= move.seconds + stop
         here = move.posture
-    spacing = SPACING_OF_MASSES if drive.contacts == "masses" else SPACING
-    times = np.arange(WARM_UP, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
+    spacing = TIMES.spacing_of_masses if drive.contacts == "masses" else TIMES.spacing
+    times = np.arange(TIMES.warm_up, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
     return (
         degradation,
         touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
@@ -119,7 +130,7 @@ def record(drive: Drive) -> DriveRecording:
     run = Simulation(configured, steps)
     rows: list[tuple[list[float], list[float], list[float], float]] = []
     nominal = np.array(arm.joints.dynamic_friction)
-    drift_every = max(1, round(drive.seconds / period / DRIFT_STEPS))
+    drift_every = max(1, round(drive.seconds / period / TIMES.drift_steps))
     done = False
     while not done:
         k = len(rows)
@@ -139,7 +150,7 @@ def record(drive: Drive) -> DriveRecording:
 
 def _identified(configured: Configuration, degradation: Degradation, seed: int) -> Values:
     """Values of the model that `wam identify` finds for a plant from the signals that the estimator gets."""
-    samples, _ = play(configured, seed, EXCITATION, degradation.signals)
+    samples, _ = play(configured, seed, TIMES.excitation, degradation.signals)
     known = configured.with_values(dict(degradation.model)).shared
     found = identify(known, samples)
     values = model_values(known, found, "an exciting motion") | estimator_values(configured)

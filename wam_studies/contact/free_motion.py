@@ -4,11 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_studies.contact_benchmark.contacts import EDGE, is_moving, spans
-from wam_studies.contact_benchmark.scenarios import DITHER_CYCLE
-from wam_studies.contact_benchmark.simulation import Played
-
-SLIDING = 1.0  # rad/s of the slowest motor
+from wam_studies.contact.contacts import EVALUATION, is_moving, spans
+from wam_studies.contact.scenarios import RANGES
+from wam_studies.contact.simulation import Played
 
 
 class TorqueErrors(NamedTuple):
@@ -40,14 +38,14 @@ def torque_errors(played: Played) -> TorqueErrors:
     stamps = np.array([record.stamp for record in records]) * 1e-9
     for span in spans(records):
         for edge in (stamps[span.first], stamps[span.last]):
-            keep &= ~((stamps > edge - 0.02) & (stamps < edge + EDGE))
+            keep &= ~((stamps > edge - 0.02) & (stamps < edge + EVALUATION.edge))
     keep &= stamps > stamps[0] + 0.2  # the observer's own transient
     truth = np.array([record.torques for record in records])
     if played.scenario.group == "dither":  # the estimate is a mean over the dither cycle, so the truth must be, too
-        truth = _over_cycle(truth, round(DITHER_CYCLE / float(stamps[1] - stamps[0])))
+        truth = _over_cycle(truth, round(RANGES.dither_cycle / float(stamps[1] - stamps[0])))
     error = np.array([record.external for record in records]) - truth
     moving = np.array([is_moving(record) for record in records])
-    sliding = keep & np.array([min(map(abs, record.thetad)) > SLIDING for record in records])
+    sliding = keep & np.array([min(map(abs, record.thetad)) > EVALUATION.sliding for record in records])
     square = error**2
     has_sd = all(record.external_sd for record in records)
     variance = np.array([record.external_sd for record in records]) ** 2 if has_sd else np.full_like(square, np.nan)
@@ -81,7 +79,7 @@ class ContactFreeTime(NamedTuple):
     Attributes
     ----------
     group : of the scenario.
-    seconds : without contact, from `EDGE` after the last one.
+    seconds : without contact, from `EVALUATION.edge` after the last one.
     alarms : detections that started in that time.
     """
 
@@ -95,7 +93,7 @@ def contact_free_time(played: Played) -> ContactFreeTime:
     records = played.records
     period = (records[1].stamp - records[0].stamp) * 1e-9
     in_contact = [False] * len(records)
-    after = round(EDGE / period)
+    after = round(EVALUATION.edge / period)
     for span in spans(records):
         for i in range(span.first, min(span.last + 1 + after, len(records))):
             in_contact[i] = True

@@ -16,37 +16,17 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import NO_LOAD, Load
 from wam_sim.batch import processes
 from wam_sim.simulation import Simulation
-from wam_studies.contact_benchmark.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
-from wam_studies.contact_benchmark.evaluation import (
-    BenchmarkExtent,
-    BenchmarkResult,
-    ScenarioTask,
-    evaluate,
-    scenarios,
-)
-from wam_studies.contact_benchmark.figure import figure
-from wam_studies.contact_benchmark.free_motion import ContactFreeTime, contact_free_time, torque_errors
-from wam_studies.contact_benchmark.over_topics import script
-from wam_studies.contact_benchmark.page import (
-    MARGINAL,
-    MET,
-    MISSED,
-    MISSED_MARGINAL,
-    TARGET_MET,
-    mark,
-    missed,
-    page,
-)
-from wam_studies.contact_benchmark.scenarios import (
-    BenchmarkScenario,
-    PlannedContact,
-    ScenarioGenerator,
-    dither_values,
-)
-from wam_studies.contact_benchmark.score import ANY, ScenarioScore, further_metrics, required_metrics, score
-from wam_studies.contact_benchmark.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
-from wam_studies.contact_robustness.requirements import RequiredRow, required_table
-from wam_studies.scores import FEW, Interval, counted, events, quantile, rms, share
+from wam_studies.contact.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
+from wam_studies.contact.free_motion import ContactFreeTime, contact_free_time, torque_errors
+from wam_studies.contact.over_topics import play_over_topics, script
+from wam_studies.contact.picture import figure
+from wam_studies.contact.rows import ScenarioScore
+from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
+from wam_studies.contact.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
+from wam_studies.contact.study import ContactStudy
+from wam_studies.contact.trial import ContactCase, score
+from wam_studies.harness import evaluate
+from wam_studies.scores import Interval, events, quantile, rms, share
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -97,7 +77,7 @@ def test_a_contact_is_evaluated_as_by_hand() -> None:
     assert contact.latency == pytest.approx(0.025)  # from record 99, the last without force, to 104
     assert contact.detected
     assert contact.right_link
-    assert contact.link_probability == 0.8
+    assert contact.probability == 0.8
     assert contact.error == pytest.approx(0.03)
     assert contact.position_sd == 0.02
     assert contact.moment_error == pytest.approx(0.3)
@@ -226,33 +206,6 @@ def test_the_interval_of_an_rms_is_that_of_its_scenes_not_of_its_samples() -> No
     assert few.high - few.low > 0.2
 
 
-def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
-    row = (0.0, 2.0), (0.0, 1.0)
-    assert mark(*row, Interval(0.9, 0.8, 1.4, 50)) == TARGET_MET
-    assert mark(*row, Interval(1.5, 1.2, 1.9, 50)) == MET
-    assert mark(*row, Interval(1.5, 1.2, 2.1, 50)) == MARGINAL
-    assert mark(*row, Interval(2.5, 2.2, 3.1, 50)) == MISSED
-    assert mark(*row, Interval(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
-    assert mark(*row, quantile([0.5], 0.5)) == FEW
-    assert mark(*row, Interval(math.nan, math.nan, math.nan, 0)) == "no data"
-    none = (0.0, 0.0), (0.0, 0.0)
-    assert mark(*none, Interval(0.0, 0.0, 3.7, 60)) == FEW
-    assert mark(*none, Interval(0.0, 0.0, 3.7, 130)) == MET
-    assert mark(*none, Interval(0.0, 0.0, 3.7, 600)) == TARGET_MET
-    assert mark(*none, Interval(1.0, 0.0, 5.0, 600)) == MISSED
-    assert mark(ANY, ANY, Interval(9.0, 8.0, 10.0, 5)) == ""
-
-
-def test_a_verdict_on_few_observations_says_so() -> None:
-    assert counted(MET, 20) == MET
-    assert counted(MET, 2) == "met (n=2: too few)"
-    assert counted("", 2) == ""
-    assert "met (n=2: too few)" in required_table([RequiredRow("x", "", 1.0, "", (0.0, 1.0), ANY, share(2, 2), "")])
-    assert "too few" not in required_table(
-        [RequiredRow("x", "", 1.0, "", (0.0, 9.0), ANY, Interval(1.0, 1.0, 1.0, 1), "")]
-    )
-
-
 def synthetic(error: float, latency: float, right: float, group: str = "moving") -> list[ScenarioScore]:
     """A hundred scenarios with a contact of 5 N; a share names the right link, 90 % of the sets hold the truth."""
     result = []
@@ -267,9 +220,12 @@ def synthetic(error: float, latency: float, right: float, group: str = "moving")
     return result
 
 
+STUDY = ContactStudy(CONFIGURATION)
+
+
 def found(name: str, scores: list[ScenarioScore]) -> Interval:
-    (row,) = [row for row in [*required_metrics(ARM), *further_metrics(ARM)] if row.name == name]
-    return row.of(scores)
+    (row,) = [row for row in STUDY.score(scores).rows if row.name == name]
+    return row.found
 
 
 def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
@@ -286,23 +242,15 @@ def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
 
 
 def test_a_missed_must_is_named_and_a_met_one_is_not() -> None:
-    bad = missed(BenchmarkResult((1,), {1: synthetic(-0.04, 0.07, 0.93)}), ARM)
-    assert "position on the outer link at 5 N, median error" in bad
+    bad = "; ".join(STUDY.score(synthetic(-0.04, 0.07, 0.93)).missed)
+    assert "position on the outer link at 5 N, median error: 4 cm, required 3" in bad
     assert "5 N on the outer link detected within 60 ms" in bad
-    assert "wrong link" in bad
-    good = missed(BenchmarkResult((1,), {1: synthetic(-0.004, 0.02, 1.0)}), ARM)
-    assert good == []
+    assert "wrong link: 7 %, required 5" in bad
+    assert STUDY.score(synthetic(-0.004, 0.02, 1.0)).missed == []
 
 
 def test_half_the_contacts_without_a_place_is_no_finite_median() -> None:
     assert found("position on the outer link at 5 N, median error", synthetic(0.01, 0.02, 0.4)).value == math.inf
-
-
-def test_the_page_holds_every_row_that_is_asked() -> None:
-    result = BenchmarkResult((7,), {7: synthetic(0.01, 0.02, 1.0)})
-    text = page(result, ARM, "wam evaluate contact", "", "picture.png")
-    assert all(f"| {row.name} |" in text for row in required_metrics(ARM))
-    assert "| seed 7 |" in text
 
 
 # truth
@@ -366,13 +314,16 @@ def test_a_hand_that_misses_is_not_counted() -> None:
 # scenarios
 
 
+def study(**options: Any) -> ContactStudy:
+    return ContactStudy(CONFIGURATION, **options)
+
+
 def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
-    extent = BenchmarkExtent(contacts=6, resting=2, free=12.0)
-    first, again, other = (scenarios(CONFIGURATION, seed, extent) for seed in (5, 5, 6))
+    small = study(contacts=6, resting=2, free=12.0)
+    first, again, other = (small.scenarios(seed) for seed in (5, 5, 6))
     assert first == again
     assert all(a.values != b.values for a, b in zip(first, other, strict=True))
-    more = scenarios(CONFIGURATION, 5, extent._replace(contacts=8))
-    assert more[:3] == first[:3]  # a larger benchmark starts like the smaller one
+    assert study(contacts=8, resting=2, free=12.0).scenarios(5)[:3] == first[:3], "a larger one starts alike"
 
 
 @pytest.mark.slow
@@ -383,9 +334,10 @@ def test_the_scores_have_a_picture(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
-    drawn = scenarios(CONFIGURATION, 4, BenchmarkExtent(contacts=4, resting=0, free=0.0))
+    small = study(contacts=4, resting=0, free=0.0)
+    cases = {4: small.cases(4)}
     with ThreadPoolExecutor(1) as one, processes(2) as two:
-        alone, together = (evaluate(CONFIGURATION, drawn, executor) for executor in (one, two))
+        alone, together = (evaluate(small, cases, executor).total for executor in (one, two))
     assert repr(alone) == repr(together)
     assert sum(len(scenario.contacts) for scenario in alone) >= 3
 
@@ -418,15 +370,13 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
 ) -> None:
     import yaml
 
-    from wam_studies import contact_scenarios
-
     scenario = pick("sphere")
     file = tmp_path / "scenario.yaml"
     file.write_text(yaml.safe_dump(script(scenario)))
     assert tuple(load_script(file, CONFIGURATION.shared)) == scenario.steps
     short = scenario._replace(steps=scenario.steps[:3])
     direct = play(CONFIGURATION, short)
-    over = contact_scenarios.play(CONFIGURATION, short, domain_id)
+    over = play_over_topics(CONFIGURATION, short, domain_id)
     assert over.failure == direct.failure == ""
     assert len(over.records) == len(direct.records)
     for one, other in zip(direct.records, over.records, strict=True):
@@ -461,4 +411,4 @@ def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a
     played = play(barrett, stiff)
     assert not played.failure
     assert played.records[-1].stamp == pytest.approx(1e9 * sum(step.seconds for step in steps), abs=5e6)
-    assert str(ScenarioTask(barrett, stiff)) == "stiff"
+    assert str(ContactCase(barrett, stiff)) == "stiff"

@@ -1,0 +1,211 @@
+"""The benchmark of contact estimation on arms that differ from what the estimator states."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_inference import Hypothesis
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_studies.contact.degradations import NAMES, drawn
+from wam_studies.contact.degraded_rows import DEGRADED, DriveScore, contacts_needed, degraded_rows, degraded_tables
+from wam_studies.contact.recording import Drive, _identified, record
+from wam_studies.contact.replay import (
+    FalseAlarm,
+    ReplayScore,
+    SecondOutcome,
+    SignalFaults,
+    TouchOutcome,
+    names_payload,
+    payload_probability,
+)
+from wam_studies.contact.scenarios import base_values
+from wam_studies.contact.study import ContactStudy
+from wam_studies.contact.touches import axis_of
+from wam_studies.contact.trial import ContactCase, play_case
+from wam_studies.identification.plants import MeasuredSignals
+from wam_studies.scores import Row, ScoreTable, share
+
+TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
+OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
+ALARM = FalseAlarm(0.2, 0.1, 1.5)
+STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
+EXACT = ("moving", "asymmetry", "load", "shape", "payload", "mass")
+BELIEVING = {f"contact_estimator:observer.{name}_uncertainty": 0.0 for name in EXACT} | {
+    "contact_estimator:observer.motor_noise": 0.0
+}
+
+
+def score_of(drive: Drive) -> ReplayScore:
+    found = play_case(ContactCase(drive.configuration, drive))
+    assert isinstance(found, DriveScore)
+    return found.score
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_degradation_is_drawn_from_its_seed_and_changes_the_arm_or_its_signals(name: str) -> None:
+    first, again = (drawn(name, WAM, np.random.default_rng(5)) for _ in range(2))
+    assert first == again
+    assert (drawn(STATED, WAM, np.random.default_rng(5)) == first) is (name == STATED)
+
+
+def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> None:
+    with pytest.raises(ValueError, match=r"no degradation is named 'wind'; degradations: as stated, friction 0\.8"):
+        ContactStudy(CONFIGURATION, degradations=("wind",))
+
+
+def test_drives_are_of_each_degradation_and_the_mix_is_identified_too() -> None:
+    drives = list(ContactStudy(CONFIGURATION, degradations=("all",), seconds=20.0).drives(2))
+    wide = [drive for drive in drives if drive.contacts == "wide"]
+    assert [drive.degradation for drive in wide] == list(NAMES)
+    assert {drive.degradation for drive in drives if drive.is_identified} == {"realistic mix"}
+    assert {drive.seed for drive in drives if drive.contacts == "level"} == {6, 7, 8}
+    assert {drive.seconds for drive in drives if drive.contacts == "masses"} == {10.0}
+    assert not list(ContactStudy(CONFIGURATION).drives(2))
+
+
+def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to_be_allowed() -> None:
+    count, (low, high) = contacts_needed(), DEGRADED.covered[0]
+    enough, fewer = (share(round(DEGRADED.usual * n), n) for n in (count, count - 1))
+    assert low <= enough.low < enough.high <= high
+    assert fewer.low < low or fewer.high > high
+
+
+def scored(*outcomes: TouchOutcome, **parts: Any) -> ReplayScore:
+    return ReplayScore(STATED, list(outcomes), 100.0, [], 0.0, 0.0, [], 60.0, 0, [], [], [], "")._replace(**parts)
+
+
+def driven(*scores: ReplayScore, contacts: str = "wide", is_identified: bool = False) -> list[DriveScore]:
+    return [DriveScore(1, contacts, is_identified, score) for score in scores]
+
+
+def rows_of(drives: list[DriveScore]) -> dict[str, Row]:
+    return {row.name: row for row in degraded_rows(drives)}
+
+
+def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_they_are_allowed() -> None:
+    rows = rows_of(driven(scored(degradation=COARSE), scored(degradation=LOADED, alarms=[ALARM])))
+    assert rows[f"false alarms, any degradation alone, the worst: {LOADED}"].found.value == 0.01
+
+
+def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
+    late = TOUCH._replace(latency=0.1, error=0.2)
+    inner = TOUCH._replace(kind="inner", force=10.0, latency=np.inf)
+    rough = TOUCH._replace(force=20.0, friction=0.8, in_set=False)
+    second = [SecondOutcome("second on the same link", np.inf)]
+    drives = [
+        *driven(scored(inner, inner._replace(latency=0.01), rough, degradation="delay 2 ms")),
+        *driven(scored(second=second, changes=5), contacts="second"),
+        *driven(scored(TOUCH, late, started=[(False, False), (True, False)]), contacts="level", is_identified=True),
+    ]
+    rows = rows_of(drives)
+    mix = "realistic mix, identified"
+    assert rows[f"5 N on the outer link detected within 30 ms, {mix}"].found[::3] == (0.5, 2)
+    assert rows[f"position on the outer link at 5 N, 95 % quantile of the error, {mix}"].found.value > 0.1
+    assert rows["10 N on the inner link detected within 200 ms, every arm"].found[::3] == (0.5, 2)
+    assert rows["90 % set contains the truth at 20 N, mu 0.8, every arm, masses included"].found[::3] == (0.0, 1)
+    assert rows["second contact detected within 250 ms"].found.value == 0.0
+    assert rows["false second contacts while there is one"].found.value == pytest.approx(5 / 60)
+    assert [rows[f"start in contact, {how}, {mix}"].found.value for how in ("warm", "cold")] == [0.5, 0.0]
+    assert rows_of([]) == {}
+
+
+def table(title: str, drives: list[DriveScore]) -> ScoreTable:
+    return next(one for one in degraded_tables(drives) if one.title.startswith(title))
+
+
+def test_the_sets_are_counted_by_force_too() -> None:
+    """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
+    light = TOUCH
+    strong = light._replace(force=40.0, in_set=False)
+    held = {row[0]: row[3] for row in table("By kind", driven(scored(light, strong, strong))).rows}
+    assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33 (3)", "100 (1)", "0 (2)")
+
+
+@pytest.mark.slow
+def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
+    """By the joint torques that the estimator finds in motion: they are those of the drawn force, within 4 %."""
+    drive = Drive(CONFIGURATION.with_values(base_values(CONFIGURATION, False)), STATED, 905, 14.0, "level")
+    recording, shared = record(drive), drive.configuration.shared
+    own = drive.configuration.node("contact_estimator", ContactEstimatorParameters)
+    estimator, body = ContactEstimator(WAM, shared.timing, own, shared.model), RigidBody(WAM)
+    products = squares = 0.0
+    for i, state, dt in SignalFaults(recording, 1e-3, 905):
+        estimator.observe(state, None, dt)
+        for touch in recording.touches:
+            if i == round(1e3 * (touch.begin + 0.2)):
+                wrench = np.concatenate(touch.wrench(i * 1e-3, axis_of(WAM, touch.cover, touch.position)))
+                true = wrench @ body.cover_jacobian(
+                    TransmissionMap.of(WAM).joint_positions(state.position), touch.cover
+                )
+                products += float(true @ estimator.estimate().external_torques)
+                squares += float(true @ true)
+    assert squares > 1.0
+    assert products / squares == pytest.approx(1.0, abs=0.04)
+
+
+@pytest.mark.slow
+def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_payload_is_named() -> None:
+    coarse, loaded = (score_of(Drive(CONFIGURATION, name, 901, 10.0)) for name in (COARSE, LOADED))
+    believing = score_of(Drive(CONFIGURATION.with_values(BELIEVING), LOADED, 901, 10.0))
+    for score in (coarse, loaded):
+        assert not score.failure
+        assert score.free_seconds > 3.0
+        assert not score.alarms
+        assert len(score.outcomes) >= 1
+    assert believing.alarms
+    assert loaded.warnings > 0.5
+    assert coarse.warnings == 0.0
+    detection = table("Detection", driven(coarse, loaded))
+    assert [row[0] for row in detection.rows] == [COARSE, LOADED]
+
+
+@pytest.mark.slow
+def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_report_is_counted() -> None:
+    """0.9 kg are 9 N at the tool, which nobody overlooks."""
+    drive = Drive(CONFIGURATION, STATED, 3402, 14.0, "masses")
+    score = score_of(drive)
+    assert not score.failure
+    (carried,), (outcome,) = score.masses, score.outcomes
+    assert carried.mass > 0.8
+    assert carried.detected
+    assert outcome.kind == "picking up"
+    drives = [*driven(score), *driven(score, contacts="masses")]
+    masses = table("Picking up", drives).rows[-1]
+    assert masses[0] == "all"
+    assert "(1)" in masses[1]
+    assert "picking up" in [row[0] for row in table("By kind", drives).rows]
+
+
+def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_reason_or_warning() -> None:
+    estimator = ContactEstimator(WAM, CONFIGURATION.shared.timing, OWN, CONFIGURATION.shared.model)
+    nothing = estimator.estimate()
+    link = Hypothesis("outer_link", 0.3, *[0.0] * 4, (0.0,) * 3, 0.0, False, 0.0, 0.0, (0.0,) * 3, 0.0, "", 0)
+    assert payload_probability(nothing) == 0.0
+    assert not names_payload(nothing)
+    assert payload_probability(nothing._replace(hypotheses=(link,))) == pytest.approx(0.7)
+    assert payload_probability(nothing._replace(hypotheses=(link._replace(cover="payload"),))) == 1.0
+    assert not names_payload(nothing._replace(hypotheses=(link,)))
+    assert names_payload(nothing._replace(hypotheses=(link._replace(reason="a payload may explain it"),)))
+    assert names_payload(nothing._replace(warning="the model is off: payload 0.3 kg"))
+
+
+@pytest.mark.slow
+def test_an_arm_is_identified_from_signals_with_the_degradation_of_its_own() -> None:
+    exact = drawn("as stated", WAM, np.random.default_rng(3401))
+    scaled = exact._replace(torque_scale=(1.1,), delay=1, dropped=0.02)
+    configured = CONFIGURATION.with_values(dict(exact.plant))
+    levels = [
+        np.array(dict(_identified(configured, one, 3401))["model.motors.coulomb_positive"]) for one in (exact, scaled)
+    ]
+    assert levels[1] / levels[0] == pytest.approx([1.1] * 4, abs=0.02), "friction in units of the assumed constants"
+
+
+def test_measured_torques_are_late_and_some_samples_do_not_arrive() -> None:
+    signals = MeasuredSignals(scale=(2.0,), delay=3, dropped=0.5)
+    torque, arrives = signals.of(np.arange(1.0, 2001.0)[:, None], np.random.default_rng(1))
+    assert torque[:5, 0].tolist() == [0.0, 0.0, 0.0, 2.0, 4.0]
+    assert 900 < arrives.sum() < 1100

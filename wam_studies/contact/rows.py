@@ -1,0 +1,304 @@
+"""The rows of contact estimation, with what is required of them: the same for the arm as stated and for others."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Final, NamedTuple
+
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_studies.contact.contacts import EvaluatedContact
+from wam_studies.contact.free_motion import ContactFreeTime, TorqueErrors
+from wam_studies.contact.replay import TouchOutcome
+from wam_studies.contact.scenarios import KINDS, RANGES
+from wam_studies.scores import ANY, NONE_AT_ALL, Bound, Interval, Row, events, quantile, rms, share
+
+IN_MOTION = ("moving", "free")
+DITHERED = "at rest, dithered"
+
+
+EstimatedContact = EvaluatedContact | TouchOutcome
+Contacts = Sequence[EstimatedContact]
+Allowed = tuple[Bound, Bound]  # required and target values
+FREE: Final[Allowed] = (ANY, ANY)
+
+
+def _up_to(required: float, target: float) -> Allowed:
+    return (0.0, required), (0.0, target)
+
+
+def _from(required: float, target: float) -> Allowed:
+    return (required, 1.0), (target, 1.0)
+
+
+@dataclass(frozen=True)
+class ContactLimits:
+    """What counts as a row, and what is required of it.
+
+    The limits of positions are by force, N, in m; those of torques by joint, N m, by name of the arm.
+    """
+
+    near: float = 0.2  # of a force: 5 N are 4 to 6 N
+    small_sd: float = 0.02  # m
+    sure: float = 0.95  # probability of a link
+    rough_force: tuple[float, float] = (12.0, 28.0)  # N, of contacts with the greatest friction
+    quiet: tuple[float, float] = (120.0, 600.0)  # s that show no false alarm, required and target
+    in_time: Mapping[float, Allowed] = field(default_factory=dict)  # share of 5 N detected within s
+    median: Mapping[float, Allowed] = field(default_factory=dict)  # error of the position
+    largest: Mapping[float, Allowed] = field(default_factory=dict)  # 95 % quantile of it
+    small: Allowed = FREE  # share of contacts with a small sd
+    median_of_small: Allowed = FREE  # error of these
+    largest_of_small: Allowed = FREE
+    wrong: Allowed = FREE  # share of wrong links
+    wrong_and_sure: Allowed = FREE  # of those with a probability above `sure`
+    covered: Allowed = FREE  # share of the 90 % sets that contain the truth
+    covered_rough: Allowed = FREE  # at 20 N with the greatest friction
+
+
+STATED = ContactLimits(
+    in_time={0.06: ((0.95, 1.0), ANY), 0.03: (ANY, (0.99, 1.0))},
+    median={5.0: _up_to(0.03, 0.02), 10.0: _up_to(0.02, 0.01), 20.0: _up_to(0.013, 0.008)},
+    small=(ANY, (0.5, 1.0)),
+    median_of_small=((0.0, 0.01), ANY),
+    largest_of_small=((0.0, 0.035), ANY),
+    wrong=_up_to(0.05, 0.02),
+    wrong_and_sure=_up_to(0.01, 0.003),
+    covered=((0.85, 0.97), ANY),
+    covered_rough=(ANY, (0.85, 0.97)),
+)
+IDENTIFIED_MIX = ContactLimits(
+    in_time={0.03: _from(0.97, 0.99)},
+    median={5.0: _up_to(0.018, 0.008), 10.0: _up_to(0.012, 0.005), 20.0: _up_to(0.008, 0.004)},
+    largest={5.0: _up_to(0.07, 0.04), 10.0: _up_to(0.05, 0.03), 20.0: _up_to(0.03, 0.02)},
+    small=_from(0.45, 0.7),
+)
+EVERY_ARM = ContactLimits(wrong_and_sure=_up_to(0.01, 0.003), covered_rough=_from(0.85, 0.88))
+TORQUES = {"wam": ((0.25, 0.35, 0.15, 0.12), (0.10, 0.15, 0.06, 0.05))}  # N m, required and target of each joint
+
+
+def percent(name: str, found: Interval, allowed: Allowed = FREE) -> Row:
+    """A share in percent."""
+    return Row(name, found, "%", 100.0, *allowed)
+
+
+def centimetres(name: str, found: Interval, allowed: Allowed = FREE) -> Row:
+    """An error of a position."""
+    return Row(name, found, "cm", 100.0, *allowed)
+
+
+def share_of(hits: Sequence[bool]) -> Interval:
+    """The share of hits."""
+    return share(sum(hits), len(hits))
+
+
+def near(found: Contacts, force: float) -> list[EstimatedContact]:
+    """Contacts of about this force, N."""
+    return [one for one in found if abs(one.force - force) <= STATED.near * force]
+
+
+def detected_within(found: Contacts, seconds: float, or_before: bool = False) -> Interval:
+    """Contacts detected in time; of those that began in a detection, whether they count."""
+    times = [one.latency for one in found if or_before or not math.isnan(one.latency)]
+    return share_of([math.isnan(time) or time <= seconds + 1e-9 for time in times])
+
+
+def error_of(found: Contacts, level: float = 0.5) -> Interval:
+    """A quantile of the position error, m."""
+    return quantile([abs(one.error) for one in found], level)
+
+
+def small_sd(found: Contacts) -> list[EstimatedContact]:
+    """Contacts with a small standard deviation of the position."""
+    return [one for one in found if one.position_sd < STATED.small_sd]
+
+
+def wrong_link(found: Contacts, least: float = 0.0) -> Interval:
+    """Wrong links of detected contacts with at least a probability."""
+    return share_of([not one.right_link for one in found if one.detected and one.probability >= least])
+
+
+def covered(found: Contacts) -> Interval:
+    """Detected contacts whose position is in the 90 % set."""
+    return share_of([one.in_set for one in found if one.detected])
+
+
+def detected(found: Contacts) -> Interval:
+    """Contacts that are detected in the end."""
+    return share_of([one.detected for one in found])
+
+
+def rough(found: Contacts) -> list[EstimatedContact]:
+    """Strong contacts with the greatest friction."""
+    low, high = STATED.rough_force
+    return [one for one in found if abs(one.friction - RANGES.rough) < 1e-9 and low <= one.force <= high]
+
+
+def z_scores(found: Contacts) -> list[float]:
+    """Error over reported standard deviation of every estimated position."""
+    return [
+        one.error / one.position_sd
+        for one in found
+        if one.right_link and math.isfinite(one.error) and one.position_sd > 0.0
+    ]
+
+
+def position_rows(links: str, limits: ContactLimits, found: Contacts) -> Iterator[Row]:
+    """Detection and position of contacts on links along which it can be measured."""
+    for seconds, allowed in limits.in_time.items():
+        name = f"5 N on the {links} detected within {1e3 * seconds:.0f} ms"
+        yield percent(name, detected_within(near(found, 5.0), seconds), allowed)
+    for force, allowed in limits.median.items():
+        name = f"position on the {links} at {force:.0f} N, median error"
+        yield centimetres(name, error_of(near(found, force)), allowed)
+    for force, allowed in limits.largest.items():
+        name = f"position on the {links} at {force:.0f} N, 95 % quantile of the error"
+        yield centimetres(name, error_of(near(found, force), 0.95), allowed)
+    small, name = small_sd(found), "position with a reported sd below 2 cm"
+    if limits.median_of_small != FREE:
+        yield centimetres(f"{name}, median error", error_of(small), limits.median_of_small)
+        yield centimetres(f"{name}, 95 % quantile of the error", error_of(small, 0.95), limits.largest_of_small)
+    yield percent("contacts with a reported sd below 2 cm", share(len(small), len(found)), limits.small)
+
+
+def link_rows(limits: ContactLimits, found: Contacts) -> Iterator[Row]:
+    """Links and 90 % sets of all contacts."""
+    yield percent("wrong link", wrong_link(found), limits.wrong)
+    yield percent("wrong link with a probability above 0.95", wrong_link(found, limits.sure), limits.wrong_and_sure)
+    yield percent("90 % set contains the truth", covered(found), limits.covered)
+    yield percent("90 % set contains the truth at 20 N, mu 0.8", covered(rough(found)), limits.covered_rough)
+
+
+class ScenarioScore(NamedTuple):
+    """Contribution of one scenario; `not_made` counts the planned contacts that did not happen."""
+
+    name: str
+    contacts: list[EvaluatedContact]
+    excluded: int
+    not_made: int
+    torque_errors: TorqueErrors
+    contact_free: ContactFreeTime
+    failure: str
+
+
+Scenarios = Sequence[ScenarioScore]
+
+
+def contacts_of(scores: Scenarios, group: str = "moving") -> list[EvaluatedContact]:
+    """Contacts of a group; in motion, those during which the arm moved at the start and at the evaluation."""
+    every = [contact for scenario in scores for contact in scenario.contacts if contact.group == group]
+    return [contact for contact in every if group != "moving" or (contact.moving and contact.began_moving)]
+
+
+@cache
+def outer_covers(arm: Arm) -> tuple[str, ...]:
+    """The covers along which a position can be measured: not all joint axes meet at their start."""
+    body, covers = RigidBody(arm), arm.covers
+    found = (name for name in covers.names if body.moves(name, (0.0, *covers.aside(name, 0.0))))
+    return tuple(found) or covers.names[-1:]
+
+
+def outer_links(arm: Arm) -> str:
+    """These in words."""
+    return " or ".join(outer_covers(arm)).replace("_", " ")
+
+
+def on_outer_link(scores: Scenarios, arm: Arm, group: str = "moving") -> list[EvaluatedContact]:
+    """Contacts of a group on the covers along which a position can be measured."""
+    return [contact for contact in contacts_of(scores, group) if contact.cover in outer_covers(arm)]
+
+
+def stated_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
+    """What is required on the arm as the estimator's model states it."""
+    limits = TORQUES.get(arm.name, ((math.inf,) * len(arm.joints.names),) * 2)
+    for when, groups, state in (("in motion", IN_MOTION, "moving"), (DITHERED, ("dither",), "still")):
+        for row, *ends in zip(torque_rows(scores, arm, when, groups, state), *limits, strict=True):
+            required, target = ((0.0, end) if math.isfinite(end) else ANY for end in ends)
+            yield row._replace(required=required, target=target)
+    name = "false alarms in free motion with stops"
+    yield Row(name, _alarms(scores, True), "", 1.0, NONE_AT_ALL, NONE_AT_ALL, STATED.quiet)
+    yield from position_rows(outer_links(arm), STATED, on_outer_link(scores, arm))
+    yield from link_rows(STATED, contacts_of(scores))
+
+
+def further_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
+    """What is not required of it."""
+    links, outer, moving = outer_links(arm), on_outer_link(scores, arm), contacts_of(scores)
+    inner = [one for one in moving if one.cover not in outer_covers(arm) and one.right_link]
+    named = " or ".join(name for name in arm.covers.names if name not in outer_covers(arm)).replace("_", " ")
+    sure = share_of([one.probability > STATED.sure for one in moving if one.detected])
+    moments = quantile([one.moment_error / one.moment for one in inner], 0.5)
+    yield percent(f"90 % set contains the truth, {links}", covered(outer))
+    yield percent("link identified with a probability above 0.95", sure)
+    yield percent(f"{named}: relative error of the moment, median", moments)
+    bound = share_of([one.least_force <= one.force for one in inner])
+    yield percent(f"{named}: true force is at least the reported bound", bound)
+    ratios = quantile([abs(z) for z in z_scores(outer)], 0.683)
+    yield Row("position: 68 % quantile of error over reported sd", ratios)
+    yield Row("torque: rms of error over reported sd, in motion", _torque_z(scores))
+    yield Row("false alarms between contacts", _alarms(scores, False))
+    for when, groups, state in (("while every motor slides", IN_MOTION, "sliding"), ("at rest", ("rest",), "still")):
+        yield from torque_rows(scores, arm, when, groups, state)
+    for group, when in (("rest", "at rest"), ("dither", DITHERED)):
+        resting = on_outer_link(scores, arm, group)
+        for force in RANGES.levels:
+            name, own = f"{force:.0f} N on the {links}", near(resting, force)
+            yield percent(f"{name} detected {when}", detected(own))
+            yield centimetres(f"position, {name} {when}, median error", error_of(own))
+        yield percent(f"90 % set contains the truth {when}", covered(contacts_of(scores, group)))
+    for kind in KINDS:
+        own = [one for one in outer if one.kind == kind]
+        yield centimetres(f"position on the {links}, {kind}, median error", error_of(own))
+
+
+def torque_rows(scores: Scenarios, arm: Arm, when: str, groups: Sequence[str], state: str) -> Iterator[Row]:
+    """Errors of the external torque of each joint in some groups; `state` is 'moving', 'still' or 'sliding'."""
+    parts = [scenario.torque_errors for scenario in scores if scenario.torque_errors.group in groups]
+    counts: list[int] = [getattr(part, f"{state}_count") for part in parts]
+    for i, name in enumerate(arm.joints.names):
+        found = rms([getattr(part, state)[i] for part in parts], counts)
+        yield Row(f"external torque {when}, rms, {name}", found, "N m")
+
+
+def _alarms(scores: Scenarios, is_free_motion: bool) -> Interval:
+    """False alarms in scenarios of free motion, or between the contacts of all others."""
+    parts = [scenario.contact_free for scenario in scores]
+    chosen = [part for part in parts if (part.group == "free") is is_free_motion]
+    return events(sum(part.alarms for part in chosen), sum(part.seconds for part in chosen))
+
+
+def _torque_z(scores: Scenarios) -> Interval:
+    parts = [scenario.torque_errors for scenario in scores if scenario.torque_errors.group in IN_MOTION]
+    joints = len(parts[0].moving_z) if parts else 1
+    return rms([sum(part.moving_z) for part in parts], [joints * part.moving_count for part in parts])
+
+
+class ScoreColumn(NamedTuple):
+    """A column of a table by degradation: its head, and its text for the contacts of one."""
+
+    head: str
+    of: Callable[[Contacts], str]
+
+
+def _cell(found: Interval) -> str:
+    return f"{100.0 * found.value:.0f} ({found.observed})" if found.observed else "none"
+
+
+def _lengths(values: Sequence[Interval]) -> str:
+    return " / ".join("-" if math.isnan(one.value) else f"{100.0 * one.value:.1f}" for one in values)
+
+
+COLUMNS = (
+    ScoreColumn("5 N within 30 ms, %", lambda found: _cell(detected_within(near(found, 5.0), 0.03))),
+    ScoreColumn(
+        "median 5/10/20 N, cm", lambda found: _lengths([error_of(near(found, force)) for force in RANGES.levels])
+    ),
+    ScoreColumn("95 %", lambda found: _lengths([error_of(near(found, force), 0.95) for force in RANGES.levels])),
+    ScoreColumn("sd < 2 cm, %", lambda found: _cell(share(len(small_sd(found)), len(found)))),
+)
+LINK_COLUMNS = (
+    ScoreColumn("wrong link, %", lambda found: _cell(wrong_link(found))),
+    ScoreColumn("wrong, p > .95, %", lambda found: _cell(wrong_link(found, STATED.sure))),
+    ScoreColumn("90 % set contains the truth, %", lambda found: _cell(covered(found))),
+    ScoreColumn("detected in the end, %", lambda found: _cell(detected_within(found, 1e9, True))),
+)
