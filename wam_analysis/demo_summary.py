@@ -333,7 +333,7 @@ def _loop(run: RecordedRun) -> LoopReport:
         status.facts
         for array in messages_of(run.bag, "/diagnostics")
         for status in map(status_of, array.status)
-        if status.node in ("driver", diagnosed_name(run.namespace, "driver"))  # the first in bags of old
+        if status.node == diagnosed_name(run.namespace, "driver")
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
     mode = "realtime" if run.mode == "unknown" and timed else run.mode

@@ -199,7 +199,7 @@ class MostProbable(NamedTuple):
 
 
 def most_probable(run: RecordedRun) -> MostProbable | None:
-    """The hypotheses of a run; None if there are none, or they are those of the first edition, which are others."""
+    """The hypotheses of a run; None without a table of hypotheses."""
     columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
     if not isinstance(columns, TableColumns) or not len(columns.message):
         return None

@@ -105,10 +105,10 @@ def _used(run: RecordedRun) -> tuple[NDArray[np.int64], NDArray[np.float64]] | N
     columns = run.bag.topics.get(f"{run.namespace}/force_axis")
     if not isinstance(columns, TableColumns) or not len(columns.row_stamp_ns):
         return None
-    position = "position" if "position" in columns.columns else "place"  # its name in older recordings
-    if not {position, "position_sd"} <= set(columns.columns):
+    names = "position", "position_sd"
+    if not set(names) <= set(columns.columns):
         return None
-    return columns.row_stamp_ns, np.column_stack([columns.columns[name] for name in (position, "position_sd")])
+    return columns.row_stamp_ns, np.column_stack([columns.columns[name] for name in names])
 
 
 def _at(stamps: NDArray[np.int64], of: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:

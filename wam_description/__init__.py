@@ -3,7 +3,6 @@
 - constants: every number of the arm and the testbed, as printed or assumed
 - units: conversion to SI; number_text: numbers as messages write them
 - parameters: parameter classes with unit, range and meaning, and their checks
-- parameter_history: what parameters were in earlier versions, for old recordings
 - configuration, yaml_text: parameter files, which may build on one another
 - arm: parameters that every node shares; parts: those of motors, joints and links
 - model: what the controllers know of the arm, where it is not the arm's own parameters

@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
-from wam_description.parameters import lengths, one_each, parameter, require, tunable
+from wam_description.parameters import lengths, parameter, require, tunable
 from wam_description.parts import Joints, Links, Motors, distinct
 from wam_description.units import STANDARD_GRAVITY
 
@@ -96,7 +96,6 @@ class Arm:
     )
     payload: float = parameter(
         "mass carried at the tool, known to all nodes and part of the simulated arm", "kg", low=0.0, high=50.0,
-        before=0.0,
     )  # fmt: skip
     gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0)
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
@@ -258,7 +257,6 @@ class Timing:
         "least, or 0: as fast as it can",
         low=0.0,
         high=100.0,
-        before=0.0,
     )
     dither_cycle: int = parameter(
         "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
@@ -270,7 +268,6 @@ class Timing:
         "but the recorder is one less; 0: not requested; interrupts have 50",
         low=0,
         high=49,
-        before=0,
     )
 
     def __post_init__(self) -> None:
@@ -331,11 +328,9 @@ class InputAges:
         "s",
         low=0.002,
         high=1.0,
-        before=0.1,
     )
     command: float = parameter(
         "age from which a command of a program is absent: force, posture, joint torque", "s", low=0.002, high=1.0,
-        before=0.2,
     )  # fmt: skip
 
     def limit_ns(self, kind: str) -> int:
@@ -347,20 +342,14 @@ class InputAges:
 class MotionParameters:
     """Limits of motions that are planned: trajectories of the joints, and straight lines of the tool."""
 
-    joint_speed: tuple[float, ...] = parameter(
-        "largest speed of each joint", "rad/s", low=1e-3, high=100.0, before=one_each("arm.joints.names", 1.2)
-    )
+    joint_speed: tuple[float, ...] = parameter("largest speed of each joint", "rad/s", low=1e-3, high=100.0)
     joint_acceleration: tuple[float, ...] = parameter(
-        "largest acceleration of each joint", "rad/s^2", low=1e-3, high=1e4, before=one_each("arm.joints.names", 4.0)
+        "largest acceleration of each joint", "rad/s^2", low=1e-3, high=1e4
     )
-    joint_jerk: tuple[float, ...] = parameter(
-        "largest jerk of each joint", "rad/s^3", low=1e-3, high=1e6, before=one_each("arm.joints.names", 40.0)
-    )
-    speed: float = parameter("largest speed of the tool on a line", "m/s", low=1e-3, high=10.0, before=0.4)
-    acceleration: float = parameter(
-        "largest acceleration of the tool on a line", "m/s^2", low=1e-3, high=100.0, before=1.0
-    )
-    jerk: float = parameter("largest jerk of the tool on a line", "m/s^3", low=1e-3, high=1e4, before=10.0)
+    joint_jerk: tuple[float, ...] = parameter("largest jerk of each joint", "rad/s^3", low=1e-3, high=1e6)
+    speed: float = parameter("largest speed of the tool on a line", "m/s", low=1e-3, high=10.0)
+    acceleration: float = parameter("largest acceleration of the tool on a line", "m/s^2", low=1e-3, high=100.0)
+    jerk: float = parameter("largest jerk of the tool on a line", "m/s^3", low=1e-3, high=1e4)
 
 
 @dataclass(frozen=True)
@@ -373,11 +362,9 @@ class Shared:
     servo: Servo
     motion: MotionParameters
     model: ArmModel
-    disturbance_force_limit: float = parameter(
-        "largest force of a push of sim/disturbance", "N", low=0.0, high=1e4, before=1e4
-    )
+    disturbance_force_limit: float = parameter("largest force of a push of sim/disturbance", "N", low=0.0, high=1e4)
     disturbance_torque_limit: float = parameter(
-        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4, before=1e4
+        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4
     )
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")
 

@@ -40,14 +40,12 @@ class Effects:
         "rad",
         low=0.0,
         high=10.0,
-        before=(0.0,),
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     pretension_share: tuple[float, ...] = tunable(
         "active pretension (6.5): part of arm.cables.pretension to which cables are tightened, one for all or one "
         "each; it changes at once",
         high=10.0,
-        before=(1.0,),
     )
     tension_friction: tuple[float, ...] = parameter(
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
@@ -58,7 +56,6 @@ class Effects:
     included_in_friction: bool = parameter(
         "true if the friction of arm.motors is a measured breakaway torque, of which friction by tension and ripples "
         "of the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
-        before=False,
     )
     added_coulomb_friction: tuple[float, ...] = tunable(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0

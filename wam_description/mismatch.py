@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, one_each, parameter
+from wam_description.parameters import lengths, parameter
 from wam_description.parts import Joints, Links, Motors
 
 Shafts = TypeVar("Shafts", Motors, Joints)
@@ -23,9 +23,7 @@ class ModelMismatch:
     joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", low=0.0, high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
     payload: float = parameter("unmodelled payload at the tool, besides arm.payload", "kg", low=0.0, high=100.0)
-    torque_constant: tuple[float, ...] = parameter(
-        "factor on the torque of each motor per current", low=0.1, high=10.0, before=one_each("arm.motors.names", 1.0)
-    )
+    torque_constant: tuple[float, ...] = parameter("factor on the torque of each motor per current", low=0.1, high=10.0)
 
 
 def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:

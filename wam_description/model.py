@@ -8,7 +8,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Final
 
-from wam_description.parameters import lengths, like, one_each, parameter, require
+from wam_description.parameters import lengths, like, parameter, require
 from wam_description.parts import Joints, Links, Motors
 
 FROM_ARM: Final = "arm"  # source of a model that was not identified
@@ -45,18 +45,13 @@ class MotorModel:
     )
     static_negative: tuple[float, ...] = like(Motors, "arm.motors.static_friction", "the same in negative motion")
     viscous: tuple[float, ...] = like(Motors, "arm.motors.viscous_friction", "viscous friction b")
-    stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.motors.names", 0.5)
-    )
+    stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
     load_positive: tuple[float, ...] = parameter(
         "friction k per transmitted torque, in positive motion",
         low=0.0,
         high=0.9,
-        before=one_each("arm.motors.names", 0.0),
     )
-    load_negative: tuple[float, ...] = parameter(
-        "the same in negative motion", low=0.0, high=0.9, before=one_each("arm.motors.names", 0.0)
-    )
+    load_negative: tuple[float, ...] = parameter("the same in negative motion", low=0.0, high=0.9)
 
 
 @dataclass(frozen=True)
@@ -71,12 +66,8 @@ class JointModel:
     )
     static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")
-    stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.joints.names", 0.02)
-    )
-    load: tuple[float, ...] = parameter(
-        "friction k per transmitted torque", low=0.0, high=0.9, before=one_each("arm.joints.names", 0.0)
-    )
+    stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
+    load: tuple[float, ...] = parameter("friction k per transmitted torque", low=0.0, high=0.9)
 
 
 @dataclass(frozen=True)
@@ -84,11 +75,9 @@ class ModelCovariance:
     """Covariance of what was identified."""
 
     parameters: tuple[str, ...] = parameter(
-        "identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified", before=(UNKNOWN,)
+        "identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified"
     )
-    values: tuple[float, ...] = parameter(
-        "their covariance, row by row", "products of their units", low=-1e9, high=1e9, before=(0.0,)
-    )
+    values: tuple[float, ...] = parameter("their covariance, row by row", "products of their units", low=-1e9, high=1e9)
 
     def __post_init__(self) -> None:
         count = len(self.parameters)
@@ -108,7 +97,7 @@ class ArmModel:
     motors: MotorModel
     joints: JointModel
     covariance: ModelCovariance
-    source: str = parameter("recording that the values were identified from; arm: those of arm", before=FROM_ARM)
+    source: str = parameter("recording that the values were identified from; arm: those of arm")
 
     def __post_init__(self) -> None:
         n = len(self.motors.inertia)

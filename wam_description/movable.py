@@ -13,42 +13,37 @@ BODY_SHAPES = {"box": 3, "cylinder": 2, "ball": 1}  # numbers that the size of e
 class FreeBodies:
     """Rigid bodies that lie, slide, roll and tip; they touch covers, obstacles, doors and each other."""
 
-    names: tuple[str, ...] = parameter("names of the free bodies", before=())
-    shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(BODY_SHAPES), before=())
+    names: tuple[str, ...] = parameter("names of the free bodies")
+    shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(BODY_SHAPES))
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; ball radius, 0, 0",
         "m",
         low=0.0,
         high=10.0,
-        before=(),
     )
     positions: tuple[float, ...] = parameter(
-        "centre at power-up in the base frame, x y z of each", "m", low=-100.0, high=100.0, before=()
+        "centre at power-up in the base frame, x y z of each", "m", low=-100.0, high=100.0
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3, before=()
+        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3
     )
-    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", low=0.0, high=1e3, before=())
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0, before=())
+    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", low=0.0, high=1e3)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
     ground_friction: tuple[float, ...] = parameter(
         "coefficient of friction against obstacles, doors and other bodies; of two bodies the larger one counts",
         low=0.0,
         high=10.0,
-        before=(),
     )
     ground_stiffness: tuple[float, ...] = parameter(
         "stiffness of each point of contact with obstacles, doors and other bodies; a box lies on four",
         "N/m",
         low=1.0,
         high=1e9,
-        before=(),
     )
-    ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", low=0.0, high=1e6, before=())
-    stiffness: tuple[float, ...] = parameter(
-        "k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9, before=()
-    )
+    ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", low=0.0, high=1e6)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
     damping: tuple[float, ...] = parameter(
-        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6, before=()
+        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6
     )
 
     def __post_init__(self) -> None:
@@ -72,35 +67,30 @@ class Doors:
     The hinge turns about z of a frame at `positions`; at angle 0 the panel reaches along x from there.
     """
 
-    names: tuple[str, ...] = parameter("names of the doors", before=())
+    names: tuple[str, ...] = parameter("names of the doors")
     positions: tuple[float, ...] = parameter(
-        "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0, before=()
+        "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", low=-6.3, high=6.3, before=()
+        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", low=-6.3, high=6.3
     )
     sizes: tuple[float, ...] = parameter(
         "three half lengths each: along the panel from the hinge, across it, along the hinge",
         "m",
         low=0.0,
         high=10.0,
-        before=(),
     )
-    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no door", "kg", low=0.0, high=1e3, before=())
-    hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", low=0.0, high=1e3, before=())
-    hinge_damping: tuple[float, ...] = parameter(
-        "viscous friction of the hinge", "N m s/rad", low=0.0, high=1e4, before=()
-    )
-    spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", low=0.0, high=1e5, before=())
-    rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3, before=())
-    lower: tuple[float, ...] = parameter("smallest angle", "rad", low=-6.3, high=6.3, before=())
-    upper: tuple[float, ...] = parameter("largest angle", "rad", low=-6.3, high=6.3, before=())
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0, before=())
-    stiffness: tuple[float, ...] = parameter(
-        "k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9, before=()
-    )
+    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no door", "kg", low=0.0, high=1e3)
+    hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", low=0.0, high=1e3)
+    hinge_damping: tuple[float, ...] = parameter("viscous friction of the hinge", "N m s/rad", low=0.0, high=1e4)
+    spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", low=0.0, high=1e5)
+    rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3)
+    lower: tuple[float, ...] = parameter("smallest angle", "rad", low=-6.3, high=6.3)
+    upper: tuple[float, ...] = parameter("largest angle", "rad", low=-6.3, high=6.3)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
     damping: tuple[float, ...] = parameter(
-        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6, before=()
+        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6
     )
 
     def __post_init__(self) -> None:
@@ -127,12 +117,12 @@ class Motions:
     The amplitude grows smoothly during the first quarter of a period, so that nothing is hit by a velocity that jumps.
     """
 
-    obstacles: tuple[str, ...] = parameter("obstacles that move", before=())
+    obstacles: tuple[str, ...] = parameter("obstacles that move")
     amplitude: tuple[float, ...] = parameter(
-        "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0, before=()
+        "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0
     )
-    frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", low=0.0, high=100.0, before=())
-    begin: tuple[float, ...] = parameter("start, since power-up", "s", low=0.0, high=1e6, before=())
+    frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", low=0.0, high=100.0)
+    begin: tuple[float, ...] = parameter("start, since power-up", "s", low=0.0, high=1e6)
 
     def __post_init__(self) -> None:
         _aligned("world.motions", self.obstacles, vars(self), ("amplitude",), "obstacles")

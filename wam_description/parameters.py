@@ -34,7 +34,6 @@ class Field(NamedTuple):
     high: float
     choices: tuple[str, ...]
     live: bool
-    before: Value | Callable[[Mapping[str, Any]], Value] | None
     length: int
     derived: Callable[[Mapping[str, Any]], Value] | None
 
@@ -59,7 +58,6 @@ def parameter(
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     live: bool = False,
-    before: Value | Callable[[Mapping[str, Any]], Value] | None = None,
     length: int = 0,
     derived: Callable[[Mapping[str, Any]], Value] | None = None,
 ) -> Any:
@@ -72,23 +70,21 @@ def parameter(
     low, high : inclusive range of each number.
     choices : allowed strings.
     live : True if a running node may take a new value.
-    before : the value that a recording without this parameter had in effect, or a function of the node's
-        other parameters, see `one_each`.  Only recordings may lack a parameter; a configuration has to give it.
     length : of a list, the number of values that it must have, 0 where that is checked elsewhere.
     derived : the value where a configuration does not give one, a function of the other parameters of its section,
-        see `like`; recordings without the parameter had the same value.
+        see `like`.
     """
     return dataclasses.field(
         metadata={
             "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live,
-            "before": derived if before is None else before, "length": length, "derived": derived,
+            "length": length, "derived": derived,
         }
     )  # fmt: skip
 
 
-def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9, before: Any = None) -> Any:
+def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9) -> Any:
     """Declare numbers that a running node may change, not negative unless `low` is given; as `parameter` else."""
-    return parameter(doc, unit, low, high, live=True, before=before)
+    return parameter(doc, unit, low, high, live=True)
 
 
 def like(cls: type, name: str, doc: str = "") -> Any:
@@ -101,19 +97,7 @@ def like(cls: type, name: str, doc: str = "") -> Any:
     doc : what the field is, where that is another sentence.
     """
     other = next(field for field in fields(cls) if field.name == name.rpartition(".")[2])
-
-    def value(others: Mapping[str, Any]) -> Value:
-        if name in others or other.before is None:
-            found: Value = others[name]
-            return found
-        return other.before(others) if callable(other.before) else other.before
-
-    return parameter(doc or other.doc, other.unit, other.low, other.high, derived=value)
-
-
-def one_each(names: str, value: bool | int | float | str) -> Callable[[Mapping[str, Any]], Value]:
-    """The same value for each of some names, as ``before=one_each("arm.joints.names", 0.0)``."""
-    return lambda others: (value,) * len(others[names])
+    return parameter(doc or other.doc, other.unit, other.low, other.high, derived=lambda others: others[name])
 
 
 _FIELDS: dict[type, tuple[Field, ...]] = {}

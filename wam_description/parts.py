@@ -1,8 +1,7 @@
 """The moving parts of an arm as parameters: motors, joints and links, each in the order of the `names` of its group."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +9,6 @@ from numpy.typing import NDArray
 from wam_description.parameters import lengths, parameter, require
 
 ROUNDED = 1e-6  # of an inertia, by which it may be rounded
-
-
-def _no_products(others: Mapping[str, Any]) -> tuple[float, ...]:
-    return (0.0,) * (3 * len(others["arm.links.names"]))
 
 
 def distinct(group: str, names: tuple[str, ...]) -> None:
@@ -117,7 +112,6 @@ class Links:
         "kg m^2",
         low=-100.0,
         high=100.0,
-        before=_no_products,
     )
 
     def __post_init__(self) -> None:

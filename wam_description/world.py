@@ -134,15 +134,14 @@ class Pushers:
 class Folding:
     """Contact between the tubes of links that follow each other, as of a folded elbow."""
 
-    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", low=0.0, high=1e9, before=0.0)
-    damping: float = parameter("damping", "N s/m", low=0.0, high=1e6, before=0.0)
-    friction: float = parameter("friction coefficient", low=0.0, high=10.0, before=0.0)
+    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", low=0.0, high=1e9)
+    damping: float = parameter("damping", "N s/m", low=0.0, high=1e6)
+    friction: float = parameter("friction coefficient", low=0.0, high=10.0)
     clearance: float = parameter(
         "length of the outer tube from the joint on that touches nothing: near it the tubes overlap",
         "m",
         low=0.0,
         high=10.0,
-        before=0.0,
     )
 
 

@@ -43,14 +43,12 @@ class DriverParameters:
         "part of the newest 2000 periods that may be late when the brakes are released, in realtime",
         low=0.0,
         high=1.0,
-        before=1.0,
     )
     brake_torque: float = parameter(
         "torque at which the brake of a rotor slips, so that it stops a moving arm without breaking a cable",
         "N m",
         low=0.1,
         high=1e3,
-        before=1e3,
     )
     cover_speed_limit: float = parameter(
         "speed of the start of a cover, where it meets the link before, above which there is a fault",

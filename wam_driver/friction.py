@@ -145,36 +145,31 @@ class FrictionParameters:
     law: str = parameter(
         "how static becomes dynamic friction; coulomb_stiction: as soon as the shaft moves; stribeck: over a velocity",
         choices=tuple(LAWS),
-        before="coulomb_stiction",
     )
     motor_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, high=1e3, before=(1.0,)
+        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, high=1e3
     )
     joint_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, high=1e3, before=(1.0,)
+        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, high=1e3
     )
-    stribeck_exponent: float = parameter("delta of exp(-(v/v_s)^delta) (law stribeck)", low=0.1, high=10.0, before=2.0)
+    stribeck_exponent: float = parameter("delta of exp(-(v/v_s)^delta) (law stribeck)", low=0.1, high=10.0)
     motor_asymmetry: tuple[float, ...] = parameter(
         "a of each motor: friction is 1 + a times as large in positive and 1 - a in negative motion",
         low=-0.9,
         high=0.9,
-        before=(0.0,),
     )
-    joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9, before=(0.0,))
+    joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9)
     motor_load_factor: tuple[float, ...] = parameter(
-        "friction of each motor per torque that the cables transmit to it", low=0.0, high=0.9, before=(0.0,)
+        "friction of each motor per torque that the cables transmit to it", low=0.0, high=0.9
     )
-    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", low=0.0, high=0.9, before=(0.0,))
+    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", low=0.0, high=0.9)
     motor_presliding_stiffness: tuple[float, ...] = parameter(
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
         low=0.0,
         high=1e9,
-        before=(0.0,),
     )
-    joint_presliding_stiffness: tuple[float, ...] = parameter(
-        "the same of each joint", "N m/rad", low=0.0, high=1e9, before=(0.0,)
-    )
+    joint_presliding_stiffness: tuple[float, ...] = parameter("the same of each joint", "N m/rad", low=0.0, high=1e9)
 
 
 COULOMB_STICTION = FrictionParameters(

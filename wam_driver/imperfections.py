@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import one_each, parameter
+from wam_description.parameters import parameter
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,6 @@ class AmplifierParameters:
         "N m",
         low=-100.0,
         high=100.0,
-        before=one_each("arm.motors.names", 0.0),
     )
 
 
@@ -41,7 +40,6 @@ class SensorParameters:
         "rad",
         low=0.0,
         high=1.0,
-        before=(0.0,),
     )
     joint_encoder_noise: tuple[float, ...] = parameter(
         "standard deviation of the joint angle", "rad", low=0.0, high=1.0

@@ -16,7 +16,7 @@ class RecorderParameters:
     directory: str = parameter("directory of the bag; created if it is missing")
     name: str = parameter("name of the bag, a new directory; empty: arm, date and time of the start")
     topics: tuple[str, ...] = parameter("recorded topics, named as in docs/topics.md; '*' for all")
-    required: bool = parameter("whether the arm brakes when the bag can no longer be written", before=False)
+    required: bool = parameter("whether the arm brakes when the bag can no longer be written")
     split_size: int = parameter("size at which the bag continues in another file; 0: never", "byte", 0, 2**50)
     split_time: float = parameter("time after which the bag continues in another file; 0: never", "s", 0.0, 1e7)
 

@@ -1,4 +1,4 @@
-"""The parameters in a bag: read with care, and completed to those of this version."""
+"""The parameters in a bag, read with care."""
 
 import hashlib
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, like
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameter_history import Completed, complete
-from wam_description.parameters import ParameterError, build_part, flatten, require
+from wam_description.parameters import ParameterError, build_part, fields, flatten, require
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
 
 LARGEST: Final = 2**20  # bytes; those of the whole stack are about 30 kB
+OF_ROS: Final = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # every node has these
 
 
 class RecordedParameters(NamedTuple):
@@ -28,10 +28,10 @@ class RecordedParameters(NamedTuple):
     Attributes
     ----------
     source : the bag, for messages.
-    nodes : flat values by node, completed to those of this version.
+    nodes : flat values by node, without those that every ROS node has.
     sha256 : of the attachment, hexadecimal, '' if there is none.
     problem : why there are no parameters, '' if there are some.
-    notes : which were added, which are not known.
+    notes : which ones are missing or unknown; a part with one of these is refused.
     """
 
     source: str
@@ -132,7 +132,7 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
         if not isinstance(tree, dict):
             raise ValueError("it has no sections")
         recorded = {
-            str(name).removeprefix(f"{namespace}/"): flatten(body[PARAMETERS])
+            str(name).removeprefix(f"{namespace}/"): _own(flatten(body[PARAMETERS]))
             for name, body in tree.items()
             if str(name).rpartition("/")[0] == namespace
         }
@@ -143,32 +143,36 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
         there = ", ".join(sorted({str(name).rpartition("/")[0] for name in tree}))
         problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
         return RecordedParameters(str(bag.path), {}, digest, problem, ())
-    found = {node: _completed(node, recorded) for node in recorded}
-    notes = (
-        _note(
-            "the recording is older than", {node: one.added for node, one in found.items()}, "have their former effect"
-        ),
-        _note("this version does not know", {node: one.unknown for node, one in found.items()}, "are ignored"),
-    )
-    nodes = {node: one.values for node, one in found.items()}
-    return RecordedParameters(str(bag.path), nodes, digest, "", tuple(note for note in notes if note))
+    differing = {node: _differences(node, values) for node, values in recorded.items()}
+    words = "misses the parameters", "has the unknown parameters"
+    lists = [_note(word, {node: names[row] for node, names in differing.items()}) for row, word in enumerate(words)]
+    note = " and ".join(text for text in lists if text)
+    notes = (f"the recording {note}: it is of another version, record it again",) if note else ()
+    return RecordedParameters(str(bag.path), recorded, digest, "", notes)
 
 
-def _completed(node: str, recorded: Mapping[str, Values]) -> Completed:
-    """The values of a node as this version knows them; those of a node that is not ours as they are."""
+def _own(values: Values) -> dict[str, Any]:
+    """Parameters of the stack, without those that every ROS node has."""
+    return {name: value for name, value in values.items() if not name.startswith(OF_ROS)}
+
+
+def _differences(node: str, recorded: Values) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names that the recorded parameters of a node lack, and those that it does not have; none of a foreign node."""
     if node not in NODES or node == "recorder":
-        return Completed(recorded[node], (), (), ())
-    return complete(node, recorded, (Shared, declared(node).parameter_class))
+        return (), ()
+    known = {field.name: field for cls in (Shared, declared(node).parameter_class) for field in fields(cls)}
+    missing = [name for name, field in known.items() if name not in recorded and field.derived is None]
+    return tuple(missing), tuple(name for name in recorded if name not in known)
 
 
-def _note(begin: str, names: Mapping[str, tuple[str, ...]], end: str) -> str:
-    """A sentence about parameters of some nodes; one of several nodes is named once, without a node."""
+def _note(begin: str, names: Mapping[str, tuple[str, ...]]) -> str:
+    """Parameters of some nodes; one of several nodes is named once, without a node."""
     of: dict[str, list[str]] = {}
     for node, some in names.items():
         for name in some:
             of.setdefault(name, []).append(node)
     listed = ", ".join(name if len(nodes) > 1 else f"{nodes[0]}:{name}" for name, nodes in of.items())
-    return f"{begin} the parameters {listed}; they {end}" if listed else ""
+    return f"{begin} {listed}" if listed else ""
 
 
 def untrusted_yaml(text: bytes | str) -> Any:

@@ -11,9 +11,8 @@ from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_control.force.reaction_status import CONTACT_FORCE, stated
 from wam_control.task.scenario import FORCE_LOOP
-from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
-from wam_description.status import CHANGES, DONE, ENABLED, parse
+from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
 from wam_sim.reactions import FAULT, RecordedReaction, lasting
 from wam_sim.recorded_commands import RefusedCommands, taken_commands
@@ -251,35 +250,27 @@ def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedSte
     for status in statuses:
         if status.node != "scenario" or not status.stamp:
             continue
-        name = status.step or status.message  # the first recordings have a step in the message only
-        if begun and begun[-1][:2] == (name, status.stamp):  # published again with what it has set
+        if not status.step:
+            return tuple(_ended(begun, status.stamp)), None, status.message
+        if begun and begun[-1][:2] == (status.step, status.stamp):  # published again with what it has set
             begun[-1] = begun[-1]._replace(settings={**begun[-1].settings, **_settings(status)})
         else:
-            begun.append(RecordedStep(name, status.stamp, status.stamp, _settings(status)))
-        if not status.step and (status.message == DONE or status.level):
-            break
-    else:
-        if not begun:
-            return (), None, ""
-        *steps, unfinished = _ended(begun)
-        return tuple(steps), unfinished._replace(end=max(last, unfinished.begin)), ""
-    return tuple(_ended(begun)[:-1]), None, begun[-1].name
+            begun.append(RecordedStep(status.step, status.stamp, status.stamp, _settings(status)))
+    if not begun:
+        return (), None, ""
+    *steps, unfinished = _ended(begun, max(last, begun[-1].begin))
+    return tuple(steps), unfinished, ""
 
 
-def _ended(begun: Sequence[RecordedStep]) -> list[RecordedStep]:
-    """Each step with the start of the next one as its end."""
-    ends = [step.begin for step in begun[1:]] + [step.end for step in begun[-1:]]
-    return [step._replace(end=end) for step, end in zip(begun, ends, strict=True)]
+def _ended(begun: Sequence[RecordedStep], end: int) -> list[RecordedStep]:
+    """Each step with the start of the next one as its end, the last one with the end that is given, ns."""
+    ends = [*(step.begin for step in begun[1:]), end]
+    return [step._replace(end=end) for step, end in zip(begun, ends, strict=False)]
 
 
 def _settings(status: NodeStatus) -> dict[str, Any]:
-    """Live parameters that a step set, by their present names."""
-    found = {}
-    for key, text in status.facts.items():
-        node, colon, name = key.partition(":")
-        if colon:
-            found[f"{node}:{present_name(node, name)}"] = _value(text)
-    return found
+    """Live parameters that a step set, by 'node:parameter'."""
+    return {key: _value(text) for key, text in status.facts.items() if ":" in key}
 
 
 def _value(text: str) -> Any:

@@ -40,7 +40,7 @@ from wam_control.task.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
-from wam_description.status import CHANGES
+from wam_description.status import CHANGES, DONE
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
 from wam_sim.reactions import RecordedReaction, sentences
 from wam_sim.recorded_parameters import recorded_parameters
@@ -114,7 +114,9 @@ class Recording:
             "status": messages([status("driver", "braked"), *itertools.starmap(said, self.statuses)]),
         }
         kept = {f"{self.namespace}/{name}": columns for name, columns in topics.items() if name not in self.without}
-        kept["/diagnostics"] = messages([array(START, status("driver", "enabled", **facts)) for facts in self.timing])
+        kept["/diagnostics"] = messages(
+            [array(START, status("wam: driver", "enabled", **facts)) for facts in self.timing]
+        )
         types = {f"{self.namespace}/{name}": BY_NAME[name].type for name in topics}
         attachments = {"parameters.yaml": PARAMETERS.encode()}
         return Bag(Path("bag"), kept, types, attachments, {"recording": self.recording})
@@ -166,7 +168,9 @@ def status(name: str, message: str, level: int = 0, **values: str) -> Any:
 
 
 def said(message: str, stamp: int, level: int) -> Any:
-    return status("scenario", message, level, stamp=str(stamp))
+    """A status of the scenario: of a step, or of its end."""
+    step = {} if level or message == DONE else {"step": message}
+    return status("scenario", message, level, stamp=str(stamp), **step)
 
 
 def array(stamp: int, *statuses: Any) -> Any:
@@ -1390,6 +1394,7 @@ def with_outcome(folder, *statuses: tuple[str, str, int]):
         connection = writer.add_connection("/wam/status", kind, typestore=store)
         for stamp, (node, text, level) in enumerate(statuses, 1):
             facts = {"stamp": str(stamp * 10**9), **({"fault": text} if level and node == "driver" else {})}
+            facts |= {"step": text} if node == "scenario" and not level and text != DONE else {}
             values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
             message = kinds["DiagnosticStatus"](level, node, text, "", values)
             writer.write(connection, stamp, store.serialize_cdr(message, kind))
@@ -1421,7 +1426,8 @@ def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections = [writer.add_connection(f"/wam/{name}", kind, typestore=store) for name in ("status", "other")]
         for stamp, said in ((1, "release the brakes"), (2, "done")):
-            values = [kinds["KeyValue"]("stamp", str(stamp * 10**9))]
+            facts = {"stamp": str(stamp * 10**9)} | ({} if said == DONE else {"step": said})
+            values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
             message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))

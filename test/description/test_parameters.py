@@ -105,9 +105,9 @@ class Derived:
 
 
 @dataclass(frozen=True)
-class Late:
-    late: float = tunable("came later", "N", before=0.5)
-    counted: tuple[float, ...] = tunable("the same", "N", high=2.0, before=lambda others: (0.5,) * others["n"])
+class Tuned:
+    gain: float = tunable("a gain", "N")
+    counted: tuple[float, ...] = tunable("the same", "N", high=2.0)
 
 
 def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
@@ -120,20 +120,13 @@ def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
 def test_a_derived_parameter_has_unit_and_range_of_the_other_one_and_its_meaning_unless_another_is_given() -> None:
     _, copy = fields(Derived)
     assert (copy.doc, copy.unit, copy.low, copy.high, copy.live) == ("copy", "1/s", 0.0, 2.0, False)
-    found = like(Late, "a.late").metadata
-    assert (found["doc"], found["unit"], found["high"]) == ("came later", "N", 1e9)
-
-
-@pytest.mark.parametrize(("name", "value"), [("a.late", 0.5), ("a.counted", (0.5, 0.5))])
-def test_a_derived_parameter_of_a_recording_is_what_the_other_one_was_before_it_existed(name: str, value: Any) -> None:
-    derived = like(Late, name).metadata["derived"]
-    assert derived({"n": 2}) == value
-    assert derived({"n": 2, name: 0.7}) == 0.7
+    found = like(Tuned, "a.gain").metadata
+    assert (found["doc"], found["unit"], found["high"]) == ("a gain", "N", 1e9)
 
 
 def test_a_tunable_is_live_and_not_negative() -> None:
-    late, counted = fields(Late)
-    assert (late.low, late.high, late.live, late.before) == (0.0, 1e9, True, 0.5)
+    gain, counted = fields(Tuned)
+    assert (gain.low, gain.high, gain.live) == (0.0, 1e9, True)
     assert (counted.high, counted.is_array) == (2.0, True)
 
 

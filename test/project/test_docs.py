@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.topics import BY_NAME
@@ -56,21 +58,6 @@ def test_a_changed_block_is_noticed_and_a_changed_sentence_is_kept(generate: Any
     assert generate.filled(text.replace("| `motor_states`", "| `motor_status`")) == text
     own = text.replace("# Topics\n", "# Our topics\n")
     assert generate.filled(own) == own
-
-
-# names
-
-
-def test_the_tests_that_force_md_names_exist() -> None:
-    named = re.findall(r"`(test_\w+)\.(test_\w+)`", HANDBOOK["force.md"])
-    assert len({row.split("|")[1] for row in HANDBOOK["force.md"].splitlines() if re.match(r"\| F\d+ ", row)}) == 21
-    missing = [f"{file}.{name}" for file, name in named if f"def {name}(" not in source(file)]
-    assert missing == []
-
-
-def source(test: str) -> str:
-    path = next(ROOT.glob(f"test/*/{test}.py"), None)
-    return path.read_text(encoding="utf-8") if path else ""
 
 
 def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None:
@@ -127,3 +114,10 @@ def test_refusals_in_the_handbook_are_those_of_the_code() -> None:
         whole = message.removeprefix("refused: ")  # the driver puts it before an obstacle
         pattern = re.compile(".*?".join(re.escape(part) for part in re.split(r"<\w+>", whole)))
         assert any(pattern.search(text) for text in texts), message
+
+
+def test_the_version_is_that_of_the_package_wherever_it_is_written() -> None:
+    version = ElementTree.parse(ROOT / "package.xml").getroot().findtext("version")
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == version
+    assert re.findall(r"^## (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[0] == version
+    assert f"from {version} on" in (ROOT / "QUALITY_DECLARATION.md").read_text(encoding="utf-8")

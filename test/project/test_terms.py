@@ -64,7 +64,6 @@ ANY = re.compile(rf"\b(?:{'|'.join(f'(?:{words})' for words in TERMS)})\b", re.I
 PAGES = ("*.md", "docs/*.md", "bags/*.md", "benchmarks/*.md")
 VALUES = ("config/**/*.yaml", "docs/*.yaml", "examples/*.yaml", "pyproject.toml")
 MODULES = ("wam_*/**/*.py", "launch/*.py", "examples/*.py", "benchmarks/*.py", "docs/*.py")
-NOT_OURS = {"CHANGELOG.md", "parameter_history.py"}  # they name the old terms
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`|\]\([^)]*\)", re.DOTALL | re.MULTILINE)
 
 
@@ -109,13 +108,10 @@ def complaints(root: Path) -> list[str]:
     """Every wrong term in the texts under root."""
     found: list[str] = []
     for path in sorted(path for pattern in PAGES for path in root.glob(pattern)):
-        if path.name not in NOT_OURS:
-            found += found_in(texts_of_a_page(path.read_text(encoding="utf-8")), path.relative_to(root))
+        found += found_in(texts_of_a_page(path.read_text(encoding="utf-8")), path.relative_to(root))
     for path in sorted(path for pattern in VALUES for path in root.glob(pattern)):
         found += found_in(enumerate(path.read_text(encoding="utf-8").splitlines(), start=1), path.relative_to(root))
     for path in sorted(path for pattern in MODULES for path in root.glob(pattern)):
-        if path.name in NOT_OURS:
-            continue
         source = path.read_text(encoding="utf-8")
         found += found_in(texts_of_a_module(source), path.relative_to(root))
         found += found_in(texts_of_comments(source), path.relative_to(root))
@@ -159,7 +155,6 @@ def test_a_wrong_term_is_found_where_a_user_reads_it(text: str) -> None:
 
 
 def test_names_in_a_module_are_not_text() -> None:
-    assert not list(found_in(texts_of_a_module('FORMER = {"departure.mass": "mismatch.mass"}'), "key"))
     assert not list(found_in(texts_of_a_module('def f(say):\n    """say : called with lines."""'), "parameter"))
 
 

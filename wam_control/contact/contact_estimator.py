@@ -51,7 +51,6 @@ class ContactEstimatorParameters:
         "0: never",
         low=0.0,
         high=1e6,
-        before=0.0,
     )
 
     def __post_init__(self) -> None:

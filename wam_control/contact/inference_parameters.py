@@ -17,28 +17,23 @@ class InferenceParameters:
         "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
     )
     friction: float = parameter("sd of the friction force along a cover, per force", low=0.0, high=2.0)
-    end_weight: float = parameter(
-        "relative frequency of contacts where two links meet, on each", low=0.0, high=1e3, before=0.0
-    )
+    end_weight: float = parameter("relative frequency of contacts where two links meet, on each", low=0.0, high=1e3)
     along_weight: float = parameter(
         "relative frequency of forces along the last link: on its surface, and on its end",
         low=0.0,
         high=1e3,
-        before=0.0,
     )
     payload_weight: float = parameter(
         "relative frequency of a mass that is picked up at the tool; 0.1 next to weights of links of 2.65 in all: one "
         "contact of 28, fewer than of any link",
         low=0.0,
         high=1e3,
-        before=0.0,
     )
     fusion_time: float = parameter(
         "for how long the torques of a contact explain it together; 0: those of the present moment alone",
         "s",
         low=0.0,
         high=10.0,
-        before=0.0,
     )
     positions: int = parameter("contact positions tried along a link", low=9, high=200)
     identification_threshold: float = parameter(

@@ -29,61 +29,52 @@ ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 class SensingParameters:
     """What disturbs the measured force, and how well it has to be known."""
 
-    torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, before=0.1)
-    torque_fraction: float = tunable("the same, per torque of the commanded force", high=1.0, before=0.0)
-    estimated_torque_sd: float = tunable(
-        "torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3, before=0.1
-    )
+    torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3)
+    torque_fraction: float = tunable("the same, per torque of the commanded force", high=1.0)
+    estimated_torque_sd: float = tunable("torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3)
     estimated_torque_fraction: float = tunable(
-        "torque_fraction with feedback contact_estimate: constants and friction of the motors", high=1.0, before=0.0
+        "torque_fraction with feedback contact_estimate: constants and friction of the motors", high=1.0
     )
-    friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0, before=0.0)
+    friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0)
     zero_limit: float = tunable(
         "largest external torque of a joint that is taken as zero when a force is commanded, where the arm is at rest "
         "and the contact estimator finds no contact; 0: never",
         "N m",
         high=1e3,
-        before=0.0,
     )
     force_sd_limit: float = tunable(
         "standard deviation of the measured force up to which any force is controlled; where it is larger, and larger "
         "than force_sd_fraction, the arm holds its position",
         "N",
-        before=1e9,
     )
     force_sd_fraction: float = tunable(
         "standard deviation of the measured force, per commanded force, up to which it is controlled",
         high=1.0,
-        before=0.0,
     )
     force_sd_fraction_unpinned: float = tunable(
         "the same where the position is estimated, if it is larger: once touched, the position is known better",
         high=1.0,
-        before=0.0,
     )
     stated_fraction: float = tunable(
         "standard deviation of the measured force with what the contact estimator states of its torques, per commanded "
         "force, up to which a force is begun with feedback contact_estimate",
-        before=1e9,
     )
     reported_fraction: float = tunable(
-        "standard deviation of the measured force, per commanded force, above which it is reported", before=1e9
+        "standard deviation of the measured force, per commanded force, above which it is reported"
     )
     least_signal: float = tunable(
         "commanded force per standard deviation with which the contact estimator knows the torques, from which a force "
         "at a pinned position is controlled with feedback contact_estimate: what is not detected is not measured",
         high=1e3,
-        before=0.0,
     )
     least_signal_unpinned: float = tunable(
-        "the same where the position is estimated, so that the link has to be identified, too", high=1e3, before=0.0
+        "the same where the position is estimated, so that the link has to be identified, too", high=1e3
     )
     apparent_mass_limit: float = tunable(
         "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
         "is larger is slowed down; 0: no limit",
         "kg",
         high=1e6,
-        before=0.0,
     )
 
     @property

@@ -47,9 +47,7 @@ class ForceLoopParameters:
         "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
     )
     force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
-    force_rate_limit: float = tunable(
-        "largest rate at which the desired force follows its command", "N/s", low=1.0, before=1e9
-    )
+    force_rate_limit: float = tunable("largest rate at which the desired force follows its command", "N/s", low=1.0)
     torque_gain: tuple[float, ...] = tunable(
         "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", high=100.0
     )
@@ -62,7 +60,7 @@ class ForceLoopParameters:
     )
     torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
     torque_rate_limit: float = tunable(
-        "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0, before=1e9
+        "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0
     )
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
     blend_time: float = tunable(
@@ -75,13 +73,11 @@ class ForceLoopParameters:
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
         "arm at the surface",
         high=1.0,
-        before=1.0,
     )
     friction_feedforward: float = tunable(
         "fraction of the dry friction of the model that is fed forward along the commanded motion while a force is "
         "controlled; with feedback contact_estimate none, as a dither does the same",
         high=1.0,
-        before=0.0,
     )
     posture_gain: float = tunable("joint velocity per posture error", "1/s", high=1e3)
     joint_speed_limit: float = tunable("largest joint speed due to the posture and to the force", "rad/s", high=1e3)
@@ -95,7 +91,6 @@ class ForceLoopParameters:
         "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
         choices=("estimated", "pinned"),
         live=True,
-        before="estimated",
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = tunable("contact position assumed along it", "m", high=3.0)
@@ -103,7 +98,6 @@ class ForceLoopParameters:
         "standard deviation of a pinned contact position, as of a surface that moves along the link",
         "m",
         high=1.0,
-        before=0.0,
     )
     schedule: str = parameter(
         "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "

@@ -27,58 +27,47 @@ class LimitParameters:
         "largest speed of a joint per distance from where it has to stop; 0: the ends of the joints are not watched",
         "1/s",
         high=100.0,
-        before=0.0,
     )
-    joint_margin: float = tunable(
-        "distance from the end of a joint at which it has to stop", "rad", high=1.0, before=0.0
-    )
+    joint_margin: float = tunable("distance from the end of a joint at which it has to stop", "rad", high=1.0)
     contact_force: float = tunable(
-        "largest force on the arm, as far as the joints measure it; above it the arm gives way", "N", before=1e9
+        "largest force on the arm, as far as the joints measure it; above it the arm gives way", "N"
     )
     whole_force: float = tunable(
         "largest force in all, per commanded force, at its position or, where that is not known, wherever it acts; "
         "above it the arm gives way",
-        before=1e9,
     )
     impact: float = tunable(
         "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
         "the speed along the force until something is touched; 0: no limit",
         high=1e3,
-        before=0.0,
     )
-    settling_time: float = tunable(
-        "time after which a force that is still not reached is reported", "s", low=1e-3, before=1e9
-    )
+    settling_time: float = tunable("time after which a force that is still not reached is reported", "s", low=1e-3)
     free_travel: float = tunable(
         "largest way along a commanded force that is not right, or back against it with what pushes; then the arm "
         "holds its position",
         "m",
-        before=1e9,
     )
     least_tolerance: float = tunable(
-        "least error up to which a force counts as reached, however small it is", "N", high=1e3, before=0.3
+        "least error up to which a force counts as reached, however small it is", "N", high=1e3
     )
     cycle_force: float = tunable(
-        "swing of the measured force, per commanded force, from which it is reported as a limit cycle", before=1e9
+        "swing of the measured force, per commanded force, from which it is reported as a limit cycle"
     )
     shake_force: float = tunable(
         "swing of the force, per commanded force, that a shaking arm (dither) may make on a surface of "
         "guard.contact_stiffness; above it the arm holds its position; with feedback contact_estimate",
-        before=1e9,
     )
     surface_speed: float = tunable(
         "largest speed along the force of the surface that will be touched: a force that is off by more than "
         "sensing.reported_fraction while it follows is refused",
         "m/s",
         high=10.0,
-        before=0.0,
     )
     slide_speed: float = tunable(
         "largest speed across the force of the surface that will be touched: one that comes nearer by more of the "
         "force than it may be off while the friction of the arm turns round is refused",
         "m/s",
         high=10.0,
-        before=0.0,
     )
 
 

@@ -31,23 +31,19 @@ class ServoGuardParameters:
     mode: str = parameter(
         "off: any gains are taken; refuse: gains that are not stable or do not hold the arm are refused",
         choices=("off", "refuse"),
-        before="off",
     )
     stability_fraction: float = parameter(
         "fraction of the largest stable gains that is accepted, with commands on time",
         low=0.05,
         high=1.0,
-        before=1.0,
     )
     extra_delay: int = parameter(
         "inner periods by which a current may be delayed in realtime; the gains have to be stable then, too",
         low=0,
         high=10,
-        before=0,
     )
     velocity_by_difference: bool = parameter(
         "true if the motor velocity is the difference of two angles over a period, as with sensors.encoder_resolution",
-        before=False,
     )
 
 

@@ -15,7 +15,6 @@ class TransformParameters:
 
     creep_correction: bool = parameter(
         "true if joint angles are corrected by the creep of the cables, (6.19), of the torques that the motors report",
-        before=False,
     )
 
 

@@ -21,10 +21,10 @@ class VelocityLoopParameters:
     dither: DitherParameters
     guard: ServoGuardParameters
     acceleration_limit: float = parameter(
-        "largest rate at which the commanded motor velocity changes", "rad/s^2", low=1.0, high=1e12, before=1e12
+        "largest rate at which the commanded motor velocity changes", "rad/s^2", low=1.0, high=1e12
     )
     torque_rate_limit: float = parameter(
-        "largest rate at which the feed-forward torque of a motor changes", "N m/s", low=1.0, high=1e12, before=1e12
+        "largest rate at which the feed-forward torque of a motor changes", "N m/s", low=1.0, high=1e12
     )
 
 
