@@ -16,8 +16,8 @@ from wam_description.arm import Shared
 from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.snapshot import NAN, Snapshot, size
-from wam_ros.display import COPIED, NEWEST, copy_name
 from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.outlets import COPIED, NEWEST, copy_name
 from wam_ros.wire import decoder, stamp_of
 
 OLD: Final = 500_000_000  # ns of the arm's time, after which a force or a contact is not shown

@@ -1,11 +1,11 @@
 """ROS around the nodes of the stack: the adapter, messages, parameters, recorder and bring-up.
 
 - node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
-- ports: publishers, subscriptions, status and diagnostics of a node
+- ports: subscriptions, status and diagnostics of a node
 - topics: a topic of the table on ROS: name, quality of service, header
 - local_bus: messages between nodes of one process, without the middleware
-- display: copies of topics for a viewer, few a second
-- claims: one publisher for each topic that a node works on
+- outlets: what a node publishes; copies of it for a viewer, few a second
+- refusals: messages that a node refuses; claims of one publisher for each topic that it works on
 - messages: ROS messages to values and back; markers: what viewers draw
 - wire: the same from and to bytes, faster, for the types that carry numbers
 - tolerance: a node that goes on when a callback raises, and reports it as a fault

@@ -277,7 +277,7 @@ class AdaptedNode(TolerantNode):
         for topic, reason in refusals.items():
             stamp = inputs.stamp_of(topic)
             if self._refused.get(topic) != stamp:
-                self._ports.refuse(topic, reason)
+                self._ports.refusals.add(topic, reason)
             self._refused[topic] = stamp
 
     # requests to other nodes

@@ -7,11 +7,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
-from rclpy.duration import Duration
-from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
-from wam_bag.printable import printable
 from wam_description.agreement import DIGESTS, digests, disagreement
 from wam_description.arm import Shared
 from wam_description.interface import Interface
@@ -21,25 +18,38 @@ from wam_description.signals import Level, NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
-from wam_ros.claims import Claims
-from wam_ros.display import COPIED, DisplayCopy
-from wam_ros.local_bus import BUSES
-from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
+from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
+from wam_ros.outlets import Outlets
 from wam_ros.priority import PRIORITY, set_priority
-from wam_ros.run import end_of_delivery
+from wam_ros.refusals import Claims, Refusals
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, SECOND, header, qos, topic_name
-from wam_ros.wire import decoder, encoder, stamp_of
+from wam_ros.wire import decoder, stamp_of
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 STALE_AFTER = 5  # s without a step, as long as aggregators of diagnostics wait
-LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
 LONGEST_ON_ITS_WAY = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
 LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+
+
+class Changes:
+    """Live parameters that a node has taken: those after one step are reported together."""
+
+    def __init__(self) -> None:
+        self._after, self._number = -1, 0
+        self._facts: dict[str, str] = {}
+
+    def add(self, stamp: int, values: Mapping[str, str]) -> dict[str, str]:
+        """Everything that was taken after the step of a stamp, ns, with the number of this report."""
+        if stamp != self._after:
+            self._after, self._number = stamp, self._number + 1
+            self._facts = {CHANGES: str(self._number)}
+        self._facts |= values
+        return self._facts
 
 
 class Ports:
@@ -55,7 +65,7 @@ class Ports:
     Attributes
     ----------
     counts : steps and whatever else the node counts, for the diagnostics.
-    refusals : refused messages by topic.
+    refusals : messages that were refused.
     facts : further values for the diagnostics.
     live : present values of the shared parameters that the node owns, as facts of its status.
     faults : present fault of each other node, '' where it has none.
@@ -69,15 +79,13 @@ class Ports:
     def __init__(self, node: TolerantNode, declaration: Declaration, shared: Shared, interface: Interface) -> None:
         self.node, self.shared, self.interface = node, shared, interface
         self.counts: Counter[str] = Counter()
-        self.refusals: Counter[str] = Counter()
+        self.refusals = Refusals(node)
         self.facts: dict[str, str] = {}
         self.faults: dict[str, str] = {}
         self.problems: dict[str, str] = {}
         self.session = 0
         self._name = declaration.name
-        self._refusals_reported = 0
-        self._changed_after, self._change_number = -1, 0
-        self._changed: dict[str, str] = {}
+        self._changes = Changes()
         self._status = self._plain = WAITING
         self._digests = digests(shared)
         self.live: dict[str, str] = {}
@@ -87,24 +95,11 @@ class Ports:
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
-        self._refused: Counter[str] = Counter()  # by kind
-        self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
-        self._unusable: dict[str, str] = {}  # why messages are refused, by topic, as the status has it
-        self._unusable_since: dict[str, str] = {}  # the same, since the last report
-        is_lockstep = shared.timing.mode == "lockstep"
-        self._bus = BUSES.get(node.context) if is_lockstep else None  # in realtime a late node needs the newest only
         self._subscriptions: dict[str, Subscription] = {}
-        self._claimed: dict[str, Subscription] = {}
-        self.claims = Claims(node, self._claimed)
+        self.claims = Claims(node)
         rows = [interface.topics[topic] for topic in declaration.outputs if topic in interface.topics]
         own = [interface.topics[topic] for topic in (STATUS, DIAGNOSTICS)]
-        self._publishers: dict[str, Publisher] = {
-            row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in [*rows, *own]
-        }
-        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.name in COPIED}
-        self._published = dict.fromkeys(self._publishers, 0)
-        self._full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in [*rows, *own]}
-        self._encoders = {row.name: encoder(row, shared) for row in rows}
+        self._outlets = Outlets(node, rows, own, shared)
         self._last_steps = self._seconds_without_step = 0
         # mode, whether nodes are missing, faulty nodes
         self._informed: tuple[str, bool, tuple[str, ...]] = ("", True, ())
@@ -116,16 +111,7 @@ class Ports:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        message = self._encoders[topic](stamp, value)
-        self._send(topic, message)
-        if (copy := self._copies.get(topic)) is not None:
-            copy.send(message)
-
-    def _send(self, topic: str, message: Any) -> None:
-        self._published[topic] += 1
-        self._publishers[topic].publish(message)
-        if self._bus is not None:
-            self._bus.send(self._full[topic], message)
+        self._outlets.publish(topic, stamp, value)
 
     def feed(
         self,
@@ -157,7 +143,7 @@ class Ports:
                 take(stamp, decode(data))
 
         is_local = self.listen(topic, receive, raw=True)
-        self._claimed[topic] = subscription = self._subscriptions[topic]
+        self.claims.subscriptions[topic] = subscription = self._subscriptions[topic]
 
     def listen(self, topic: str, take: Callable[[Any], None], raw: bool = False) -> bool:
         """Subscribe; a message that `take` refuses is counted and reported, and the last good one is used.
@@ -174,9 +160,10 @@ class Ports:
             try:
                 take(message)
             except Refused as reason:
-                self.refuse(topic, str(reason), reason.kind)
-                if not (reason.kind or self.problems.get(topic)):
-                    self._show_unusable(topic, str(reason))
+                self.refusals.add(topic, str(reason), reason.kind)
+                is_own = not (reason.kind or self.problems.get(topic))
+                if is_own and self.refusals.show(topic, str(reason)):
+                    self.publish_status(self._plain)
 
         row = self.interface.topics[topic]
         profile = qos(row)
@@ -186,7 +173,7 @@ class Ports:
             profile.depth = NEWEST  # a late node works on the newest state
         kind = message_type(row)
         name = topic_name(self.node, row)
-        bus, is_local = self._bus, False
+        bus, is_local = self._outlets.bus, False
         if bus is not None and raw and not row.latched and bus.carries(self.interface.publishers(topic)):
             bus.subscribe(self.node.resolve_topic_name(name), self.node.bearing(receive, f"a message on {topic}"))
             profile.depth, is_local = 1, True
@@ -196,35 +183,9 @@ class Ports:
         self._subscriptions[topic] = subscription
         return is_local
 
-    def refuse(self, topic: str, reason: str, kind: str = "") -> None:
-        """Count a refused message; one a second of each kind, or of each topic without one, is logged."""
-        self.refusals[topic] += 1
-        kind = kind or topic
-        self._refused[kind] += 1
-        now = time.monotonic()
-        since, count = self._logged.get(kind, (-LOG_PERIOD, 0))
-        if now - since >= LOG_PERIOD:
-            others = self._refused[kind] - count - 1
-            more = f" ({others} more were refused before)" if others else ""
-            self._logged[kind] = now, self._refused[kind]
-            self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
-
-    def _show_unusable(self, topic: str, reason: str) -> None:
-        """State in the status that messages of a topic are refused, up to a report before which none was."""
-        self._unusable_since[topic] = reason
-        if topic not in self._unusable:
-            self._unusable[topic] = reason
-            self.publish_status(self._plain)
-
-    def _look_for_usable(self) -> None:
-        """Once a second: leave out of the status what has not been refused since the last time."""
-        if self._unusable:
-            self._unusable, self._unusable_since = self._unusable_since, {}
-            self.publish_status(self._plain)
-
     def repeat_status(self) -> None:
         """Publish the present status once more, as a message may be lost on a loaded machine."""
-        self._send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
+        self._outlets.send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
 
     def repeat_taken_status(self) -> None:
         """`repeat_status`, but not over one that is still on its way: replaced, it would be a loss to a recorder.
@@ -232,7 +193,7 @@ class Ports:
         One that a frozen node does not take holds up the others no longer than `LONGEST_ON_ITS_WAY`.
         """
         now = time.monotonic()
-        if now - self._repeated > LONGEST_ON_ITS_WAY or self._publishers[STATUS].wait_for_all_acked(Duration()):
+        if now - self._repeated > LONGEST_ON_ITS_WAY or self._outlets.is_taken(STATUS):
             self._repeated = now
             self.repeat_status()
 
@@ -258,15 +219,12 @@ class Ports:
 
         What was taken after one step is reported together, so that only the last message is needed.
         """
-        if stamp != self._changed_after:
-            self._changed_after, self._changed = stamp, {CHANGES: str(self._change_number + 1)}
-            self._change_number += 1
         texts = {name: str(listed(value)) for name, value in values.items()}
-        self._changed |= {f"{self._name}:{name}": text for name, text in texts.items()}
+        changed = self._changes.add(stamp, {f"{self._name}:{name}": text for name, text in texts.items()})
         self.live |= {name: text for name, text in texts.items() if name in self.live}
         self._status = self._with_shared(self._status)
-        status = self._status._replace(stamp=stamp, facts={**self._status.facts, **self._changed})
-        self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
+        status = self._status._replace(stamp=stamp, facts={**self._status.facts, **changed})
+        self._outlets.send(STATUS, diagnostic_status(status, self.shared.arm.name))
 
     def _with_shared(self, status: NodeStatus) -> NodeStatus:
         """A status of this node with what the others compare and take of its shared parameters."""
@@ -283,7 +241,7 @@ class Ports:
             self._plain = plain
 
     def _look_for_rivals(self) -> None:
-        for topic in self._claimed:
+        for topic in self.claims.subscriptions:
             self.set_problem(topic, self.claims.rivals(topic))
 
     def set_status(self, status: NodeStatus) -> None:
@@ -296,7 +254,7 @@ class Ports:
     def publish_status(self, status: NodeStatus) -> None:
         """Publish the status of the node as it is, where it has changed."""
         self._plain = status
-        status = with_refused(status, self._unusable)
+        status = with_refused(status, self.refusals.unusable)
         problem = self.problem if self.takes_problem is None else ""
         if problem:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
@@ -304,9 +262,9 @@ class Ports:
         if status != self._status:
             if self.shared.timing.mode == "lockstep" or status.session != self._status.session:
                 # only the last status is kept: a recording, and a driver that is followed, lack none
-                self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))
+                self._outlets.is_taken(STATUS, LONGEST_ECHO)
             self._status = status
-            self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
+            self._outlets.send(STATUS, diagnostic_status(status, self.shared.arm.name))
             self._inform()
 
     def _inform(self) -> None:
@@ -335,23 +293,9 @@ class Ports:
                 self.node.get_logger().info(f"{PRIORITY}: {granted}")
 
     def wait_for_delivery(self) -> None:
-        """Report how much was published, then wait until the recorder and all others have the last messages.
-
-        No longer than `wam_ros.run.end_of_delivery`.
-
-        What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
-        """
+        """Report how much was published, then wait until the recorder and all others have the last messages."""
         self._report(**{ENDED: "yes"})
-        end = end_of_delivery(self.node.context)
-        late = [
-            topic
-            for topic, publisher in self._publishers.items()
-            if not publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
-        ]
-        if late:
-            self.node.get_logger().warning(
-                f"ends before all listeners took the last messages of {', '.join(late)}: one is very slow, or gone"
-            )
+        self._outlets.wait_for_delivery()
 
     def watch_peers(self, take: Callable[[NodeStatus], None], followed: str = "") -> None:
         """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`.
@@ -397,8 +341,8 @@ class Ports:
         for name, subscription in self._subscriptions.items():
             if subscription.get_publisher_count() < len(interface.publishers(name)):
                 return
-        for name, publisher in self._publishers.items():
-            if publisher.get_subscription_count() < len(interface.subscribers(name)):
+        for name, count in self._outlets.subscriptions().items():
+            if count < len(interface.subscribers(name)):
                 return
         if self.waits():
             return
@@ -416,13 +360,12 @@ class Ports:
         self._next_report = stamp - stamp % SECOND + SECOND
         self._last_report = stamp
         self._report()
-        self._look_for_usable()
+        if self.refusals.look_again():
+            self.publish_status(self._plain)
 
     def _report(self, **more: str) -> None:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
-        total = sum(self.refusals.values())
-        level = max(self._status.level, Level.WARN if total > self._refusals_reported else Level.OK)
-        self._refusals_reported = total
+        level = max(self._status.level, Level.WARN if self.refusals.have_grown() else Level.OK)
         self._publish_report(level, self._status.message, more)
 
     def _report_standstill(self) -> None:
@@ -435,13 +378,13 @@ class Ports:
             self._publish_report(Level.STALE, reason, {})
 
     def _publish_report(self, level: Level, text: str, more: Mapping[str, str]) -> None:
-        refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.items())}
+        refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.counts.items())}
         counts = {key: str(count) for key, count in sorted(self.counts.items())}
-        totals = {**self._published, DIAGNOSTICS: self._published[DIAGNOSTICS] + 1}
-        published = {f"{PUBLISHED}{self._full[topic]}": str(count) for topic, count in totals.items()}
+        totals = {**self._outlets.published, DIAGNOSTICS: self._outlets.published[DIAGNOSTICS] + 1}
+        published = {f"{PUBLISHED}{self._outlets.full[topic]}": str(count) for topic, count in totals.items()}
         own = {NODE: self.node.get_fully_qualified_name(), **published}
         facts = {**counts, **refused, **own, **self.facts, **more}
         name = diagnosed_name(self.node.get_namespace(), self._name)
         status = NodeStatus(level, text, name, fault=self._status.fault, facts=facts)
         message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
-        self._send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))
+        self._outlets.send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))

@@ -36,6 +36,29 @@ _SHARED = frozenset(field.name for field in fields(Shared))
 MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
 
+class Silence:
+    """Whether nothing comes for a while.
+
+    Attributes
+    ----------
+    heard : messages so far.
+    """
+
+    def __init__(self) -> None:
+        self.heard = self._before = 0
+        self._at, self._is_reported = time.monotonic(), False
+
+    def begins(self) -> bool:
+        """Whether no message has come for `SILENCE`; true once for each pause."""
+        now = time.monotonic()
+        if self.heard != self._before:
+            self._before, self._at, self._is_reported = self.heard, now, False
+        elif not self._is_reported and now - self._at > SILENCE:
+            self._is_reported = True
+            return True
+        return False
+
+
 class RecorderNode(TolerantNode):
     """Records from construction to `destroy_node`, which closes the bag."""
 
@@ -85,8 +108,7 @@ class RecorderNode(TolerantNode):
         self._lives: dict[str, str] = {}  # the node of each writer of a status that was seen
         self._again: dict[str, RemoteParameters] = {}  # those of nodes that were started again
         self._two_runs = ""  # which node was started again with others
-        self._heard = self._heard_before = 0  # messages of others, recorded or not
-        self._heard_at, self._is_silent = time.monotonic(), False
+        self._silence = Silence()  # of others, recorded or not
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DRAIN_PERIOD, self._drain, clock=steady)
         self.create_timer(0.1, self.attend, clock=steady)
@@ -118,7 +140,7 @@ class RecorderNode(TolerantNode):
     @property
     def _empty(self) -> str:
         """That no message of the stack has come to a recorder that was started by hand; '' where one has."""
-        if self._ends_last or self._heard:
+        if self._ends_last or self._silence.heard:
             return ""
         return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
@@ -247,12 +269,8 @@ class RecorderNode(TolerantNode):
 
     def _look_for_messages(self) -> None:
         """Report once that nothing comes, to a recorder that was started by hand and may wait for nobody."""
-        now = time.monotonic()
-        if self._heard != self._heard_before:
-            self._heard_before, self._heard_at, self._is_silent = self._heard, now, False
-        elif not (self._is_silent or self._ends_last) and now - self._heard_at > SILENCE:
-            self._is_silent = True
-            why = "the stack has ended, or is paused" if self._heard else "no stack runs here"
+        if not self._ends_last and self._silence.begins():
+            why = "the stack has ended, or is paused" if self._silence.heard else "no stack runs here"
             self.get_logger().warning(f"no message for {SILENCE:g} s: {why}; Ctrl-C ends the recording")
 
     def _report(self) -> None:
@@ -293,7 +311,7 @@ class RecorderNode(TolerantNode):
                     arrived.append((info["source_timestamp"], name, data, received, number))
         arrived.sort(key=itemgetter(0))
         for sent, name, data, received, number in arrived:
-            self._heard += name not in self._own_topics
+            self._silence.heard += name not in self._own_topics
             self.recorder.receive(name, data, received, sent, number)
             if name == self._diagnostics_name:
                 self._take_totals(data)

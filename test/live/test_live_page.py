@@ -79,8 +79,8 @@ from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import STRONGEST, Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 from wam_live.stack_source import RunningStack  # noqa: E402
-from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
+from wam_ros.outlets import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
 from wam_ros.topics import qos  # noqa: E402
 from wam_ros.wire import encoder  # noqa: E402
 

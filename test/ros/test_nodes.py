@@ -25,9 +25,9 @@ from wam_description.signals import Level, NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
-from wam_ros.display import COPIED, copy_name
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status, wrench_stamped
 from wam_ros.node import make_node
+from wam_ros.outlets import COPIED, copy_name
 from wam_ros.ports import READY
 from wam_ros.topics import DEPTH, qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
@@ -230,7 +230,7 @@ def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: 
     heard = Listener(hand.ros, "/diagnostics")
     hand.enable()
     hand.extra = [message] * 5
-    refusals = hand.node._ports.refusals
+    refusals = hand.node._ports.refusals.counts
     hand.ros.wait(lambda: refusals["motor_current_command"] == 5, what="refusals")
     hand.wait_periods(5)
     assert hand.driver.safety.mode is Mode.ENABLED
@@ -246,7 +246,7 @@ def test_a_command_that_answers_no_state_is_refused_in_realtime(stamp: int, live
     live.enable()
     live.is_answering = False
     given = live.driver.stamp + stamp if stamp > 0 else stamp
-    refused = live.node._ports.refusals
+    refused = live.node._ports.refusals.counts
     while refused["motor_current_command"] < 3:
         live.publisher.publish(joint_state(given, MOTORS, State([], [], [3.0] * 4)))
         live.wait_periods(1)
@@ -270,7 +270,7 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
         "/wam/intruder and /wam/velocity_loop publish motor_current_command, which one node alone may; stop all others"
     )
     live.ros.wait(lambda: any(text in m.message and m.level == DiagnosticStatus.ERROR for m in heard.seen["status"]))
-    assert live.node._ports.refusals["motor_current_command"] > 0
+    assert live.node._ports.refusals.counts["motor_current_command"] > 0
     live.ask("reset_fault")
     assert "which one node alone may" in live.ask("enable", True).message
     other.destroy_publisher(second)
@@ -422,7 +422,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
     row = BY_NAME["sim/disturbance"]
     publisher = hand.ros.node("pusher").create_publisher(message_type(row), row.name, qos(row))
     hand.ros.wait(publisher.get_subscription_count)
-    refusals = hand.node._ports.refusals
+    refusals = hand.node._ports.refusals.counts
     zero = (0.0, 0.0, 0.0)
     for k, wrench in enumerate(
         [

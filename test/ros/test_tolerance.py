@@ -249,11 +249,11 @@ def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, cap
     gravity = make(ros, tmp_path, "gravity", ["gravity"])
     capfd.readouterr()
     for k in range(500):
-        gravity._ports.refuse("joint_states", f"reason {k} " + "y" * 10_000)
+        gravity._ports.refusals.add("joint_states", f"reason {k} " + "y" * 10_000)
     lines = [line for line in capfd.readouterr().err.splitlines() if "refused" in line]
     assert 1 <= len(lines) <= 3
     assert sum(map(len, lines)) < 3000
-    assert gravity._ports.refusals["joint_states"] == 500
+    assert gravity._ports.refusals.counts["joint_states"] == 500
 
 
 def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: Any, tmp_path: Path, capfd: Any) -> None:
@@ -261,11 +261,11 @@ def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: An
     capfd.readouterr()
     for topic in ("joint_states", "force_command", "joint_posture_command"):
         for _ in range(10):
-            loop._ports.refuse(topic, "stamp 1 ns is ahead", "out of time")
+            loop._ports.refusals.add(topic, "stamp 1 ns is ahead", "out of time")
     (line,) = (line for line in capfd.readouterr().err.splitlines() if "refused" in line)
     assert "joint_states: refused: stamp 1 ns is ahead" in line
-    loop._ports._logged.clear()  # a second later
-    loop._ports.refuse("force_command", "stamp 2 ns is ahead", "out of time")
+    loop._ports.refusals._logged.clear()  # a second later
+    loop._ports.refusals.add("force_command", "stamp 2 ns is ahead", "out of time")
     assert "(30 more were refused before)" in capfd.readouterr().err
 
 

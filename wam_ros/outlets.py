@@ -1,0 +1,126 @@
+"""What a node publishes: encoded, counted, handed to the nodes of its process, and copied for a viewer.
+
+A run that is as fast as it can be sends ten thousand messages a second, and sending one to another process takes the
+sender 10 us.  A viewer needs no more of them than it draws pictures: it takes the copies.
+"""
+
+import time
+from collections.abc import Sequence
+from typing import Any, Final
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from wam_description.arm import Shared
+from wam_description.topics import Topic
+from wam_ros.local_bus import BUSES
+from wam_ros.messages import message_type
+from wam_ros.run import end_of_delivery
+from wam_ros.topics import qos, topic_name
+from wam_ros.wire import encoder
+
+PERIOD: Final = 1.0 / 30.0  # s of the wall clock, between copies
+NEWEST: Final = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, history=HistoryPolicy.KEEP_LAST, depth=1)
+COPIED: Final = frozenset(
+    (
+        "joint_states",
+        "sim/joint_states",
+        "sim/contact/wrench",
+        "sim/contact/point",
+        "sim/objects",
+        "contact/hypotheses",
+        "force_measured",
+    )
+)
+
+
+def copy_name(topic: str) -> str:
+    """Name of the copies of a topic, which `ros2 topic list` does not show."""
+    return f"_display/{topic}"
+
+
+class DisplayCopy:
+    """Publishes some of the messages of a topic once more.
+
+    Parameters
+    ----------
+    node : that publishes.
+    row : of the topic.
+    """
+
+    def __init__(self, node: Node, row: Topic) -> None:
+        self._publisher = node.create_publisher(message_type(row), copy_name(row.name), NEWEST)
+        self._next = 0.0
+
+    def send(self, message: Any) -> None:
+        """Publish a message, or its bytes, where the last copy is old enough."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + PERIOD
+            self._publisher.publish(message)
+
+
+class Outlets:
+    """Publishers of one node.
+
+    Parameters
+    ----------
+    node : the ROS node.
+    rows : topics of the table that the node publishes as values.
+    own : topics on which each node publishes messages.
+    shared : the shared configuration.
+
+    Attributes
+    ----------
+    bus : that carries messages within the process; None in realtime, where a late node needs the newest only.
+    published : messages so far, by topic.
+    full : full name of each topic.
+    """
+
+    def __init__(self, node: Node, rows: Sequence[Topic], own: Sequence[Topic], shared: Shared) -> None:
+        self._node = node
+        self.bus = BUSES.get(node.context) if shared.timing.mode == "lockstep" else None
+        every = [*rows, *own]
+        self._publishers: dict[str, Publisher] = {
+            row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in every
+        }
+        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.name in COPIED}
+        self._encoders = {row.name: encoder(row, shared) for row in rows}
+        self.published = dict.fromkeys(self._publishers, 0)
+        self.full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in every}
+
+    def publish(self, topic: str, stamp: int, value: Any) -> None:
+        """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
+        message = self._encoders[topic](stamp, value)
+        self.send(topic, message)
+        if (copy := self._copies.get(topic)) is not None:
+            copy.send(message)
+
+    def send(self, topic: str, message: Any) -> None:
+        """Publish a message, or its bytes."""
+        self.published[topic] += 1
+        self._publishers[topic].publish(message)
+        if self.bus is not None:
+            self.bus.send(self.full[topic], message)
+
+    def is_taken(self, topic: str, within: float = 0.0) -> bool:
+        """Whether all listeners have taken what was published on a topic, waiting for that so long, s."""
+        return bool(self._publishers[topic].wait_for_all_acked(Duration(seconds=within)))
+
+    def subscriptions(self) -> dict[str, int]:
+        """How many listen to each topic."""
+        return {topic: publisher.get_subscription_count() for topic, publisher in self._publishers.items()}
+
+    def wait_for_delivery(self) -> None:
+        """Wait until the recorder and all others have the last messages, to `wam_ros.run.end_of_delivery` at most.
+
+        What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
+        """
+        end = end_of_delivery(self._node.context)
+        late = [topic for topic in self._publishers if not self.is_taken(topic, max(0.0, end - time.monotonic()))]
+        if late:
+            self._node.get_logger().warning(
+                f"ends before all listeners took the last messages of {', '.join(late)}: one is very slow, or gone"
+            )
