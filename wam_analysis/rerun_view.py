@@ -120,7 +120,7 @@ def view(recording: AnalysedRun, save: Path | None) -> str:
 
 
 def joint_motion(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
-    """Stamps and angles of the joints, from the best topic in the bag, POSES per second."""
+    """Stamps and angles of the joints, from the best topic in the bag, `poses` per second."""
     for name in ("sim/joint_states", "joint_sensors", "joint_states"):
         columns = recording.run.joints(name)
         angles = None if columns is None else by_names(columns, "position", arm.joints.names)

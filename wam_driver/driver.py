@@ -142,7 +142,7 @@ class Driver:
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._push_ends: dict[str, int] = {}  # last tick of the present push on each cover
         self._disturbed = ""  # cover that is pushed by messages
-        self._pushed, self._pushed_tick = "", 0  # the last pushes of an enabled arm, in words, and when they acted
+        self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted
         self._pretension_share = parameters.effects.pretension_share
         self._begin_period(1)
         self._release()
@@ -216,7 +216,7 @@ class Driver:
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
         if pushed := self.plant.pushes_in_words():
-            self._pushed, self._pushed_tick = pushed, self._tick
+            self._last_push = pushed, self._tick
         tensions = self._largest_tensions()
         watched = self._watch.watched(*self._turned, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
@@ -234,11 +234,12 @@ class Driver:
     def _advice(self) -> str:
         """What to do about an arm that moves or is loaded beyond a limit: less of what it is commanded, or pushed."""
         now = self.plant.pushes_in_words()
-        since = (self._tick - self._pushed_tick) * self._timing.period
+        pushed, tick = self._last_push
+        since = (self._tick - tick) * self._timing.period
         if now:
             return f"a push acts ({now}): push or command less"
-        if self._pushed and since <= RECENT:
-            return f"a push acted until {since:.2f} s before ({self._pushed}): push or command less"
+        if pushed and since <= RECENT:
+            return f"a push acted until {since:.2f} s before ({pushed}): push or command less"
         return "command less"
 
     def _watch_braking(self) -> None:

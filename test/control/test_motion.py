@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wam_control.task.motion import LineMotion, PostureMotion, SCurve
-from wam_control.task.trajectory_player import TrajectoryPlayer
+from wam_control.task.trajectory_goal import TrajectoryPlayer
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody

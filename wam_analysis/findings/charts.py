@@ -88,7 +88,7 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
 
 
 def _thinned(chart: Chart) -> Chart:
-    """The chart with at most MOST points, which looks the same."""
+    """The chart with at most `points` points, which looks the same."""
     if len(chart.x) <= LAYOUT.points:
         return chart
     lines = [one._replace(values=envelope(chart.x, one.values, LAYOUT.points)[1]) for one in chart.series]

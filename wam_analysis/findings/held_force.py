@@ -39,7 +39,7 @@ class HeldForce(NamedTuple):
     time, measured : (n,), s from the start, and the force that the loop measured.
     time_true, true : (m,), the same of the true force; empty if it was not recorded.
     response : of the measured force; None if there is no step.
-    touched : start of the contact, s from the start, at most FRESH before it; NaN if the contact began earlier or is
+    touched : start of the contact, s from the start, at most `fresh` before it; NaN if the contact began earlier or is
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
     before : force of the contact in which the hold began and of which the loop had no measurement yet, N, as where no
         force was commanded until then; 0 where there is none.  Rise and overshoot are those of the measurement.

@@ -9,7 +9,7 @@ from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOu
 from wam_control.force.guard import Report
 from wam_control.force.reaction_status import facts_of
 from wam_control.force.task import TaskCommand, task_of
-from wam_control.task.trajectory_player import TrajectoryPlayer
+from wam_control.task.trajectory_goal import TrajectoryPlayer
 from wam_description.arm import Shared
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError

@@ -1,6 +1,6 @@
 """Simulation of a saturated loop with dry friction on an arm of one joint, including its velocity loop.
 
-Many trials run in parallel, one per column.  Each inner period has PARTS steps.  Within a step all
+Many trials run in parallel, one per column.  Each inner period has `parts` steps.  Within a step all
 but friction is exact; friction is the constant torque that would bring the joint to rest at the end
 of the step, limited to F_static if the joint was sticking, else F_dynamic.
 """

@@ -7,7 +7,6 @@
 ``scenario_settings``  the live parameters that its steps set, checked against their declarations
 ``scenario_values``    values of its file, refused with a reason
 ``task_text``          the axes of a task in its file
-``trajectory_goal``    how a goal of FollowJointTrajectory goes, and how it ends
-``trajectory_player``  a trajectory that a program streams
+``trajectory_goal``    how a goal of FollowJointTrajectory goes; a trajectory that a program streams
 =====================  ================================================================================
 """

@@ -1,6 +1,6 @@
-"""How a goal of the action FollowJointTrajectory goes: whether the arm follows, and why it does not."""
+"""Trajectories of others: how a goal of FollowJointTrajectory goes, and a trajectory that a program streams."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Final, NamedTuple
 
@@ -47,8 +47,8 @@ class TrajectoryGoal:
     path : of the client.
     arm : with the limits of the joints.
     limits : of motions.
-    on_path, at_goal : tolerances by name of the joint; usual is none on the path, and GOAL_TOLERANCE at the goal.
-    goal_time : s after the end; 0 for GOAL_TIME.
+    on_path, at_goal : tolerances by name of the joint; usual is none on the path, and `arrived` at the goal.
+    goal_time : s after the end; 0 for `goal_time`.
 
     Attributes
     ----------
@@ -112,3 +112,49 @@ class TrajectoryGoal:
                 if 0.0 < most[k] < abs(got - want):
                     return f"{name} is off by {got - want:.3g} {unit}, allowed are {most[k]:g} {unit}"
         return ""
+
+
+class TrajectoryPlayer:
+    """Makes postures of trajectories.
+
+    Parameters
+    ----------
+    arm : with the limits of the joints.
+    limits : of motions.
+
+    Attributes
+    ----------
+    refusal : why the present trajectory is not played, '' where it is.
+    """
+
+    def __init__(self, arm: Arm, limits: MotionParameters) -> None:
+        self._arm, self._limits = arm, limits
+        self._present: PosturePath | None = None
+        self._motion: PostureMotion | None = None
+        self._time = 0.0
+        self.refusal = ""
+
+    def step(self, trajectory: PosturePath | None, q: Sequence[float], qd: Sequence[float], dt: float) -> Moving | None:
+        """The posture of this period; None where the arm is to stay where it is.
+
+        Parameters
+        ----------
+        trajectory : that is streamed now; None for none.
+        q, qd : joint angles and velocities (n,), rad and rad/s.
+        dt : outer period, s.
+        """
+        if trajectory != self._present:
+            self._present, self._motion, self.refusal = trajectory, None, ""
+        if trajectory is None or self.refusal:
+            return None
+        if self._motion is None:
+            if max(map(abs, qd)) > MOTION.at_rest:
+                return None
+            try:
+                self._motion = PostureMotion(q, trajectory, self._arm, self._limits)
+            except ParameterError as error:
+                self.refusal = f"{error}; the arm stays where it is"
+                return None
+            self._time = 0.0
+        self._time += dt
+        return self._motion.at(self._time)
