@@ -22,5 +22,6 @@
 - reach: whether anything can be touched at all
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
+- thresholds: what counts as stuck, touching and stable; when the driver warns and waits
 - pusher: hands that follow a moving link and press on it
 """

@@ -11,7 +11,8 @@ import mujoco
 from wam_driver.circuits import CableCircuits
 from wam_driver.dry_friction import DryFriction
 from wam_driver.loads import AppliedPush
-from wam_driver.surfaces import SHARPNESS, SMALLEST_DEPTH, SurfaceLaw
+from wam_driver.surfaces import SurfaceLaw
+from wam_driver.thresholds import PLANT
 
 # `advance` of fast_steps.c, without its first argument
 Advance = Callable[[SupportsIndex, bool, Callable[[], object]], list[float]]
@@ -47,7 +48,7 @@ def compiled_steps(
     addresses = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
     each = circuits.each if circuits.depends_on_torque else []
     lists = (laws, *friction.bounds, friction.direction, each)
-    constants = (step, SMALLEST_DEPTH, float(SHARPNESS))
+    constants = (step, PLANT.smallest_depth, float(PLANT.sharpness))
     prepared = built.prepare(
         model._address, data._address, *addresses, mujoco.FatalError, *lists, circuits, pushes, *constants
     )

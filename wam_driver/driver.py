@@ -18,13 +18,11 @@ from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
 from wam_driver.imperfections import AmplifierParameters, SensorParameters
-from wam_driver.limit_watch import WARNING, LimitWatch
+from wam_driver.limit_watch import LimitWatch
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
-
-RECENT = 0.2  # s, for which a push that has ended may be the cause of what the arm does
-ROUNDING = 1e-9  # m, of a contact position
+from wam_driver.thresholds import DRIVER
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def _require_springs(arm: Arm, world: World) -> None:
         offset = np.array([lever, 0.0, 0.0]) - covers.origin[3 * i : 3 * i + 3]
         place = float(rotation_xyz(*covers.rotation[3 * i : 3 * i + 3])[:, 0] @ offset)
         require(
-            -ROUNDING <= place <= covers.length[i] + ROUNDING,
+            -DRIVER.rounding <= place <= covers.length[i] + DRIVER.rounding,
             f"world.springs.lever is {lever:g} m for {joint}: the spring would push at {place:.4g} m of "
             f"{covers.names[i]}; allowed: 0 to {covers.length[i]:g} m of it",
         )
@@ -223,7 +221,7 @@ class Driver:
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
-            if heat > WARNING
+            if heat > DRIVER.warning
         ]
         if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
             self._trip(f"{excess}; {self._advice}")
@@ -238,7 +236,7 @@ class Driver:
         since = (self._tick - tick) * self._timing.period
         if now:
             return f"a push acts ({now}): push or command less"
-        if pushed and since <= RECENT:
+        if pushed and since <= DRIVER.recent:
             return f"a push acted until {since:.2f} s before ({pushed}): push or command less"
         return "command less"
 

@@ -14,18 +14,17 @@ from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, Stat
 from wam_description.status import PAUSED
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
-from wam_driver.lockstep import WATCH, Lockstep
+from wam_driver.lockstep import Lockstep
 from wam_driver.pacer import Pacer
 from wam_driver.realtime import Realtime
 from wam_driver.safety import Mode
 from wam_driver.session import Session
+from wam_driver.thresholds import DRIVER
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.tolerance import TolerantNode
-
-STATUS_PERIOD = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
 
 
 class DriverNode(TolerantNode):
@@ -87,7 +86,7 @@ class DriverNode(TolerantNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
         if isinstance(self.time, Lockstep):
-            self.create_timer(WATCH, self._watch_lockstep, clock=steady)
+            self.create_timer(DRIVER.watch, self._watch_lockstep, clock=steady)
             if factor := shared.timing.real_time_factor:
                 self.create_timer(shared.timing.period / factor, self.time.go_on, clock=steady)
         else:
@@ -95,7 +94,7 @@ class DriverNode(TolerantNode):
             ports.waits = lambda: bool(ports.absent) or self.time.settles()
             self._announce()  # in lockstep the first status goes to all peers
             self.create_timer(shared.timing.period, self.time.tick, clock=steady)
-            self.create_timer(STATUS_PERIOD, ports.repeat_taken_status, clock=steady)
+            self.create_timer(DRIVER.status_period, ports.repeat_taken_status, clock=steady)
             self.time.start()
 
     def destroy_node(self) -> None:

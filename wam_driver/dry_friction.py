@@ -8,10 +8,7 @@ from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.parameters import require
 from wam_driver.friction import LAWS, Asymmetric, FrictionLaw, FrictionParameters, LoadDependent, Presliding, each_shaft
-
-STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
-STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
-LARGEST_PHASE = 1.0  # step times frequency of a presliding spring; explicit integration is unstable above 2
+from wam_driver.thresholds import PLANT
 
 
 class DryFriction:
@@ -68,7 +65,9 @@ class DryFriction:
         self._step = step
         self._shafts = range(size)
         # velocities between which a shaft remains as it is: stuck, in positive or in negative motion
-        slowest = [math.nextafter(v, math.inf) for v in [STUCK_ROTOR] * (size // 2) + [STUCK_JOINT] * (size // 2)]
+        slowest = [
+            math.nextafter(v, math.inf) for v in [PLANT.stuck_rotor] * (size // 2) + [PLANT.stuck_joint] * (size // 2)
+        ]
         self._bounds = [((-v, v), (0.0, math.inf), (-math.inf, 0.0)) for v in slowest]
         self.direction = [0] * size
         self._low, self._high = self.bounds = [0.0] * size, [0.0] * size
@@ -174,7 +173,7 @@ def _refuse_too_stiff(
     names: Sequence[str], stiffness: Sequence[float], step: float, compliance: Sequence[float]
 ) -> None:
     for name, sigma, inverse_inertia in zip(names, stiffness, compliance, strict=True):
-        largest = (LARGEST_PHASE / step) ** 2 / inverse_inertia
+        largest = (PLANT.largest_phase / step) ** 2 / inverse_inertia
         require(
             sigma <= largest,
             f"{name}: its presliding stiffness in 'friction' is {sigma:g} N m/rad; a step of {step:g} s allows up to "

@@ -6,9 +6,7 @@ from typing import NamedTuple
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
-
-WARNING = 0.9  # of a limit
-LEEWAY = 0.05  # rad, by which an arm that was enabled beyond a stop may go on before it is stopped again
+from wam_driver.thresholds import DRIVER
 
 
 class WatchedLimit(NamedTuple):
@@ -72,7 +70,7 @@ class LimitWatch:
         q = self._map.joint_positions(theta)
         there = [abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)]
         self._limits = self._with_travel(
-            [half if at <= half else at + LEEWAY for at, half in zip(there, self._half, strict=True)]
+            [half if at <= half else at + DRIVER.leeway for at, half in zip(there, self._half, strict=True)]
         )
 
     def watched(
@@ -108,5 +106,5 @@ def _near(
     return [
         WatchedLimit(quantity, value, limit, unit)
         for (quantity, unit), value, limit in zip(quantities, values, limits, strict=True)
-        if not value <= WARNING * limit  # what is not a number is above every limit
+        if not value <= DRIVER.warning * limit  # what is not a number is above every limit
     ]

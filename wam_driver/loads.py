@@ -16,9 +16,7 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import folded
 from wam_description.signals import Load
 from wam_description.world import Springs
-
-MIDDLE = 0.8  # part of the way from a surface to the middle of an object, up to which an axis may be in it
-LEAN = 0.3  # cosine between a contact's normal and a tube, above which it is none of the tube's side
+from wam_driver.thresholds import PLANT
 
 
 class SpringOnCover(NamedTuple):
@@ -152,7 +150,7 @@ class CoverLoads:
                 depth, (radius, half, _) = -float(data.contact.dist[i]), sizes[geom].tolist()
                 if geom not in self._cover_of_geom or depth <= radius:
                     continue
-                deepest = radius + MIDDLE * _half_thickness(self._model.geom(other))
+                deepest = radius + PLANT.middle * _half_thickness(self._model.geom(other))
                 if depth > deepest:
                     return (
                         f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}, "
@@ -161,7 +159,10 @@ class CoverLoads:
                     )
                 normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
                 nearest = data.contact.pos[i] - sign * (radius - 0.5 * depth) * normal  # point of the axis
-                if abs(normal @ axis) > LEAN and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half:
+                if (
+                    abs(normal @ axis) > PLANT.least_normal
+                    and abs((nearest - data.geom_xpos[geom]) @ axis) < 0.99 * half
+                ):
                     return (
                         f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in an edge, where the direction of "
                         f"the contact force is unknown; allowed: {radius * 1e3:.3g} mm, the radius of the tube; "

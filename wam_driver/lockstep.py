@@ -1,7 +1,6 @@
 """The arm's time in lockstep: a period passes when the present state has been answered and the next one is due."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Final
 
 from wam_description.arm import Timing
 from wam_description.signals import Answer
@@ -9,10 +8,7 @@ from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 from wam_driver.driver import Driver
 from wam_driver.pacer import Pacer
 from wam_driver.session import Session
-
-WATCH: Final = 0.02  # s between two looks at the progress
-ROLL_CALL: Final = 0.4  # s before the time-out, in which the nodes report that they run
-LONGEST_LOOK: Final = 0.1  # s; a process that was frozen did not wait for longer than that
+from wam_driver.thresholds import DRIVER
 
 
 def unpublished(found: Mapping[str, Sequence[str]]) -> str:
@@ -27,7 +23,7 @@ class Lockstep:
     Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node: shortly before,
     the roll is called with a new session.  A node that does not report that it follows has stopped; of those that do,
     the one that lacks nothing for its step has not answered.  From then on
-    time creeps, a period every `WATCH`, braked: states go out, so that a node that was restarted finds its way in;
+    time creeps, a period every `watch`, braked: states go out, so that a node that was restarted finds its way in;
     with the next answer lockstep goes on.
 
     Parameters
@@ -67,7 +63,7 @@ class Lockstep:
         self._is_played = "sim/disturbance" in senders
         self._started = self.is_paused = False
         self._patience = timing.timeout
-        self._roll_call = timing.timeout - min(ROLL_CALL, 0.5 * timing.timeout)
+        self._roll_call = timing.timeout - min(DRIVER.roll_call, 0.5 * timing.timeout)
         self._is_called = False
         self._advice = ""  # what to do about an answer that is overdue
         self._waited, self._looked = 0.0, now()
@@ -114,9 +110,9 @@ class Lockstep:
         self._publish()
 
     def watch(self) -> None:
-        """Look whether an answer is overdue; to be called every `WATCH` seconds."""
+        """Look whether an answer is overdue; to be called every `watch` seconds."""
         now = self._now()
-        self._waited += min(now - self._looked, LONGEST_LOOK)
+        self._waited += min(now - self._looked, DRIVER.longest_look)
         self._looked = now
         if not self._started or self.is_paused or not (missing := self.missing):
             return
@@ -126,7 +122,7 @@ class Lockstep:
             self._announce()
         if self._waited >= self._patience:
             self._fault(self._overdue(missing))
-            self._patience = 0.5 * WATCH  # at the next look again
+            self._patience = 0.5 * DRIVER.watch  # at the next look again
             self.pacer.restart()
             self._one_period()
 

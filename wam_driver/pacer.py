@@ -1,11 +1,10 @@
 """The pace of simulated time: never ahead of the wall clock times a factor, slower where the machine is slower."""
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from wam_description.arm import seconds
-
-SLACK: Final = 0.02  # s of the wall clock that may be made up for; what is later than that is forgotten
+from wam_driver.thresholds import DRIVER
 
 
 class Pace(NamedTuple):
@@ -15,7 +14,7 @@ class Pace(NamedTuple):
     ----------
     factor : simulated time per time of the wall clock.
     behind : largest delay of a period, s of the wall clock.
-    slips : periods, since the start, that were more than `SLACK` late, so that the excess was forgotten.
+    slips : periods, since the start, that were more than `slack` late, so that the excess was forgotten.
     """
 
     factor: float
@@ -33,7 +32,7 @@ class Pacer:
 
     Attributes
     ----------
-    slips : periods that were more than `SLACK` late.
+    slips : periods that were more than `slack` late.
     """
 
     def __init__(self, factor: float, now: Callable[[], float]) -> None:
@@ -59,8 +58,8 @@ class Pacer:
             if late < 0.0:
                 return False
             self._behind = max(self._behind, late)
-            if late > SLACK:
-                self._origin += late - SLACK
+            if late > DRIVER.slack:
+                self._origin += late - DRIVER.slack
                 self.slips += 1
         self._newest = (now, stamp)
         return True

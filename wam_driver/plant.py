@@ -34,6 +34,7 @@ from wam_driver.pusher import pushers
 from wam_driver.start_contacts import require_free_start
 from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Mover, Surfaces
+from wam_driver.thresholds import PLANT
 
 WARNINGS = {
     "inertia": "its inertia matrix is singular",
@@ -44,7 +45,6 @@ WARNINGS = {
     "badqacc": "an acceleration is not finite or huge",
     "badctrl": "a torque is not finite",
 }  # what MuJoCo's warnings mean for the arm
-RIGID = 1e3  # N m of a brake, far above any cable
 OF_MASS = (
     "body_mass",
     "body_subtreemass",
@@ -104,7 +104,7 @@ class Plant:
         effects: Effects,
         step: float,
         friction: FrictionParameters = COULOMB_STICTION,
-        brake_torque: float = RIGID,
+        brake_torque: float = PLANT.rigid_brake,
     ) -> None:
         self._xml_of = partial(mjcf, step=step, world=world, effects=effects)
         self.model = mujoco.MjModel.from_xml_string(self._xml_of(arm))

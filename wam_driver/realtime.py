@@ -8,10 +8,7 @@ from wam_description.arm import Timing
 from wam_description.signals import Answer
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
-
-WINDOW = 2000  # newest periods, of which late ones are counted; stated at the parameter `late_periods`
-SETTLING = 1.0  # s since all nodes are connected, for which the arm waits: their start does not count
-LONGEST_SETTLING = 10.0  # s, for which it waits until few periods are late
+from wam_driver.thresholds import DRIVER
 
 
 class Realtime:
@@ -99,7 +96,7 @@ class Realtime:
         """Keep how many periods were due at the ticks in the window."""
         self._recent.append(due)
         self._recent_done += due
-        while self._recent_done > WINDOW and len(self._recent) > 1:
+        while self._recent_done > DRIVER.window and len(self._recent) > 1:
             self._recent_done -= self._recent.popleft()
 
     def settles(self) -> bool:
@@ -110,9 +107,9 @@ class Realtime:
             self._recent.clear()
             self._recent_done = 0
         waited = now - self._connected
-        if self._late_periods == 1.0 or waited >= LONGEST_SETTLING:
+        if self._late_periods == 1.0 or waited >= DRIVER.longest_settling:
             return False
-        return waited < SETTLING or bool(self.lateness)
+        return waited < DRIVER.settling or bool(self.lateness)
 
     @property
     def lateness(self) -> str:
@@ -136,7 +133,7 @@ class Realtime:
         self._progress = now
         if now - self.command_came > self._watchdog:
             return "no motor_current_command comes in; start velocity_loop and its peers, then enable"
-        return self.lateness if now - self._connected >= SETTLING else ""
+        return self.lateness if now - self._connected >= DRIVER.settling else ""
 
     def pause(self, on: bool) -> None:
         """Stop the time, or let it go on."""

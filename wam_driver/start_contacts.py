@@ -6,9 +6,7 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.parameters import ParameterError
 from wam_description.world import World
-
-DEEPEST = 0.003  # m; of a contact at power-up that counts as touching
-HARDEST = 50.0  # N; with which something soft may press the arm from deeper
+from wam_driver.thresholds import PLANT
 
 
 def require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
@@ -36,12 +34,12 @@ def require_free_start(model: Any, data: Any, arm: Arm, world: World) -> None:
     depths: dict[str, float] = {}
     for geoms, distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
         pair = pairs.get(frozenset(model.geom(geom).name for geom in geoms))
-        if pair is not None and -distance > DEEPEST and -distance * pair.stiffness > HARDEST:
+        if pair is not None and -distance > PLANT.deepest and -distance * pair.stiffness > PLANT.hardest:
             inside = f"{pair.what} is {{}} mm inside cover '{pair.first}' of {links[pair.first]}"
             depths[inside] = max(depths.get(inside, 0.0), -distance)
     if depths:
         found = " and ".join(inside.format(f"{1e3 * depth:.3g}") for inside, depth in depths.items())
         raise ParameterError(
-            f"at power-up {found}; allowed: up to {1e3 * DEEPEST:g} mm, or {HARDEST:g} N by its stiffness; "
+            f"at power-up {found}; allowed: up to {1e3 * PLANT.deepest:g} mm, or {PLANT.hardest:g} N by its stiffness; "
             "move it away from the arm (world), or start the arm in another pose (arm.joints.start)"
         )

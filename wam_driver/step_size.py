@@ -19,12 +19,9 @@ from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError
 from wam_description.world import World
+from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
-FRACTION = 0.5  # of the longest step that is stable without damping, that is accepted
-DAMPED = 0.8  # of the longest step that is stable with damping, that is accepted
-HARDENED_AT = 200.0  # N; the force at which the stiffness of a hardening surface counts
-ON_THE_CIRCLE = 1e-6  # growth of a mode in one step that counts as none
 
 
 class Linearised(NamedTuple):
@@ -67,7 +64,7 @@ def longest_step(mode: Linearised, step: float) -> float:
 
 def _is_too_long(mode: Linearised, step: float) -> bool:
     kick, drag = np.linalg.solve(mode.inertia, np.stack([mode.stiffness, mode.damping]))
-    return _grows(kick, 0.0 * drag, step / FRACTION) or _grows(kick, drag, step / DAMPED)
+    return _grows(kick, 0.0 * drag, step / PLANT.undamped_step) or _grows(kick, drag, step / PLANT.damped_step)
 
 
 def _grows(kick: Array, drag: Array, step: float) -> bool:
@@ -75,7 +72,7 @@ def _grows(kick: Array, drag: Array, step: float) -> bool:
     one = np.eye(len(kick))
     velocity = np.hstack([-step * kick, one - step * drag])
     position = np.hstack([one, np.zeros_like(one)]) + step * velocity
-    return bool(np.abs(np.linalg.eigvals(np.vstack([position, velocity]))).max() > 1.0 + ON_THE_CIRCLE)
+    return bool(np.abs(np.linalg.eigvals(np.vstack([position, velocity]))).max() > 1.0 + PLANT.on_the_circle)
 
 
 def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
@@ -118,7 +115,7 @@ def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[A
             mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(link).id)
             for axis, one in ((a, s) for a in range(3) for s in touched):
                 if cover == one.first or folded(cover) == one.second:
-                    k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * HARDENED_AT / one.stiffness)
+                    k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * PLANT.hardened_at / one.stiffness)
                     reach = rotation[:, axis] @ jacobian
                     if one.second in loosest:
                         reach = reach - loosest[one.second]

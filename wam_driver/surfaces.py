@@ -10,15 +10,12 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs
 from wam_description.world import World
 from wam_driver.reach import within_reach
+from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
 
 SurfaceLaw = tuple[int, int, float, float, float, int, bool]  # see `Surfaces.laws`
-SHARPNESS = (
-    32  # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
-)
 WHOLE = [1.0]
-SMALLEST_DEPTH = 1e-12  # m
 
 
 class Mover(Protocol):
@@ -113,10 +110,10 @@ def _fractions(pairs: Sequence[int], distances: Sequence[float]) -> list[float]:
     otherwise the deepest carries nearly all.  Fractions by number or by depth alone would give energy to a tube that
     tips from end to end.
     """
-    deepest = dict.fromkeys(pairs, SMALLEST_DEPTH)
+    deepest = dict.fromkeys(pairs, PLANT.smallest_depth)
     for pair, distance in zip(pairs, distances, strict=True):
         deepest[pair] = max(deepest[pair], -distance)
-    weights = [(max(-d, 0.0) / deepest[pair]) ** SHARPNESS for pair, d in zip(pairs, distances, strict=True)]
+    weights = [(max(-d, 0.0) / deepest[pair]) ** PLANT.sharpness for pair, d in zip(pairs, distances, strict=True)]
     totals = dict.fromkeys(pairs, 0.0)
     for pair, weight in zip(pairs, weights, strict=True):
         totals[pair] += weight

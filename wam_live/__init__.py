@@ -10,6 +10,7 @@
 - scenario_player: a scenario or task played into a running stack
 - hold: a topic that is published while somebody drags or presses
 - playback: a bag as the source
+- thresholds: times and sizes
 
 Other programs next to a running stack:
 

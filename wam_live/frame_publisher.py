@@ -1,6 +1,6 @@
 """/tf and /tf_static of a running stack, where tf2_msgs is installed."""
 
-from typing import Any, Final
+from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
@@ -11,10 +11,9 @@ from tf2_msgs.msg import TFMessage
 from wam_description.arm import Shared
 from wam_description.frames import ArmFrames, FramePlacement
 from wam_description.topics import BY_NAME
+from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, read_joint_state
 from wam_ros.topics import NAMESPACE, header, qos, stamp_of
-
-DEPTH: Final = 100  # of /tf, as tf2_ros has it
 
 
 class FramesNode(Node):
@@ -36,7 +35,7 @@ class FramesNode(Node):
         self._period = shared.timing.outer_period_ns * shared.timing.display_divisor
         self._last = -self._period
         place = "/" if prefix or namespace.strip("/") == NAMESPACE else ""
-        self._moving = self.create_publisher(TFMessage, f"{place}tf", QoSProfile(depth=DEPTH))
+        self._moving = self.create_publisher(TFMessage, f"{place}tf", QoSProfile(depth=LIVE.depth))
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._fixed = self.create_publisher(TFMessage, f"{place}tf_static", latched)
         self._fixed.publish(TFMessage(transforms=[_message(one, 0) for one in self._frames.fixed]))

@@ -8,12 +8,12 @@ from rclpy.node import Node
 from wam_description.arm import Shared
 from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
+from wam_live.thresholds import LIVE
 from wam_ros.messages import message_type
 from wam_ros.topics import qos
 from wam_ros.wire import encoder
 
 KEYS: Final = {"sim/disturbance": "key push", "force_command": "key force"}
-DELIVERY: Final = 0.2  # s, in which the last message has arrived
 
 
 class HeldTopic:
@@ -57,6 +57,6 @@ class HeldTopic:
     def end(self) -> None:
         """Leave the topic to others, once what was sent has arrived."""
         if self._publisher is not None:
-            self._publisher.wait_for_all_acked(Duration(seconds=DELIVERY))
+            self._publisher.wait_for_all_acked(Duration(seconds=LIVE.delivery))
             self._node.destroy_publisher(self._publisher)
             self._publisher = None

@@ -5,7 +5,7 @@ It publishes nothing before somebody drags or presses, and no longer than that.
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any
 
 from rclpy.node import Node
 
@@ -24,15 +24,13 @@ from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
+from wam_live.thresholds import LIVE
 from wam_ros.messages import message_type
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import Connection
 from wam_ros.topics import qos
 from wam_ros.wire import stamp_of
-
-RATE: Final = 30.0  # Hz, of the picture
-PANEL_EVERY: Final = 6  # pictures, between changes of plots and texts
 
 
 class LivePage:
@@ -130,7 +128,7 @@ class LivePage:
     ) -> None:
         count, next_time = 0, time.monotonic()
         while not until():
-            next_time = max(next_time + 1.0 / RATE, time.monotonic())
+            next_time = max(next_time + 1.0 / LIVE.rate, time.monotonic())
             while (left := next_time - time.monotonic()) > 0.0:
                 self._connection.executor.spin_once(timeout_sec=left)
             snapshot = source.snapshot()
@@ -139,7 +137,7 @@ class LivePage:
                 objects.show(snapshot.objects)
                 push = scene.push()
                 panel.take(snapshot)
-                if count % PANEL_EVERY == 0:
+                if count % LIVE.panel_every == 0:
                     pushing, pressing = (size(one.force) if one else 0.0 for one in (push, self._press))
                     panel.show(snapshot, pushing, pressing)
             count += 1

@@ -15,16 +15,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from wam_live.thresholds import LIVE
+
 HOST: Final = "127.0.0.1"
-PORT: Final = 8080
-PORTS: Final = 100  # from that one on, of which the first free one is taken
 TITLE: Final = "WAM"
-NARROW: Final = 576  # px, of a window; below it viser puts the panel under the picture
 CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
 UP: Final = np.array([0.0, 0.0, 1.0])
-WIDE: Final = 1100  # px, of a window; in one that is narrower the panel covers a part of the arm
-PANEL: Final = 335  # px, width of the panel and its margin
-FARTHER: Final = 1.8, 1.3  # times, in a narrow window and in one between
 INSTALL: Final = "pip install 'wam_stack[live]'"
 
 
@@ -48,15 +44,16 @@ def free_port(wanted: int | None, notify: Callable[[str], None]) -> int:
 
     Parameters
     ----------
-    wanted : the one of an option; None takes `PORT`, or the next one that is free.
-    say : called with a line for people where `PORT` was not free.
+    wanted : the one of an option; None takes `port`, or the next one that is free.
+    say : called with a line for people where `port` was not free.
     """
-    if wanted is not None or port_is_free(PORT):
-        return PORT if wanted is None else wanted
-    port = next(filter(port_is_free, range(PORT + 1, PORT + PORTS)), PORT)
-    if port != PORT:
+    if wanted is not None or port_is_free(LIVE.port):
+        return LIVE.port if wanted is None else wanted
+    port = next(filter(port_is_free, range(LIVE.port + 1, LIVE.port + LIVE.ports)), LIVE.port)
+    if port != LIVE.port:
         notify(
-            f"port {PORT} is taken by another program: a page there may be of another arm; this one's is {url(port)}"
+            f"port {LIVE.port} is taken by another program: a page there may be of another arm; this one's is "
+            f"{url(port)}"
         )
     return port
 
@@ -132,15 +129,15 @@ def name_page(server: Any, label: str, more: str = "") -> None:
 def _look_next_to_the_panel(client: Any) -> None:
     """Where the panel covers the lower half of a window, or much of its right, see the arm amid the rest."""
     camera = client.camera
-    if camera.image_width >= WIDE:
+    if camera.image_width >= LIVE.wide:
         return
-    is_narrow = camera.image_width < NARROW
+    is_narrow = camera.image_width < LIVE.narrow
     position, target = map(np.array, CAMERA)
-    away = FARTHER[not is_narrow] * (position - target)
+    away = LIVE.farther[not is_narrow] * (position - target)
     metres = np.linalg.norm(away) * math.tan(0.5 * camera.fov) / (0.5 * camera.image_height)  # of a pixel
     right = np.cross(UP, away) / np.linalg.norm(np.cross(UP, away))
     camera.position = target + away
-    camera.look_at = target + metres * (-0.29 * camera.image_height * UP if is_narrow else 0.5 * PANEL * right)
+    camera.look_at = target + metres * (-0.29 * camera.image_height * UP if is_narrow else 0.5 * LIVE.panel * right)
 
 
 @contextlib.contextmanager

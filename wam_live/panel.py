@@ -18,17 +18,11 @@ from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
 from wam_description.status import PAUSED, REACTION
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
+from wam_live.thresholds import LIVE
 
-WINDOW: Final = 15.0  # s of the arm's time in the plots
-POINTS: Final = 300  # of a line at most
 FORCES: Final = ("true", "commanded", "measured", "estimated", "at least")  # of the plot, the last one in front
 PLACES: Final = ("true", "estimated")
 FORCE_TITLE: Final = "force [N]"
-RANGES: Final = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)  # N, upper ends of its axis
-STATUS_HEIGHT: Final = 150  # px
-NOTE_HEIGHT: Final = 40  # px
-SILENT: Final = 2.0  # s without a state, after which the page reports that
-MARK: Final = 0.5  # s between the rings of a lower bound
 HINT: Final = "Enable releases the brakes; then drag a link to push it."  # until there is an answer
 LEGEND: Final = (  # of the arrows and the range in the scene
     ("&#10145;", "true", "true (simulator)"),
@@ -99,19 +93,19 @@ class Controls:
         self.requests: SimpleQueue[Request] = SimpleQueue()
         self._gui = gui = server.gui
         self.snapshot = Snapshot()
-        self._drawn, self._high = math.nan, RANGES[0]
-        self._samples: deque[tuple[float, ...]] = deque(maxlen=POINTS)
+        self._drawn, self._high = math.nan, LIVE.ranges[0]
+        self._samples: deque[tuple[float, ...]] = deque(maxlen=LIVE.points)
         self._sliders: dict[tuple[str, str], Any] = {}
         gui.configure_theme(control_width="medium", show_share_button=False)
         if live is not None:
             self._add_buttons()  # above all that changes its height
-        self._status = gui.add_html(boxed(status_page(Snapshot()), STATUS_HEIGHT))
-        self._shown = gui.add_html(boxed(paragraph(HINT), NOTE_HEIGHT) if live is not None else "")
+        self._status = gui.add_html(boxed(status_page(Snapshot()), LIVE.status_height))
+        self._shown = gui.add_html(boxed(paragraph(HINT), LIVE.note_height) if live is not None else "")
         gui.add_html(legend(LEGEND if live is not None else LEGEND[:-1]))
         if live is not None:
             self._add_press(arm)
             self._add_scenario()
-        self._force_plot = self._add_plot(FORCE_TITLE, FORCES, RANGES[0])
+        self._force_plot = self._add_plot(FORCE_TITLE, FORCES, LIVE.ranges[0])
         self._place_plot = self._add_plot("position along the link [m]", PLACES, max(arm.covers.end))
         if live:
             self._add_sliders(live)
@@ -122,7 +116,7 @@ class Controls:
         """Keep an instant for the plots; call it with every picture."""
         if self._samples and snapshot.seconds < self._samples[-1][0]:
             self._samples.clear()  # the arm was started again, or the bag was moved back
-        if not self._samples or snapshot.seconds > self._samples[-1][0] + 0.9 * WINDOW / POINTS:
+        if not self._samples or snapshot.seconds > self._samples[-1][0] + 0.9 * LIVE.window / LIVE.points:
             self._samples.append(sample(snapshot))
 
     def show(self, snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0) -> None:
@@ -134,7 +128,7 @@ class Controls:
         pushing, pressing : forces that the page pushes a link with and commands, N, 0 for none.
         """
         self.snapshot = snapshot
-        status = boxed(status_page(snapshot, pushing, pressing), STATUS_HEIGHT)
+        status = boxed(status_page(snapshot, pushing, pressing), LIVE.status_height)
         if status != self._status.content:
             self._status.content = status
         self.take(snapshot)
@@ -151,7 +145,7 @@ class Controls:
     def notify(self, text: str, refused: bool = False) -> None:
         """Show the answer to the last request."""
         stated = paragraph(f"{'refused: ' * refused}{html.escape(text)}", DOTS[Level.ERROR] if refused else "")
-        self._shown.content = boxed(stated, NOTE_HEIGHT)
+        self._shown.content = boxed(stated, LIVE.note_height)
 
     def set_slider(self, node: str, name: str, value: Any) -> None:
         """Put a slider where its parameter is."""
@@ -224,11 +218,11 @@ class Controls:
 
     def _draw(self) -> None:
         newest = self._drawn = self._samples[-1][0]
-        rows = np.array([row for row in self._samples if row[0] >= newest - WINDOW])
+        rows = np.array([row for row in self._samples if row[0] >= newest - LIVE.window])
         time, force, place = rows[:, :1], rows[:, 1 : 1 + len(FORCES)], rows[:, 1 + len(FORCES) :]
-        between = np.diff(np.floor(rows[:, 0] / MARK), prepend=math.nan) == 0.0
+        between = np.diff(np.floor(rows[:, 0] / LIVE.mark), prepend=math.nan) == 0.0
         force[between, FORCES.index("at least")] = math.nan
-        high = next((one for one in RANGES if one > np.nanmax(force, initial=0.0)), RANGES[-1])
+        high = next((one for one in LIVE.ranges if one > np.nanmax(force, initial=0.0)), LIVE.ranges[-1])
         if high != self._high:
             # a plot whose scales are changed stays at its old range of time, and empty: another takes its place
             old, self._high = self._force_plot, high
@@ -297,7 +291,7 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
     driver = snapshot.statuses.get("driver")
     mode = mode_of(snapshot.statuses) or "waiting for the stack"
     is_paused = driver is not None and PAUSED in driver.facts
-    lost = driver is not None and not is_paused and snapshot.silent > SILENT
+    lost = driver is not None and not is_paused and snapshot.silent > LIVE.silent
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
     factor = " · paused" if is_paused else factor
     lines = [

@@ -18,14 +18,13 @@ from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Obje
 from wam_description.world import NO_SPRINGS, World
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
-from wam_live.panel import POINTS, WINDOW, Controls
+from wam_live.panel import Controls
 from wam_live.scene import Scene
 from wam_live.snapshot import NAN, Snapshot
+from wam_live.thresholds import LIVE
 from wam_sim.replay import tables
 
-RATE: Final = 30.0  # Hz, of the picture
 SPEEDS: Final = ("0.1", "0.25", "0.5", "1", "2", "5")
-HELD: Final = 100_000_000  # ns for which a recorded estimate is shown
 
 
 class BagSource:
@@ -74,7 +73,7 @@ class BagSource:
         traces, row = self._traces, int(np.searchsorted(self._traces.stamp, stamp, side="right")) - 1
         known = row >= 0
         estimate = bisect_right(self._likely_stamps, stamp) - 1
-        is_fresh = estimate >= 0 and stamp - self._likely_stamps[estimate] < HELD
+        is_fresh = estimate >= 0 and stamp - self._likely_stamps[estimate] < LIVE.held
         until = bisect_right(self._status_stamps, stamp)
         return Snapshot(
             stamp=stamp,
@@ -98,8 +97,8 @@ class BagSource:
 
     def past(self, stamp: int) -> Iterator[Snapshot]:
         """What the plots show before a time of the arm, ns, oldest first."""
-        first = max(self.begin, stamp - round(WINDOW * 1e9))
-        return (self.snapshot(int(at)) for at in np.linspace(first, stamp, POINTS, endpoint=False))
+        first = max(self.begin, stamp - round(LIVE.window * 1e9))
+        return (self.snapshot(int(at)) for at in np.linspace(first, stamp, LIVE.points, endpoint=False))
 
     def _alone(self, row: int) -> Contact:
         """The estimated contact of a bag without `contact/hypotheses`; none where its position was not recorded.
@@ -154,7 +153,7 @@ def play(
         slider.on_update(moved)
         shown = math.nan
         while not until():
-            time.sleep(1.0 / RATE)
+            time.sleep(1.0 / LIVE.rate)
             now = time.monotonic()
             if running.value:
                 place += (now - then) * float(speed.value)

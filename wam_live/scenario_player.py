@@ -11,11 +11,10 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, values
 from wam_description.yaml_text import parameter_text
+from wam_live.thresholds import LIVE
 from wam_ros.bring_up import NodeProcess
 
 NODE = "scenario"
-SPEED = 0.5  # rad/s, mean of the fastest joint in a motion that the page requested
-SHORTEST = 1.0  # s
 
 
 class ScenarioPlayer:
@@ -35,7 +34,11 @@ class ScenarioPlayer:
     def move(self, start: Sequence[float], end: Sequence[float]) -> str:
         """Move from posture to posture, rad; returns why that is not possible, '' where it is."""
         most = max(abs(b - a) for a, b in zip(start, end, strict=True))
-        step = {"name": "bend the arm", "seconds": max(SHORTEST, round(most / SPEED, 1)), "posture": list(end)}
+        step = {
+            "name": "bend the arm",
+            "seconds": max(LIVE.shortest, round(most / LIVE.speed, 1)),
+            "posture": list(end),
+        }
         file = Path(self._folder.name) / "move.yaml"
         file.write_text(yaml.safe_dump({"steps": [step]}), encoding="utf-8")
         return self.play(str(file))

@@ -22,13 +22,9 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, LikelyRange, Wrench
 from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
+from wam_live.thresholds import LIVE
 
-LONGEST_ARROW = 0.6  # m
 ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one point
-VISERS_LONGEST = 0.9  # m, beyond which the head of viser's arrow does not grow
-DEEPER = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
-STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
-STRONGEST = 40.0  # N, that a drag pushes with
 
 Array = NDArray[np.float64]
 
@@ -164,7 +160,7 @@ class Scene:
         if known:
             pose = self._body.cover_pose(self._q, contact.cover)
             start = self.point(contact.cover, contact.position)
-            scale = min(length, LONGEST_ARROW) / length * LAYOUT.metres_per_newton
+            scale = min(length, LIVE.longest_arrow) / length * LAYOUT.metres_per_newton
             end = start + scale * pose.rotation @ np.array(contact.force)
             arrow.points = np.array([[start, end]], dtype=np.float32)
             if name == "estimated":
@@ -219,7 +215,7 @@ class Scene:
             point = self._body.point(self._q, drag.grip.cover, drag.grip.point)
             self._band.points = np.array([[point, drag.pointer]], dtype=np.float32)
             # viser draws an arrow of its own in another colour at the pointer that drags; this one is around it
-            length = min(float(np.linalg.norm(drag.pointer - point)), VISERS_LONGEST)
+            length = min(float(np.linalg.norm(drag.pointer - point)), LIVE.longest_head)
             self._band.head_length, self._band.head_radius = 0.22 * length, 0.06 * length
 
 
@@ -232,8 +228,8 @@ def band_push(grip: Grip, pointer: Array) -> Wrench:
     along = (grip.end - grip.start) / np.linalg.norm(grip.end - grip.start)
     at = grip.start + along * np.clip(along @ (grip.point - grip.start), 0.0, along @ (grip.end - grip.start))
     stretch = pointer - grip.point
-    force = STIFFNESS * (stretch - along * (along @ stretch))
-    force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
+    force = LIVE.stiffness * (stretch - along * (along @ stretch))
+    force *= min(1.0, LIVE.strongest / max(float(np.linalg.norm(force)), 1e-9))
     fx, fy, fz = force.tolist()
     tx, ty, tz = np.cross(at, force).tolist()
     return Wrench(grip.cover, (fx, fy, fz), (tx, ty, tz))
@@ -241,7 +237,7 @@ def band_push(grip: Grip, pointer: Array) -> Wrench:
 
 def lit(colour: str) -> tuple[int, int, int]:
     """Red, green and blue of a thing that is to be seen in a colour under the lights of the page."""
-    red, green, blue = (round(255.0 * (part / 255.0) ** DEEPER) for part in channels(colour))
+    red, green, blue = (round(255.0 * (part / 255.0) ** LIVE.deeper) for part in channels(colour))
     return red, green, blue
 
 

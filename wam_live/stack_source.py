@@ -16,11 +16,11 @@ from wam_description.arm import Shared
 from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.snapshot import NAN, Snapshot, size
+from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.outlets import COPIED, NEWEST, copy_name
 from wam_ros.wire import decoder, stamp_of
 
-OLD: Final = 500_000_000  # ns of the arm's time, after which a force or a contact is not shown
 TOPICS: Final = (*sorted(COPIED), "force_command")  # of which everybody may be the publisher
 LATCHED: Final = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
@@ -106,7 +106,7 @@ class RunningStack:
 
     def _fresh(self, topic: str) -> Any:
         """The newest of a topic, None where it is old: its node may be gone."""
-        is_old = self.stamp - self._stamps.get(topic, 0) >= OLD
+        is_old = self.stamp - self._stamps.get(topic, 0) >= LIVE.old
         return None if is_old else self._newest.get(topic)
 
     def _silent(self) -> float:

@@ -23,13 +23,12 @@ from wam_description.arm import Shared
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.stack_client import run_next_to
+from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
 from wam_ros.topics import qos
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"
-FEEDBACK: Final = 0.05  # s of the arm's time between two messages
-SILENCE: Final = 2.0  # s of the wall clock without a state of the arm, after which a goal ends
 
 
 class TrajectoryActionNode(Node):
@@ -63,8 +62,8 @@ class TrajectoryActionNode(Node):
 
     def watch(self) -> None:
         """End a goal of an arm that publishes nothing more; to be called now and then."""
-        if self._goal and time.monotonic() - self._last > SILENCE:
-            self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"no joint_states for {SILENCE:g} s"))
+        if self._goal and time.monotonic() - self._last > LIVE.silent:
+            self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"no joint_states for {LIVE.silent:g} s"))
 
     async def _follow(self, handle: Any) -> Any:
         """Run a goal to its end."""
@@ -136,7 +135,7 @@ class TrajectoryActionNode(Node):
         trajectory = following.handle.request.trajectory
         trajectory.header.stamp = message.header.stamp
         following.publisher.publish(trajectory)
-        if stamp - following.reported >= FEEDBACK * 1e9 and following.goal.desired:
+        if stamp - following.reported >= LIVE.feedback * 1e9 and following.goal.desired:
             following.reported = stamp
             following.handle.publish_feedback(self._feedback(message, joints, following.goal))
 

@@ -17,9 +17,10 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ForceCommand, Wrench
 from wam_description.transmission_map import TransmissionMap
-from wam_driver.driver import RECENT, Driver, DriverParameters
+from wam_driver.driver import Driver, DriverParameters
 from wam_driver.limit_watch import LimitWatch, WatchedLimit
 from wam_driver.safety import Mode
+from wam_driver.thresholds import DRIVER
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
 ARM = WAM.shared.arm
@@ -223,7 +224,7 @@ def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float) -> Non
     play(0.1, [2.0 * current + 2.0 for current in at_rest])
     reason, _, advice = hardware.safety.fault.partition("; ")
     assert reason.startswith("speed of the tip ")
-    if ended > RECENT:
+    if ended > DRIVER.recent:
         assert advice == "command less"
     elif ended:
         assert re.fullmatch(r"a push acted until 0.\d\d s before \(1.2 N on outer_link\): push or command less", advice)

@@ -9,11 +9,12 @@ from arms import CONFIGURATION
 from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
 from wam_driver.driver import Driver, DriverParameters
-from wam_driver.lockstep import WATCH, Lockstep
-from wam_driver.pacer import SLACK, Pacer
+from wam_driver.lockstep import Lockstep
+from wam_driver.pacer import Pacer
 from wam_driver.realtime import Realtime
 from wam_driver.safety import Mode
 from wam_driver.session import Session
+from wam_driver.thresholds import DRIVER
 
 MS = 1_000_000
 HOLDING = [0.0] * 4
@@ -67,12 +68,12 @@ def test_a_slow_machine_slows_the_arm() -> None:
     assert count == pytest.approx(1000, abs=2)
     pace = pacer.report()
     assert pace.factor == pytest.approx(0.5, rel=0.01)
-    assert pace.behind <= SLACK + 0.0021
+    assert pace.behind <= DRIVER.slack + 0.0021
     assert pace.slips > 900
 
 
 def test_a_short_delay_is_made_up_for_and_of_a_long_one_no_more_than_the_slack() -> None:
-    for delay, lost in ((0.9 * SLACK, 0.0), (10.0, 10.0 - SLACK)):
+    for delay, lost in ((0.9 * DRIVER.slack, 0.0), (10.0, 10.0 - DRIVER.slack)):
         clock = FalseClock()
         pacer = Pacer(1.0, clock)
         waits = iter([delay])
@@ -169,7 +170,7 @@ def test_an_answer_that_does_not_come_is_a_fault_by_name_braked_or_not(
         bench.driver.enable("")
     begin = bench.clock.time
     while not bench.driver.safety.fault:
-        bench.clock.time += WATCH
+        bench.clock.time += DRIVER.watch
         lockstep.watch()
         assert bench.clock.time - begin < 2.0
     assert bench.driver.safety.fault == (
@@ -177,7 +178,7 @@ def test_an_answer_that_does_not_come_is_a_fault_by_name_braked_or_not(
     )
     assert bench.driver.currents == [0.0] * 4
     sent = len(bench.sent)
-    bench.clock.time += WATCH
+    bench.clock.time += DRIVER.watch
     lockstep.watch()
     assert len(bench.sent) == sent + 1, "time creeps, so that a node that was restarted is sent states"
     assert lockstep.obstacle() == f"no motor_current_command comes in; {advice}, then enable"
@@ -201,7 +202,7 @@ def test_a_pause_is_no_missing_answer_and_a_step_is_one_period() -> None:
     assert lockstep.step().message == "refused: the driver is running; call pause first"
     lockstep.pause(True)
     for _ in range(200):
-        bench.clock.time += WATCH
+        bench.clock.time += DRIVER.watch
         lockstep.watch()
     assert bench.driver.safety.fault == ""
     assert lockstep.step().message == "refused: still waiting for motor_current_command"

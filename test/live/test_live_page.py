@@ -15,6 +15,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -53,6 +54,7 @@ from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 from wam_live.page import free_port as next_free_port
+from wam_live.thresholds import LIVE
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
@@ -61,22 +63,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import (  # noqa: E402
-    DITHER,
-    FORCES,
-    NO_PRESS,
-    POINTS,
-    RANGES,
-    Bend,
-    Controls,
-    Play,
-    Press,
-    dot,
-    sample,
-    status_page,
-)
+from wam_live.panel import DITHER, FORCES, NO_PRESS, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
-from wam_live.scene import STRONGEST, Grip, Scene, band_push  # noqa: E402
+from wam_live.scene import Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
@@ -168,7 +157,7 @@ def test_a_drag_pushes_like_a_rubber_band_of_limited_strength() -> None:
     assert push.force == pytest.approx((0.0, 6.0, 0.0))
     assert push.torque == pytest.approx((0.0, 0.0, 1.2))
     far = band_push(Grip("outer_link", START, START, END), np.array([0.0, 0.0, 9.0]))
-    assert far.force == pytest.approx((0.0, 0.0, STRONGEST))
+    assert far.force == pytest.approx((0.0, 0.0, LIVE.strongest))
 
 
 def test_a_drag_at_the_surface_pushes_at_the_axis_and_across_it_only() -> None:
@@ -302,7 +291,7 @@ def test_a_page_goes_beside_a_taken_port_and_says_so(monkeypatch: pytest.MonkeyP
         taken.bind((HOST, 0))
         taken.listen()
         port = taken.getsockname()[1]
-        monkeypatch.setattr("wam_live.page.PORT", port)
+        monkeypatch.setattr("wam_live.page.LIVE", replace(LIVE, port=port))
         ours = next_free_port(None, said.append)
         assert next_free_port(port, said.append) == port  # one that was asked for
     assert ours > port
@@ -491,7 +480,7 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     assert pushed.true.position == pytest.approx(0.3, abs=1e-6)
     assert pushed.estimated.position_sd > 0.0
     assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
-    assert len(list(source.past(400_000_000))) == POINTS
+    assert len(list(source.past(400_000_000))) == LIVE.points
     levels = [source.snapshot(at).statuses["force_loop"].level for at in (400_000_000, 650_000_000)]
     assert levels == [Level.OK, Level.WARN]  # of the press at 0.6 s, whose status has no stamp
 
@@ -840,7 +829,7 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                 until(lambda: panel.snapshot.true.cover == "outer_link")
                 until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
                 until(lambda: "you push with" in tab.text())
-                until(lambda: panel._force_plot.scales["y"]["range"][1] > RANGES[0])
+                until(lambda: panel._force_plot.scales["y"]["range"][1] > LIVE.ranges[0])
                 until(lambda: all(count > 20 for count in tab.drawn(TRUE)))  # also the plot whose range has changed
                 tab.mouse("mouseReleased", x + 144.0, y, False)
                 until(lambda: panel.snapshot.true.cover == "")

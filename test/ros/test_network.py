@@ -17,7 +17,7 @@ from conftest import LONG, ROOT
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_driver.lockstep import ROLL_CALL
+from wam_driver.thresholds import DRIVER
 from wam_ros.network import (
     FIRST_PORT,
     OPEN,
@@ -34,7 +34,7 @@ from wam_ros.network import (
 
 WIDE_OPEN = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "192.0.2.77"}
 PARAMETERS = ("--ros-args", "--params-file", str(ROOT / "config" / "wam.yaml"))
-DRIVER = ("-m", "wam_ros.program", "driver", *PARAMETERS)
+PROGRAM = ("-m", "wam_ros.program", "driver", *PARAMETERS)
 LOOPBACK = "0100007F"  # as in /proc/net/udp
 UNLIMITED = {"FASTRTPS_DEFAULT_PROFILES_FILE": "", "SKIP_DEFAULT_XML_FILE": ""}  # as before the tests limit themselves
 
@@ -63,7 +63,7 @@ def test_what_was_lost_is_repeated_before_lockstep_calls_it_missing() -> None:
     dds = "{http://www.eprosima.com}"
     (period,) = ElementTree.parse(PROFILE).iter(f"{dds}heartbeatPeriod")
     repeated = int(period.findtext(f"{dds}sec") or 0) + int(period.findtext(f"{dds}nanosec") or 0) * 1e-9
-    assert 0.0 < 3.0 * repeated < Configuration.load(packaged("wam")).shared.timing.timeout - ROLL_CALL
+    assert 0.0 < 3.0 * repeated < Configuration.load(packaged("wam")).shared.timing.timeout - DRIVER.roll_call
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ def test_it_is_opened_on_purpose_only_and_by_one_switch() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [DRIVER, ("-m", "wam_cli.main", "node", "driver"), ("-m", "wam_cli.main", "up")], ids=" ".join
+    "command", [PROGRAM, ("-m", "wam_cli.main", "node", "driver"), ("-m", "wam_cli.main", "up")], ids=" ".join
 )
 def test_every_program_listens_on_the_loopback_interface_alone(
     command: tuple[str, ...], programs: Callable[..., subprocess.Popen[str]], domain_id: int
@@ -151,7 +151,7 @@ def test_every_program_listens_on_the_loopback_interface_alone(
 def test_the_switch_opens_a_program_and_a_wrong_one_ends_it_in_one_sentence(
     switch: str, addresses: set[str], programs: Callable[..., subprocess.Popen[str]], domain_id: int
 ) -> None:
-    process = programs(*DRIVER, **UNLIMITED, **{SWITCH: switch})
+    process = programs(*PROGRAM, **UNLIMITED, **{SWITCH: switch})
     if addresses:
         wait_for_place(domain_id, "/wam", "driver", process)
         assert {address for address, _ in bound(domain_id)} == addresses
@@ -162,7 +162,7 @@ def test_the_switch_opens_a_program_and_a_wrong_one_ends_it_in_one_sentence(
 def test_an_ordinary_ros_program_of_this_machine_finds_the_stack(
     programs: Callable[..., subprocess.Popen[str]], domain_id: int
 ) -> None:
-    wait_for_place(domain_id, "/wam", "driver", programs(*DRIVER))
+    wait_for_place(domain_id, "/wam", "driver", programs(*PROGRAM))
     plain = {**UNLIMITED, "ROS_AUTOMATIC_DISCOVERY_RANGE": ""}
     assert "reached" in said(programs("-c", STRANGER, str(LONG), **plain))
 
@@ -217,7 +217,7 @@ def test_another_host_reaches_the_stack_only_where_it_was_invited(
     invited: bool, programs: Callable[..., subprocess.Popen[str]], domain_id: int, hosts: tuple[tuple[str, ...], ...]
 ) -> None:
     here, elsewhere = hosts
-    driver = programs(*DRIVER, before=here, **UNLIMITED, **({SWITCH: OPEN} if invited else {}))
+    driver = programs(*PROGRAM, before=here, **UNLIMITED, **({SWITCH: OPEN} if invited else {}))
     plain = {**UNLIMITED, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     if not invited:  # once a stranger on the same host has reached it, it is there
         local = said(programs("-c", STRANGER, str(20.0), before=here, **plain))
@@ -354,9 +354,9 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
 def test_a_node_that_runs_already_is_refused_and_the_first_one_does_not_notice(
     programs: Callable[..., subprocess.Popen[str]], domain_id: int
 ) -> None:
-    first = programs(*DRIVER)
+    first = programs(*PROGRAM)
     wait_for_place(domain_id, "/wam", "driver", first)
-    second = programs(*DRIVER)
+    second = programs(*PROGRAM)
     text = said(second)
     assert second.returncode == 1
     assert re.fullmatch(
@@ -404,7 +404,7 @@ def test_enforced_security_without_the_middleware_s_part_for_it_ends_a_node_in_o
         "ROS_SECURITY_KEYSTORE": str(tmp_path),
         "ROS_SECURITY_ENCLAVE_OVERRIDE": "/wam",
     }
-    process = programs(*DRIVER, **settings)
+    process = programs(*PROGRAM, **settings)
     text = said(process)
     assert process.returncode == 1
     assert "Traceback" not in text, text

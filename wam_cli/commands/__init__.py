@@ -17,7 +17,7 @@ from typing import NamedTuple
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
 from wam_description.configuration import Configuration, files_of, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, ONE
-from wam_live.page import PORT
+from wam_live.thresholds import LIVE
 from wam_sim.batch import executor
 from wam_sim.pieces import default_file
 from wam_sim.progress import Progress
@@ -206,7 +206,7 @@ def is_paced(configuration: Configuration) -> bool:
 def take_port(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --port."""
     parser.add_argument(
-        "--port", type=port, help=f"of the page on this machine; default: {PORT}, or the next one that is free"
+        "--port", type=port, help=f"of the page on this machine; default: {LIVE.port}, or the next one that is free"
     )
 
 
