@@ -295,7 +295,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "refusals": refusals,
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
         "force tasks": lambda: f"\n{(ROOT / 'docs' / 'force-tasks.txt').read_text(encoding='utf-8')}",
-        "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
@@ -462,15 +461,6 @@ def refusals() -> str:
     return "```\n" + "\n".join(lines) + "\n```\n"
 
 
-def measure_guard() -> None:
-    """Validate the guard by Monte Carlo simulation and keep the two tables."""
-    command = [sys.executable, "-m", "wam_cli.main", "guard"]
-    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"the guard accepted a diverging set; docs/guard.txt is unchanged:\n{done.stdout}")
-    (ROOT / "docs" / "guard.txt").write_text(done.stdout.rstrip() + "\n", encoding="utf-8")
-
-
 def measure_elbow() -> None:
     """Press with a nearly straight elbow and keep the table."""
     table = elbow_table(elbow(Configuration.load(CONFIGURATION)))
@@ -560,18 +550,15 @@ DRAWN = {
 
 
 def main() -> None:
-    """Validate the guard, write the pages, then the pictures."""
+    """Write the pages, then the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=DRAWN, default="", help="nothing but these pictures, and what goes with them")
-    parser.add_argument(
-        "--pages", action="store_true", help="pages only, without demonstration and validation of the guard"
-    )
+    parser.add_argument("--pages", action="store_true", help="pages only, without demonstration")
     given = parser.parse_args()
     if given.only:
         DRAWN[given.only]()
         return
     if not given.pages:
-        measure_guard()
         measure_elbow()
         measure_force_tasks()
     for path, text in pages().items():

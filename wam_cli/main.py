@@ -29,8 +29,8 @@ COMMANDS = {
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run experiments of the thesis, record them and print predicted against measured",
     "sweep": "play a scenario with many parameter sets: a table and a plot",
-    "evaluate": "seeded studies (contact, force, identify, faults, soak); the thesis's figures",
-    "guard": "validate the stability guard by Monte Carlo simulation, or assess a force loop of your own",
+    "evaluate": "seeded studies (contact, force, guard, identify, faults, soak); the thesis's figures",
+    "guard": "assess the force loop of an arm, or your own, by the stability guard",
     "conform": "test a driver, the simulated one or yours, against the contract of drivers",
     "model": "print the arm's model as URDF or MJCF, or compare it with the requisites of chapter 3",
 }

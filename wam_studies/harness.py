@@ -28,6 +28,7 @@ Record = TypeVar("Record")
 STUDIES: Final = {
     "contact": "wam_studies.contact.study:ContactStudy",
     "force": "wam_studies.force_benchmark.study:ForceStudy",
+    "guard": "wam_studies.stability.guard_validation:GuardStudy",
     "identify": "wam_studies.identification.study:IdentificationStudy",
 }
 
@@ -97,7 +98,7 @@ class Study(ABC, Generic[Case, Record]):
         """One record in full."""
         return str(record)
 
-    def sets(self, case: Case) -> Collection[str]:
+    def own_values(self, case: Case) -> Collection[str]:
         """Parameters that a case sets itself, so that --set has no effect on them."""
         return ()
 

@@ -86,7 +86,7 @@ def run_study(given: argparse.Namespace) -> int:
     cases = {seed: chosen_cases(study, seed, given.cases, given.only or ()) for seed in given.seeds}
     every = [case for own in cases.values() for case in own]
     if given.values:
-        refuse_overridden(given, {name for case in every for name in study.sets(case)}, "each case")
+        refuse_overridden(given, {name for case in every for name in study.own_values(case)}, "each case")
     with batch_of(given, max(len(every), 1)) as batch:
         measured = evaluate(study, cases, *batch)
     if given.only:

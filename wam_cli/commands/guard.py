@@ -1,15 +1,13 @@
-"""`wam guard`: the guard validated by Monte Carlo simulation; or the force loop of an arm, or your own, assessed."""
+"""`wam guard`: the force loop of an arm, or your own, assessed by the stability guard."""
 
 import argparse
 import math
-import sys
 from pathlib import Path
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.identification.recorded_loop import LoopNumber, RecordedLoop, recorded_loop
 from wam_cli.commands import (
     BASE_CONFIGURATION,
-    at_least,
     configuration_of,
     take_configuration,
     take_topic_map,
@@ -19,8 +17,7 @@ from wam_cli.commands import (
 from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.loop_design import loop_design
-from wam_description.configuration import Configuration
-from wam_studies.stability.guard_validation import Trial, exact_trials, table, testbed_trials
+from wam_description.configuration import Configuration, packaged
 from wam_studies.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
@@ -43,9 +40,6 @@ NUMBERS = (*PLANT, "stiction", *LOOP)
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("--sets", type=int, default=200, help="random sets for the exact integrator; default: 200")
-    parser.add_argument("--testbed", type=int, default=40, help="random sets for the testbed in MuJoCo; default: 40")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the random sets; default: 1")
     take_configuration(parser)
     parser.set_defaults(config="")
     own = parser.add_argument_group("a force loop of your own", "the first six are needed; consistent units")
@@ -62,9 +56,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the two tables, 1 where a set was accepted that diverges; or assess a loop, 1 where it is not safe.
-
-    With a configuration or values of one, its force loop is assessed as at its start.
+    """Assess the force loop of a configuration as at its start, or a loop of your own; 1 where it is not safe.
 
     Raises
     ------
@@ -81,19 +73,7 @@ def run(given: argparse.Namespace) -> int:
         return _assess(given)
     if given.picture:
         raise ValueError(f"--picture shows a loop of your own; give --{', --'.join(PLANT)}")
-    at_least("--sets", given.sets, 1)
-    at_least("--testbed", given.testbed, 1)
-    at_least("--seed", given.seed, 0)
-    bad = 0
-    for name, trials in (
-        ("one friction node, exact integrator", exact_trials(given.seed, given.sets)),
-        ("testbed in MuJoCo behind its velocity loop", testbed_trials(given.seed, given.testbed)),
-    ):
-        found = table(trials, _show)
-        bad += found.accepted_and_diverged
-        sys.stderr.write("\n")
-        print(f"{name}\n{found.text()}\n")
-    return int(bad > 0)
+    return _assess_configuration(Configuration.load(packaged(BASE_CONFIGURATION)))
 
 
 def _assess_configuration(configuration: Configuration) -> int:
@@ -131,9 +111,3 @@ def _assess(given: argparse.Namespace) -> int:
     if given.picture:
         draw(design, given.picture)
     return int(not design.is_safe)
-
-
-def _show(trial: Trial) -> None:
-    """Show the progress: one character per set."""
-    sys.stderr.write("." if trial.is_accepted else "-")
-    sys.stderr.flush()

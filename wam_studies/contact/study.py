@@ -90,7 +90,7 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
                 level = wide._replace(contacts="level", seed=EXTENT.arms * seed + arm)
                 yield from (level, level._replace(is_identified=True))
 
-    def sets(self, case: ContactCase) -> Collection[str]:
+    def own_values(self, case: ContactCase) -> Collection[str]:
         """Parameters of the scenario."""
         return case.given.values if isinstance(case.given, BenchmarkScenario) else ()
 

@@ -50,7 +50,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
 
     run = staticmethod(play)
 
-    def sets(self, case: ForceTaskCase) -> Collection[str]:
+    def own_values(self, case: ForceTaskCase) -> Collection[str]:
         """What the task declares."""
         return task_values(case.configuration, case.task)
 

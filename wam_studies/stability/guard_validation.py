@@ -7,54 +7,149 @@ Two references that the guard does not use: the exact integrator, with steps and
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from wam_analysis.table import plain
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.force.friction_verdict import friction_verdict, linear_margin, stiction_cycle
 from wam_control.force.stability_guard import GuardAssessment
 from wam_control.task.scenario import ScenarioStep
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import Configuration
 from wam_sim.simulation import Simulation
+from wam_studies.harness import Study, option
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, share
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
 RESTS, CYCLES, DIVERGES = "rests", "cycles", "diverges"
 ENDS = (RESTS, CYCLES, DIVERGES)  # from good to bad
-EVENTS = 6000
-SHORTEST = 20  # events around F_des, below which a response is still in its transient
-GROWTH = 1.1  # of the last quarter over the one before, above which a response grows
+NODE, TESTBED = "one friction node, exact integrator", "testbed in MuJoCo behind its velocity loop"
 
 
-class Trial(NamedTuple):
+@dataclass(frozen=True)
+class ValidationLimits:
+    """When a response has ended, and how the testbed is pressed."""
+
+    events: int = 6000  # of the exact integrator
+    shortest: int = 20  # events around F_des, below which a response is still in its transient
+    growth: float = 1.1  # of the last quarter over the one before, above which a response grows
+    before: float = 15.0  # N, on the testbed's spring before the step
+    largest: float = 75.0  # N
+
+
+LIMITS = ValidationLimits()
+
+
+class NodeSet(NamedTuple):
+    """A friction node under a loop: steps and initial velocities, as force of the contact; softer contacts."""
+
+    node: FrictionNode
+    loop: IntegralLoop
+    steps: tuple[float, ...]
+    velocities: tuple[float, ...]
+    softer: tuple[float, ...]
+
+
+class TestbedSet(NamedTuple):
+    """A configuration of the testbed with a saturation, N, and a gain, as a part of the guard's margin."""
+
+    configuration: Configuration
+    limit: float
+    margin: float
+    part: float
+
+
+class ValidationRecord(NamedTuple):
     """One parameter set: the guard's verdict and the end of the worst response."""
 
+    where: str
     label: str
     domain: str
     is_accepted: bool
     end: str
 
 
-def exact_trials(seed: int, count: int) -> Iterator[Trial]:
+def validate(case: NodeSet | TestbedSet) -> ValidationRecord:
+    """The verdict of the guard and the end of the worst response."""
+    return _of_node(case) if isinstance(case, NodeSet) else _of_testbed(case)
+
+
+@dataclass(frozen=True)
+class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
+    """Random nodes under random loops, and the testbed with random friction, gain, saturation and delay."""
+
+    title: ClassVar[str] = "verdicts of the stability guard against simulated responses"
+    page: ClassVar[str] = "docs/guard.md"
+    seeds: ClassVar[tuple[int, ...]] = (1,)
+    base: ClassVar[str] = "testbed"
+
+    sets: int = option(200, "random sets for the exact integrator", 1)
+    testbed: int = option(40, "random sets for the testbed in MuJoCo", 0)
+
+    run = staticmethod(validate)
+
+    def cases(self, seed: int) -> Iterator[NodeSet | TestbedSet]:
+        """Nodes, then sets of the testbed."""
+        yield from _nodes(seed, self.sets)
+        yield from _testbeds(self.configuration, seed, self.testbed)
+
+    def score(self, records: Sequence[ValidationRecord]) -> Scores:
+        """What is accepted and diverges, what is refused and comes to rest."""
+        return Scores(list(_rows(records)), [_counts(records)])
+
+    def failure(self, record: ValidationRecord) -> str:
+        """An accepted set that diverges."""
+        return f"{record.label}, accepted, diverges" if record.is_accepted and record.end == DIVERGES else ""
+
+
+def _rows(records: Sequence[ValidationRecord]) -> Iterator[Row]:
+    for where in (NODE, TESTBED):
+        own = [one for one in records if one.where == where]
+        bad = sum(one.is_accepted and one.end == DIVERGES for one in own)
+        lost = sum(not one.is_accepted and one.end == RESTS for one in own)
+        yield Row(f"accepted sets that diverge, {where}", exact(bad, len(own)), "sets", required=NONE_AT_ALL)
+        yield Row(f"refused sets that come to rest, {where}", share(lost, len(own)), "%", 100.0)
+
+
+def _counts(records: Sequence[ValidationRecord]) -> ScoreTable:
+    counts = Counter((one.where, one.domain, one.is_accepted, one.end) for one in records)
+    kinds = sorted({key[:3] for key in counts}, key=lambda kind: (kind[0], kind[1], not kind[2]))
+    rows = [
+        [
+            where,
+            domain,
+            "accepts" if accepted else "refuses",
+            *(str(counts[where, domain, accepted, end]) for end in ENDS),
+        ]
+        for where, domain, accepted in kinds
+    ]
+    return ScoreTable("Verdicts and responses", ("of", "domain", "guard", *ENDS), rows)
+
+
+def _nodes(seed: int, count: int) -> Iterator[NodeSet]:
     """Random nodes under random loops, with and without sampling, delay and stiction."""
     random = np.random.default_rng(seed)
     for _ in range(count):
         node, loop = _random_node(random)
-        found = friction_verdict(node, loop)
         steps = loop.error_limit * 10.0 ** random.uniform(-1.0, 2.0, 6)
         velocities = loop.error_limit * random.uniform(-5.0, 5.0, 2)
         softer = random.uniform(0.05, 1.0, 2).tolist()
-        ends = [
-            _exact_end(replace(node, contact_stiffness=part * node.contact_stiffness), loop, step, velocity)
-            for part in (1.0, *softer)
-            for step, velocity in [*((s, 0.0) for s in steps.tolist()), *((0.0, v) for v in velocities.tolist())]
-        ]
-        label = f"gain {loop.gain / linear_margin(node, loop):.2f} of the margin, delay {loop.delay_samples}"
-        accepted = loop.error_limit <= found.stable_error
-        yield Trial(label, str(found.domain), accepted, max(ends, key=ENDS.index))
+        yield NodeSet(node, loop, tuple(steps.tolist()), tuple(velocities.tolist()), tuple(softer))
+
+
+def _of_node(case: NodeSet) -> ValidationRecord:
+    node, loop = case.node, case.loop
+    found = friction_verdict(node, loop)
+    ends = [
+        _exact_end(replace(node, contact_stiffness=part * node.contact_stiffness), loop, step, velocity)
+        for part in (1.0, *case.softer)
+        for step, velocity in [*((step, 0.0) for step in case.steps), *((0.0, v) for v in case.velocities)]
+    ]
+    label = f"gain {loop.gain / linear_margin(node, loop):.2f} of the margin, delay {loop.delay_samples}"
+    accepted = loop.error_limit <= found.stable_error
+    return ValidationRecord(NODE, label, str(found.domain), accepted, max(ends, key=ENDS.index))
 
 
 def _random_node(random: np.random.Generator) -> tuple[FrictionNode, IntegralLoop]:
@@ -74,7 +169,7 @@ def _exact_end(node: FrictionNode, loop: IntegralLoop, step: float, velocity: fl
     """End of the response to a step of the force or to an initial velocity, given as force of the contact, N m."""
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     speed = velocity / node.contact_stiffness * frequency
-    found = assess(node, loop, step, start=(0.0, speed, 0.0), max_events=EVENTS)
+    found = assess(node, loop, step, start=(0.0, speed, 0.0), max_events=LIMITS.events)
     if found.verdict is Verdict.SETTLED:
         return RESTS
     stiction = stiction_cycle(node, loop.gain).peak_to_peak
@@ -82,15 +177,15 @@ def _exact_end(node: FrictionNode, loop: IntegralLoop, step: float, velocity: fl
         return _by_size(found.peak_to_peak, loop.error_limit, stiction)
     if found.verdict is Verdict.DIVERGED:
         return DIVERGES
-    events = simulate(node, loop, step, max(found.time, 1e-9), (0.0, speed, 0.0), EVENTS).events
+    events = simulate(node, loop, step, max(found.time, 1e-9), (0.0, speed, 0.0), LIMITS.events).events
     errors = step - np.array([event.contact_force for event in events])
     passes = np.flatnonzero(np.diff(np.sign(errors)))
     around = errors[passes[0] :] if passes.size else errors[:0]  # before it is the transient
     quarter = len(around) // 4
-    if quarter < SHORTEST:
+    if quarter < LIMITS.shortest:
         return RESTS
     late, before = np.ptp(around[-quarter:]), np.ptp(around[-2 * quarter : -quarter])
-    if late > GROWTH * before and late > loop.error_limit:
+    if late > LIMITS.growth * before and late > loop.error_limit:
         return DIVERGES
     return _by_size(float(late), loop.error_limit, stiction)
 
@@ -101,14 +196,9 @@ def _by_size(peak_to_peak: float, limit: float, stiction: float) -> str:
     return CYCLES if peak_to_peak <= limit + 2.0 * stiction else DIVERGES
 
 
-BEFORE = 15.0  # N, on the testbed's spring before the step
-LARGEST = 75.0  # N
-
-
-def testbed_trials(seed: int, count: int) -> Iterator[Trial]:
+def _testbeds(testbed: Configuration, seed: int, count: int) -> Iterator[TestbedSet]:
     """The testbed in MuJoCo with random friction, gain, saturation and delay; without winding heat."""
     random = np.random.default_rng(seed)
-    testbed = Configuration.load(packaged("testbed"))
     for _ in range(count):
         static, delay = float(random.uniform(0.05, 3.0)), int(random.integers(0, 2))
         dynamic = static * float(random.choice([1.0, 0.8]))
@@ -124,12 +214,19 @@ def testbed_trials(seed: int, count: int) -> Iterator[Trial]:
         )
         margin = 0.01 * _assessment(base).scale
         part, limit = float(random.uniform(0.5, 1.9)), float(10.0 ** random.uniform(-0.3, 1.8))
-        conf = base.with_values({"force_loop:force_gain": [margin * part], "force_loop:force_error_limit": [limit]})
-        found = _assessment(conf)
-        noise = 0.5 + 3.0 * found.cycle.peak_to_peak  # N, of plant effects that one node does not have
-        ends = [_plant_end(conf, step, limit, margin * part, noise) for step in (0.5 * limit, 1.2 * limit, 6.0 * limit)]
-        label = f"gain {part:.2f} of the margin, delay {delay}"
-        yield Trial(label, str(found.domain), not found.reason, max(ends, key=ENDS.index))
+        yield TestbedSet(base, limit, margin, part)
+
+
+def _of_testbed(case: TestbedSet) -> ValidationRecord:
+    gain, limit = case.margin * case.part, case.limit
+    values = {"force_loop:force_gain": [gain], "force_loop:force_error_limit": [limit]}
+    configuration = case.configuration.with_values(values)
+    found = _assessment(configuration)
+    noise = 0.5 + 3.0 * found.cycle.peak_to_peak  # N, of plant effects that one node does not have
+    ends = [_plant_end(configuration, step, limit, gain, noise) for step in (0.5 * limit, 1.2 * limit, 6.0 * limit)]
+    delay = configuration.node("force_loop", ForceLoopParameters).delay_samples
+    label = f"gain {case.part:.2f} of the margin, delay {delay}"
+    return ValidationRecord(TESTBED, label, str(found.domain), not found.reason, max(ends, key=ENDS.index))
 
 
 def _assessment(configuration: Configuration) -> GuardAssessment:
@@ -141,11 +238,11 @@ def _assessment(configuration: Configuration) -> GuardAssessment:
 
 def _plant_end(configuration: Configuration, step: float, limit: float, gain: float, noise: float) -> str:
     """End of the response to a step on the testbed."""
-    force = min(BEFORE + step, LARGEST)
-    seconds = 3.5 + 1.3 * (force - BEFORE) / (gain * 900.0 * min(limit, force - BEFORE))
+    force = min(LIMITS.before + step, LIMITS.largest)
+    seconds = 3.5 + 1.3 * (force - LIMITS.before) / (gain * 900.0 * min(limit, force - LIMITS.before))
     steps = [
         ScenarioStep("release", 0.2, request="enable"),
-        ScenarioStep("press", 1.5, force=ForceCommand("base", (0.0, 0.0, -BEFORE))),
+        ScenarioStep("press", 1.5, force=ForceCommand("base", (0.0, 0.0, -LIMITS.before))),
         ScenarioStep("step", seconds, force=ForceCommand("base", (0.0, 0.0, -force))),
     ]
     run = Simulation(configuration, steps)
@@ -154,39 +251,3 @@ def _plant_end(configuration: Configuration, step: float, limit: float, gain: fl
     force_z = np.array([row.values[2] for row in run.rows["force_measured"][-41:-1]])
     swing = float(np.ptp(force_z))
     return RESTS if swing <= 0.3 * limit + noise else DIVERGES
-
-
-class ValidationTable(NamedTuple):
-    """Counts of trials by domain, verdict and end, and the two kinds of error."""
-
-    counts: dict[tuple[str, bool, str], int]
-    accepted_and_diverged: int
-    refused_and_stable: int
-
-    def text(self) -> str:
-        """The table as text."""
-        kinds = [(domain, accepted) for domain in ("I", "II", "III") for accepted in (True, False)]
-        counts = [[self.counts.get((*kind, end), 0) for end in ENDS] for kind in kinds]
-        rows = [
-            [domain, "accepts" if accepted else "refuses", *map(str, row)]
-            for (domain, accepted), row in zip(kinds, counts, strict=True)
-            if any(row)
-        ]
-        lines = plain([["domain", "guard", *ENDS]], rows, left=(0, 1))
-        total = sum(self.counts.values())
-        lines.append(
-            f"{total} sets: {self.accepted_and_diverged} accepted that diverge, "
-            f"{self.refused_and_stable} refused that come to rest"
-        )
-        return "\n".join(lines)
-
-
-def table(trials: Iterator[Trial], seen: Callable[[Trial], None] = lambda _: None) -> ValidationTable:
-    """Count trials; `seen` is called with each, to show progress."""
-    counts: Counter[tuple[str, bool, str]] = Counter()
-    for trial in trials:
-        counts[trial.domain, trial.is_accepted, trial.end] += 1
-        seen(trial)
-    bad = sum(n for (_, accepted, end), n in counts.items() if accepted and end == DIVERGES)
-    lost = sum(n for (_, accepted, end), n in counts.items() if not accepted and end == RESTS)
-    return ValidationTable(dict(counts), bad, lost)
