@@ -400,7 +400,7 @@ def resting_pushes() -> str:
         found = list(group)
         late = [row.estimate for row in found if row.late]
         known = [estimate for estimate in late if not math.isnan(estimate.position)]
-        errors = [100.0 * abs(estimate.position - resting_push.POSITION) for estimate in known]
+        errors = [100.0 * abs(estimate.position - resting_push.PLAN.position) for estimate in known]
         rows.append(
             [
                 sensing,
@@ -426,10 +426,12 @@ def between(values: Sequence[float], unit: str) -> str:
 
 def dither(configuration: Configuration) -> str:
     """Cost of the dither."""
-    shared = configuration.with_values({"timing.dither_cycle": resting_push.CYCLE}).shared
+    shared = configuration.with_values({"timing.dither_cycle": resting_push.PLAN.cycle}).shared
     own = configuration.node("velocity_loop", VelocityLoopParameters).dither
-    cost = Dither(shared.arm, shared.timing, own).cost(resting_push.POSE)
-    moved = next(row.tip_motion for row in pushes() if (row.sensing, row.pose) == ("motors, dither", resting_push.POSE))
+    cost = Dither(shared.arm, shared.timing, own).cost(resting_push.PLAN.pose)
+    moved = next(
+        row.tip_motion for row in pushes() if (row.sensing, row.pose) == ("motors, dither", resting_push.PLAN.pose)
+    )
     rows = [
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
         ["amplitude over static friction of motor and joints", f"{own.level:g}"],

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -15,9 +14,9 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
 from wam_ros.messages import joint_state
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, big_endian, broken, leaves
-from wam_studies.faults.page import faults_section, report, with_section
+from wam_studies.faults.page import faults_section, report
 from wam_studies.faults.parameter_faults import UNKNOWN_CODES, parameter_set
-from wam_studies.faults.trials import MOST_ESCAPES, FaultKind, FaultTrial, KindResult, played
+from wam_studies.faults.trials import FAULTS, FaultKind, FaultTrial, KindResult, played
 from wam_studies.faults.watched_stack import StackSource, WatchedStack
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -129,19 +128,7 @@ def test_a_kind_is_stopped_after_many_escapes() -> None:
         yield from (FaultTrial(i, "bad", escapes=("it escaped",)) for i in range(first, first + count))
 
     kind = FaultKind("bad", "", "trials", 100, 1, play)
-    assert len(played(kind, CONFIGURATION, 1, 0, 100, lambda: 0.0).trials) == MOST_ESCAPES
-
-
-def test_a_section_of_the_page_is_replaced_and_the_others_stay(tmp_path: Path) -> None:
-    page = tmp_path / "reliability.md"
-    page.write_text(with_section(page, "soak", "memory: flat"), encoding="utf-8")
-    page.write_text(with_section(page, "faults", "none escaped"), encoding="utf-8")
-    text = page.read_text(encoding="utf-8")
-    assert "memory: flat" in text
-    assert "none escaped" in text
-    (tmp_path / "other.md").write_text("by hand")
-    with pytest.raises(ValueError, match="has no line '<!-- written: soak -->'"):
-        with_section(tmp_path / "other.md", "soak", "x")
+    assert len(played(kind, CONFIGURATION, 1, 0, 100, lambda: 0.0).trials) == FAULTS.most_escapes
 
 
 def test_kinds_that_were_not_played_keep_their_rows() -> None:

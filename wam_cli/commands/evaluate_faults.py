@@ -11,8 +11,9 @@ from wam_cli.commands import PAGE, at_least, configuration_of, take_configuratio
 from wam_sim.progress import Progress
 from wam_studies.faults import interruptions
 from wam_studies.faults.kinds import REPLAYED, kinds
-from wam_studies.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
+from wam_studies.faults.page import INTERRUPTIONS, faults_section, report
 from wam_studies.faults.trials import FaultKind, KindResult, played
+from wam_studies.page import section_of, with_section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +50,7 @@ def run(given: argparse.Namespace) -> int:
         if given.ctrl_c is not None:
             command += f" --ctrl-c {given.ctrl_c}"
         text = faults_section(results, command, section_of(given.write, section))
-        given.write.write_text(with_section(given.write, section, text), encoding="utf-8")
+        given.write.write_text(with_section(given.write, section, text, "Reliability"), encoding="utf-8")
     return 1 if any(result.escaped for result in results) else 0
 
 

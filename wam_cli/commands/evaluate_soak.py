@@ -6,8 +6,8 @@ from pathlib import Path
 
 from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
 from wam_sim.progress import Progress
-from wam_studies.faults.page import with_section
 from wam_studies.faults.soak import soak
+from wam_studies.page import with_section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def run(given: argparse.Namespace) -> int:
     text = found.section(f"wam evaluate soak --seconds {given.seconds:g}")
     print(text)
     if given.write:
-        given.write.write_text(with_section(given.write, "soak", text), encoding="utf-8")
+        given.write.write_text(with_section(given.write, "soak", text, "Reliability"), encoding="utf-8")
     for reason in found.missed:
         print(reason, file=sys.stderr)
     return 1 if found.missed else 0

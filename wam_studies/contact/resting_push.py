@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -23,35 +24,46 @@ from wam_description.world import Obstacles
 from wam_sim.simulation import Simulation
 
 Triple = tuple[float, float, float]
-SIZE = (11.0, 4.6)  # in
-METRES_PER_NEWTON = 0.02
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
-POSE = (0.1, -0.9, 0.2, 0.9)  # rad
-POSITION, FORCE = 0.28, (0.0, 6.0, 8.0)  # m, N
-CYCLE = 40  # periods of the dither: 25 Hz
+
+
+@dataclass(frozen=True)
+class PushPlan:
+    """How the resting arm is pushed, and how it is drawn."""
+
+    pose: tuple[float, ...] = (0.1, -0.9, 0.2, 0.9)  # rad
+    position: float = 0.28  # m along the outer link
+    force: Triple = (0.0, 6.0, 8.0)  # N, of the figure
+    sizes: tuple[float, ...] = (5.0, 10.0, 20.0)  # N, of the table
+    cycle: int = 40  # periods of the dither: 25 Hz
+    begins: float = 0.45  # s after power-up
+    early: float = 0.4  # s after the start of a push
+    late: float = 2.0  # s
+    before: tuple[int, int] = (60, 90)  # outer periods between release and push
+    figure: tuple[float, float] = (11.0, 4.6)  # in
+    metres_per_newton: float = 0.02  # of an arrow
+
+
+PLAN = PushPlan()
 SENSING = {
     "motors": {"timing.dither_cycle": 0, "contact_estimator:use_joint_sensors": False},
-    "motors, dither": {"timing.dither_cycle": CYCLE, "contact_estimator:use_joint_sensors": False},
+    "motors, dither": {"timing.dither_cycle": PLAN.cycle, "contact_estimator:use_joint_sensors": False},
     "joint sensors": {"timing.dither_cycle": 0, "contact_estimator:use_joint_sensors": True},
 }
 TITLES = ("(a) at rest: the motors alone", "(b) at rest, with dither")
-SIZES = (5.0, 10.0, 20.0)  # N
 DIRECTIONS: tuple[Triple, ...] = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))  # of the link
-EARLY, LATE = 0.4, 2.0  # s after the start of a push
-PUSH_BEGINS = 0.45  # s after power-up
-TIP_ROWS = slice(60, 90)  # outer periods between release and push
 
 
 def save(path: Path, configuration: Configuration) -> list[str]:
     """Draw a push at rest and its estimate from the motors, without and with dither; a line of numbers for each."""
-    figure = Figure(figsize=SIZE)
+    figure = Figure(figsize=PLAN.figure)
     FigureCanvasAgg(figure)
     lines = []
     for i, (title, values) in enumerate(zip(TITLES, SENSING.values(), strict=False)):
-        run, arm = _pushed(configuration, FORCE, values, POSE, EARLY), configuration.shared.arm
+        run, arm = _pushed(configuration, PLAN.force, values, PLAN.pose, PLAN.early), configuration.shared.arm
         axes = figure.add_axes((0.5 * i, 0.0, 0.5, 1.0))
         estimate, q = run.estimate, run.driver.true_joint_state.position
-        draw(axes, arm, q, estimate, Contact("outer_link", POSITION, FORCE))
+        draw(axes, arm, q, estimate, Contact("outer_link", PLAN.position, PLAN.force))
         axes.text(0.03, 0.97, title, va="top", transform=axes.transAxes, fontsize=11)
         lines.append(f"{title}: {_numbers(estimate)}")
     figure.savefig(path, dpi=110)
@@ -60,7 +72,7 @@ def save(path: Path, configuration: Configuration) -> list[str]:
 
 def draw(axes: Axes, arm: Arm, q: Sequence[float], estimate: ContactEstimate, true: Contact) -> None:
     """The arm in pose q, rad, with the estimated and the true contact."""
-    view = arm_picture.side_view(arm, q, NOWHERE, aspect=0.5 * SIZE[0] / SIZE[1])
+    view = arm_picture.side_view(arm, q, NOWHERE, aspect=0.5 * PLAN.figure[0] / PLAN.figure[1])
     axes.set_axis_off()
     axes.set_xlim(-view.width / 2.0, view.width / 2.0)
     axes.set_ylim(-view.height / 2.0, view.height / 2.0)
@@ -94,7 +106,7 @@ def _arrow(
     axes: Axes, arm: Arm, q: Sequence[float], view: arm_picture.View, contact: Contact, colour: str, width: float
 ) -> None:
     point, force = arm_picture.contact_on_surface(arm, q, contact)
-    tail, tip = view.project(np.array([point - METRES_PER_NEWTON * force, point]))
+    tail, tip = view.project(np.array([point - PLAN.metres_per_newton * force, point]))
     style = {"arrowstyle": "-|>,head_width=0.35,head_length=0.7", "color": colour, "linewidth": width}
     axes.annotate("", tip, tail, arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=20 + int(width < 2.0))
 
@@ -115,8 +127,8 @@ class RestingPush(NamedTuple):
     Attributes
     ----------
     sensing, newtons, pose : which.
-    early : N, size of the estimated force `EARLY` after the start of the push; 0 where it is missed.
-    estimate : `LATE` after the start of the push.
+    early : N, size of the estimated force `PLAN.early` after the start of the push; 0 where it is missed.
+    estimate : `PLAN.late` after the start of the push.
     tip_motion : m, peak to peak, of the tool before the push.
     """
 
@@ -135,19 +147,21 @@ class RestingPush(NamedTuple):
 
 def poses(configuration: Configuration) -> tuple[tuple[float, ...], ...]:
     """Joint angles in which the arm is pushed, rad: that in which it starts, and one that is bent and turned."""
-    return configuration.shared.arm.joints.start, POSE
+    return configuration.shared.arm.joints.start, PLAN.pose
 
 
 def study(configuration: Configuration) -> list[RestingPush]:
     """Push the resting arm with each force, in each pose and direction, and estimate it with each kind of sensing."""
-    found, body, n = [], RigidBody(configuration.shared.arm), len(POSE)
-    for (sensing, values), newtons in product(SENSING.items(), SIZES):
+    found, body, n = [], RigidBody(configuration.shared.arm), len(PLAN.pose)
+    for (sensing, values), newtons in product(SENSING.items(), PLAN.sizes):
         for pose, (x, y, z) in product(poses(configuration), DIRECTIONS):
             force = (newtons * x, newtons * y, newtons * z)
-            run = _pushed(configuration, force, values, pose, LATE)
-            tips = [body.tool_pose(row.values[:n]).position for row in run.rows["sim/joint_states"][TIP_ROWS]]
+            run = _pushed(configuration, force, values, pose, PLAN.late)
+            tips = [
+                body.tool_pose(row.values[:n]).position for row in run.rows["sim/joint_states"][slice(*PLAN.before)]
+            ]
             rows = run.rows["contact/wrench"]
-            early = min(rows, key=lambda row: abs(row.stamp / 1e9 - PUSH_BEGINS - EARLY)).values[:3]
+            early = min(rows, key=lambda row: abs(row.stamp / 1e9 - PLAN.begins - PLAN.early)).values[:3]
             moved = float(np.linalg.norm(np.ptp(tips, axis=0)))
             found.append(RestingPush(sensing, newtons, pose, math.hypot(*early), run.estimate, moved))
     return found
@@ -163,8 +177,8 @@ def _pushed(
     }
     steps = [
         ScenarioStep("release", 0.05, request="enable"),
-        ScenarioStep("settle", PUSH_BEGINS - 0.05),
-        ScenarioStep("rest", seconds, push=Push("outer_link", POSITION, force, 0.0, seconds)),
+        ScenarioStep("settle", PLAN.begins - 0.05),
+        ScenarioStep("rest", seconds, push=Push("outer_link", PLAN.position, force, 0.0, seconds)),
     ]
     run = Simulation(configuration.with_values(values), steps)
     if failure := run.play():

@@ -11,11 +11,9 @@ from typing import Final
 
 from wam_bag.bag import BagError, read
 from wam_description.configuration import Configuration
-from wam_studies.faults.trials import FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 from wam_studies.faults.watched_stack import NodeEndedError, WatchedStack
 
-REPORTED: Final = 10.0  # s of wall time, on a busy machine
-ROOM: Final = (0, 3_000, 100_000)  # bytes that a full disk still takes
 Work = Callable[[WatchedStack, Path, Random], None]
 ERROR: Final = b"\x02"
 
@@ -60,7 +58,7 @@ def _fill(stack: WatchedStack, bag: Path, chance: Random) -> None:
     """No file of this process may grow any more, as on a full disk; what was written must stay readable."""
     size = max(file.stat().st_size for file in bag.glob("*.mcap"))
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size + chance.choice(ROOM), before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size + chance.choice(FAULTS.room), before[1]))
     try:
         _is_reported(stack)
     finally:
@@ -79,8 +77,8 @@ def _is_reported(stack: WatchedStack) -> None:
         stack.run(0.01)
         return "recorder" in stack.statuses and stack.statuses["recorder"].level == ERROR
 
-    if not stack.wait(reported, REPORTED):
-        stack.escapes.append(f"the recorder reported nothing within {REPORTED:g} s")
+    if not stack.wait(reported, FAULTS.reported):
+        stack.escapes.append(f"the recorder reported nothing within {FAULTS.reported:g} s")
 
 
 def _fault(stack: WatchedStack, bag: Path, chance: Random) -> None:

@@ -15,19 +15,16 @@ from typing import Final
 from wam_bag.bag import BagError
 from wam_bag.contents import contents
 from wam_studies.faults.soak import lost_in
-from wam_studies.faults.trials import FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 
 MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
-PYTHON: Final = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own
-STARTING, PLAYING = 4.0, 12.0  # s; one half of the moments is before the first, the other before the second
-LONGEST_END: Final = 30.0  # s, on a busy machine
 
 
 def play(seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count`, a demonstration each."""
     for index in range(first, first + count):
         chance = Random(f"interruptions {seed} {index}")
-        moment = chance.uniform(PYTHON, STARTING if index % 2 else PLAYING)
+        moment = chance.uniform(FAULTS.python, FAULTS.starting if index % 2 else FAULTS.playing)
         with TemporaryDirectory(prefix="wam_faults_") as folder:
             escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{index}"))
         yield FaultTrial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
@@ -48,9 +45,9 @@ def _interrupted(folder: Path, moment: float, mark: str) -> Iterator[str]:
         with suppress(ProcessLookupError):
             os.killpg(demo.pid, signal.SIGINT)  # as a terminal does
         try:
-            code = demo.wait(LONGEST_END)
+            code = demo.wait(FAULTS.longest_end)
         except subprocess.TimeoutExpired:
-            yield f"not ended after {LONGEST_END:g} s"
+            yield f"not ended after {FAULTS.longest_end:g} s"
             code = None
         left = _marked(mark)
         for process in left:

@@ -8,12 +8,9 @@ from typing import Final
 
 from wam_description.configuration import Configuration
 from wam_studies.faults.node_processes import ANSWERS, NodeProcesses
-from wam_studies.faults.trials import FORCE, MOTION, ZERO_CURRENT, FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
-NOTICED: Final = 5.0  # s of wall time, in which a loss must be reported on a busy machine
-RECOVERED: Final = 20.0  # s of wall time, in which an operator gets an enabled arm again
-FROZEN: Final = (0.2, 1.5)  # s of wall time that a driver is frozen
 
 
 def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
@@ -40,7 +37,7 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
 
 def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> FaultTrial:
     what = f"{name} {way.name}, {mode}"
-    if reason := chain.enabled(RECOVERED):
+    if reason := chain.enabled(FAULTS.recovered):
         return FaultTrial(index, what, 1, (f"before: {reason}",))
     chain.wait(lambda: False, chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
@@ -48,36 +45,36 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
     chain.send(name, way)
     delay, escapes = math.nan, list[str]()
     if name == "driver":
-        chain.wait(lambda: False, chance.uniform(*FROZEN) if way == signal.SIGSTOP else 0.2)
+        chain.wait(lambda: False, chance.uniform(*FAULTS.frozen) if way == signal.SIGSTOP else 0.2)
     else:
         delay = _noticed(chain, name, escapes)
     if way == signal.SIGSTOP:
         chain.send(name, signal.SIGCONT)
     else:
-        chain.wait(lambda: name in chain.ended(), NOTICED)
+        chain.wait(lambda: name in chain.ended(), FAULTS.noticed)
         chain.end(name)
     if others := [one for one in chain.ended() if one != name]:
         escapes.append(f"{', '.join(others)} ended, too")
     if way != signal.SIGSTOP:
         chain.start(name)
-    if reason := chain.enabled(RECOVERED):
+    if reason := chain.enabled(FAULTS.recovered):
         escapes.append(reason)
     is_new_arm = name == "driver" and way != signal.SIGSTOP
     motion = 0.0 if is_new_arm else max(abs(a - b) for a, b in zip(q, chain.q, strict=True))
-    if motion > MOTION:
+    if motion > FAULTS.motion:
         escapes.append(f"the arm moved {motion:.3f} rad")
-    if chain.force > FORCE:
+    if chain.force > FAULTS.force:
         escapes.append(f"{chain.force:.0f} N")
     return FaultTrial(index, what, 1, tuple(escapes), motion, chain.force, delay)
 
 
 def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:
     """Wait for the fault that names a lost node; returns the time to zero current, s of the arm's time."""
-    if not chain.wait(lambda: chain.mode == "fault", NOTICED):
-        escapes.append(f"not noticed within {NOTICED:g} s")
+    if not chain.wait(lambda: chain.mode == "fault", FAULTS.noticed):
+        escapes.append(f"not noticed within {FAULTS.noticed:g} s")
     chain.wait(lambda: False, 0.05)
     delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
-    if delay > ZERO_CURRENT:
+    if delay > FAULTS.zero_current:
         escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
     texts = " ".join(chain.reports)
     if name not in texts and ANSWERS[name] not in texts:

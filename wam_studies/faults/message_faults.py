@@ -6,15 +6,25 @@ A message is any object with `get_fields_and_field_types`, as ROS makes them; th
 import struct
 from array import array
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from random import Random
 from typing import Any, Final, NamedTuple
 
-SECOND: Final = 1_000_000_000
+SECOND: Final = 10**9  # ns
 NOT_FINITE: Final = (float("nan"), float("inf"), float("-inf"))
-HUGE: Final = (1e6, -1e6, 1e12, -1e30, 1.7e308, -1.7e308)
-TINY: Final = (5e-324, -5e-324, 1e-300, -0.0)
+
+
+@dataclass(frozen=True)
+class BrokenValues:
+    """What is put in the place of numbers, and how long lists are made."""
+
+    huge: tuple[float, ...] = (1e6, -1e6, 1e12, -1e30, 1.7e308, -1.7e308)
+    tiny: tuple[float, ...] = (5e-324, -5e-324, 1e-300, -0.0)
+    lengths: tuple[int, ...] = (0, 1, 3, 5, 100, 5000)
+
+
+BROKEN: Final = BrokenValues()
 TEXTS: Final = ("", "x" * 10_000, "\x1b[2J\x1b[31m", "joint1", "base", "driver", "\U0001f9be", "../../etc", "[" * 500)
-LENGTHS: Final = (0, 1, 3, 5, 100, 5000)
 SIZES: Final = {
     "boolean": "?", "octet": "B", "byte": "B", "uint8": "B", "int8": "b", "uint16": "H", "int16": "h",
     "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d",
@@ -77,7 +87,7 @@ def with_lengths(message: Message, chance: Random) -> bool:
         return False
     leaf = chance.choice(found)
     old = list(leaf.value)
-    length = chance.choice([n for n in LENGTHS if n != len(old)])
+    length = chance.choice([n for n in BROKEN.lengths if n != len(old)])
     filler = old[:1] or (["joint1"] if "string" in leaf.kind else [0] if "int" in leaf.kind else [0.3])
     setattr(leaf.owner, leaf.name, _like(leaf.value, (old + filler * length)[:length]))
     return True
@@ -254,8 +264,8 @@ def _stamped(stamps: Stamps) -> Callable[[Message, Random, int], bool]:
 
 MESSAGE_FAULTS: Final = (
     MessageFault("a number not finite", True, lambda m, chance, now: with_numbers(m, chance, NOT_FINITE)),
-    MessageFault("a huge number", True, lambda m, chance, now: with_numbers(m, chance, HUGE)),
-    MessageFault("a tiny number", False, lambda m, chance, now: with_numbers(m, chance, TINY)),
+    MessageFault("a huge number", True, lambda m, chance, now: with_numbers(m, chance, BROKEN.huge)),
+    MessageFault("a tiny number", False, lambda m, chance, now: with_numbers(m, chance, BROKEN.tiny)),
     MessageFault("an array of another length", True, lambda m, chance, now: with_lengths(m, chance)),
     MessageFault("a wrong text or name", True, lambda m, chance, now: with_texts(m, chance)),
     MessageFault("names in another order", False, lambda m, chance, now: permuted(m, chance)),

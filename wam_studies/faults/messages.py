@@ -9,13 +9,10 @@ from rclpy.publisher import Publisher
 
 from wam_description.configuration import Configuration
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
-from wam_studies.faults.trials import HELD_MOTION, MOTION, FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 from wam_studies.faults.watched_stack import StackSource, WatchedStack
 
-MESSAGES: Final = 20  # of one trial
-BETWEEN: Final = 0.001  # s of the arm's time between two of them
 PUSH: Final = "sim/disturbance"
-AFTER: Final = 0.03  # s of the arm's time after the last
 
 
 class MessagePlan(NamedTuple):
@@ -41,7 +38,7 @@ def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
 
 
 def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count` of a seed, `MESSAGES` messages each, in a mode of `timing.mode`."""
+    """Trials `first` to `first + count` of a seed, `FAULTS.messages` messages each, in a mode of `timing.mode`."""
     with StackSource(configuration.with_values({"timing.mode": mode})) as source:
         for index in range(first, first + count):
             todo = plan(source.ready().taken_topics(), seed, index)
@@ -53,12 +50,12 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     publisher: Publisher | None
     publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
     sent = 0
-    stack.allowed_motion = MOTION if todo.is_foreign else HELD_MOTION
+    stack.allowed_motion = FAULTS.motion if todo.is_foreign else FAULTS.held_motion
     if publisher is None:
         return 1
     if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
         stack.allowed_force = stack.configuration.shared.disturbance_force_limit
-    for _ in range(MESSAGES):
+    for _ in range(FAULTS.messages):
         message = stack.newest(todo.topic)
         if todo.fault.moves:
             made_effective(todo.topic, message, stack.cover)
@@ -66,8 +63,8 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
         if data is not None:
             stack.inject(publisher, data)
             sent += 1
-        stack.run(BETWEEN)
+        stack.run(FAULTS.between)
     if todo.is_foreign:
         stack.remove(publisher)
-    stack.run(AFTER)
+    stack.run(FAULTS.after)
     return max(sent, 1)

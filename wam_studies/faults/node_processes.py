@@ -24,6 +24,7 @@ from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import Connection
 from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import Decode, decoder, encoder, stamp_of
+from wam_studies.faults.trials import FAULTS
 
 ANSWERS: Final = {  # a topic that each node publishes in every outer period or more often
     "driver": "motor_states",
@@ -42,7 +43,6 @@ PRELOADED: Final = [
     "wam_driver.driver",
     "wam_control.force.force_loop",
 ]
-ANSWERED, ATTEMPTS = 0.5, 6  # s, for each attempt to ask a service
 COMMANDS: Final = ("joint_posture_command", "force_command")
 
 
@@ -231,7 +231,12 @@ class NodeProcesses:
         client = self._clients[service]
         if not self.wait(client.service_is_ready, 5.0):
             return f"no service {service}"
-        answer = answer_of(client, switch_request(switch)[1], ATTEMPTS, lambda future: self.wait(future.done, ANSWERED))
+        answer = answer_of(
+            client,
+            switch_request(switch)[1],
+            FAULTS.attempts_of_processes,
+            lambda future: self.wait(future.done, FAULTS.answered),
+        )
         return "no answer" if answer is None else str(answer.message)
 
     def enabled(self, patience: float) -> str:

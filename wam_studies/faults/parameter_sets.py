@@ -22,14 +22,13 @@ from wam_studies.faults.parameter_faults import (
     ParameterSet,
     parameter_set,
 )
-from wam_studies.faults.trials import FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 from wam_studies.faults.watched_stack import StackSource, WatchedStack
 
 FIELDS: Final = {
     BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",
     6: "bool_array_value", 7: "integer_array_value", 8: "double_array_value", 9: "string_array_value",
 }  # fmt: skip
-PUSH, PUSHED, SETTLING, FAST = 3.0, 0.02, 0.1, 1.0  # N, s, s, rad/s: a small push after which a stable arm is slow
 
 
 def message(assignment: Assignment) -> Parameter:
@@ -111,14 +110,14 @@ def _answer(stack: WatchedStack, client: Any, parameters: list[Parameter]) -> An
 def _push(stack: WatchedStack) -> None:
     """A small push: with parameters that are accepted the arm stays slow and enabled."""
     plant = stack.driver.plant
-    plant.push(stack.configuration.shared.arm.covers.names[-1], np.array([0.0, PUSH, 0.0]), np.zeros(3))
-    stack.run(PUSHED)
+    plant.push(stack.configuration.shared.arm.covers.names[-1], np.array([0.0, FAULTS.push, 0.0]), np.zeros(3))
+    stack.run(FAULTS.pushed)
     plant.release()
-    stack.run(SETTLING)
+    stack.run(FAULTS.settling)
     speed = max(abs(v) for v in plant.qd)
-    if speed > FAST or stack.driver.safety.fault:
+    if speed > FAULTS.fast or stack.driver.safety.fault:
         stack.escapes.append(
-            f"accepted, then unstable: {speed:.1f} rad/s after a push of {PUSH:g} N {stack.driver.safety.fault}"
+            f"accepted, then unstable: {speed:.1f} rad/s after a push of {FAULTS.push:g} N {stack.driver.safety.fault}"
         )
 
 

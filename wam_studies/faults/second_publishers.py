@@ -17,12 +17,9 @@ from wam_description.configuration import Configuration
 from wam_ros.topics import NAMESPACE
 from wam_ros.wire import stamp_of
 from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
-from wam_studies.faults.trials import FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 from wam_studies.faults.watched_stack import StackSource, WatchedStack
 
-STREAMED: Final = 0.15  # s of the arm's time with two publishers
-AFTER: Final = 0.05  # s of the arm's time that is watched afterwards
-REPLAYED: Final = 300  # messages of each topic of a bag
 WALL_CLOCK: Final = 1_790_000_000 * SECOND
 STAMPS: Final = ("as recorded", "from now on", "of the wall clock")
 GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != "sim/disturbance")  # a second publisher is a fault
@@ -62,14 +59,14 @@ def _stream(topic: str, stack: WatchedStack) -> int:
     """Answer every period with a false message that has the right stamp."""
     publisher = stack.foreign_publisher(topic)
     try:
-        end = stack.stamp() + int(STREAMED * SECOND)
+        end = stack.stamp() + int(FAULTS.streamed * SECOND)
         while stack.stamp() < end and not stack.driver.safety.fault:
             message = stack.newest(topic)
             made_effective(topic, message, stack.cover)
             set_stamp(message, stack.stamp())
             stack.inject(publisher, stack.serialize(message))
             stack.run(0.001)
-        stack.run(AFTER)
+        stack.run(FAULTS.after_publishers)
         if topic in GUARDED and topic not in stack.driver.safety.fault:
             stack.escapes.append(f"no fault names {topic}: '{stack.driver.safety.fault}'")
     finally:
@@ -95,14 +92,14 @@ def _replay(messages: dict[str, list[bytes]], stamps: str, stack: WatchedStack) 
     publishers: dict[str, Publisher] = {topic: stack.foreign_publisher(topic) for topic in messages}
     begin = stack.stamp()
     first = min(stamp_of(data[0]) for data in messages.values())
-    for i in range(REPLAYED):
+    for i in range(FAULTS.replayed):
         for topic, data in messages.items():
             if i < len(data):
                 stack.inject(publishers[topic], _stamped(data[i], stamps, begin - first))
         stack.run(0.001)
     for publisher in publishers.values():
         stack.remove(publisher)
-    stack.run(AFTER)
+    stack.run(FAULTS.after_publishers)
     return 1
 
 

@@ -16,13 +16,9 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
 from wam_studies.contact.moves import MoveGenerator
+from wam_studies.faults.trials import FAULTS
 
-STEP: Final = 2.0  # s of a move
-POSTURES: Final = 4  # that are gone to, one after the other
 PUSH: Final = {"newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
-ALONG: Final = 0.75  # of the last cover, where it is pushed
-SEED: Final = 1
-GROWTH: Final = 20.0  # MB from a tenth of the run on to its end
 
 
 class Soak(NamedTuple):
@@ -50,8 +46,8 @@ class Soak(NamedTuple):
     def missed(self) -> list[str]:
         """What does not hold."""
         found = [self.failure] if self.failure else []
-        if self.late - self.early > GROWTH:
-            found.append(f"memory grew by {self.late - self.early:.1f} MB; allowed: {GROWTH:g} MB")
+        if self.late - self.early > FAULTS.growth:
+            found.append(f"memory grew by {self.late - self.early:.1f} MB; allowed: {FAULTS.growth:g} MB")
         return [*found, *self.losses]
 
     def section(self, command: str) -> str:
@@ -91,12 +87,12 @@ def lost_in(found: Contents) -> list[str]:
 
 
 def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
-    drawn = MoveGenerator(arm).moves(np.random.default_rng(SEED), arm.joints.start, POSTURES)
+    drawn = MoveGenerator(arm).moves(np.random.default_rng(FAULTS.seed), arm.joints.start, FAULTS.postures)
     postures = [list(move.posture) for move in drawn]
-    push = {"cover": arm.covers.names[-1], "contact_position": ALONG * arm.covers.length[-1], **PUSH}
+    push = {"cover": arm.covers.names[-1], "contact_position": FAULTS.along * arm.covers.length[-1], **PUSH}
     moves = [
-        {"name": f"move {i}", "seconds": STEP, "posture": postures[i % POSTURES], "push": push}
-        for i in range(max(1, int(seconds / STEP)))
+        {"name": f"move {i}", "seconds": FAULTS.move, "posture": postures[i % FAULTS.postures], "push": push}
+        for i in range(max(1, int(seconds / FAULTS.move)))
     ]
     return [
         {"name": "release", "seconds": 0.5, "request": "enable"},

@@ -22,13 +22,8 @@ from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import Encode, encoder, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves
-from wam_studies.faults.trials import FORCE, MOTION, FaultTrial
+from wam_studies.faults.trials import FAULTS, FaultTrial
 
-LONGEST_START: Final = 120.0  # s of wall time
-PATIENCE: Final = 15.0  # s of work without progress and without a fault that is a hang
-ANSWERED, ATTEMPTS = 0.5, 20  # s, for each attempt to ask a service
-IDLE: Final = 0.25  # s of work that a second of waiting counts as
-REST: Final = 0.2  # s of work after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
 SECOND: Final = 1_000_000_000
@@ -36,7 +31,7 @@ SECOND: Final = 1_000_000_000
 
 def worked() -> float:
     """A clock that runs with the work of this process, so that a starved one has time, and slowly while it waits, s."""
-    return time.process_time() + IDLE * time.monotonic()
+    return time.process_time() + FAULTS.idle * time.monotonic()
 
 
 class NodeEndedError(RuntimeError):
@@ -74,7 +69,7 @@ class WatchedStack:
         self.statuses: dict[str, Any] = {}
         self.escapes: list[str] = []
         self.motion = self.force = 0.0
-        self.allowed_force, self.allowed_motion = FORCE, MOTION
+        self.allowed_force, self.allowed_motion = FAULTS.force, FAULTS.motion
         self._peak = [
             t / k for t, k in zip(shared.arm.motors.peak_torque, shared.arm.motors.torque_constant, strict=True)
         ]
@@ -197,11 +192,11 @@ class WatchedStack:
             raise NodeEndedError(f"a node ended: {type(error).__name__}: {str(error)[:150]} ({names[-1]})") from error
 
     def _start(self, until: Callable[[], Any], what: str) -> None:
-        if not self.wait(until, LONGEST_START):
+        if not self.wait(until, FAULTS.longest_start):
             self.close()
-            raise TimeoutError(f"no {what} within {LONGEST_START:g} s")
+            raise TimeoutError(f"no {what} within {FAULTS.longest_start:g} s")
 
-    def wait(self, until: Callable[[], Any], patience: float = PATIENCE) -> bool:
+    def wait(self, until: Callable[[], Any], patience: float = FAULTS.patience) -> bool:
         """Spin until something is true; False where it is not within `patience`, s of work."""
         end = worked() + patience
         while not until():
@@ -219,10 +214,10 @@ class WatchedStack:
             self.spin_once()
             self._look()
             rest = worked() - since
-            if rest > REST and self.driver.safety.mode is Mode.FAULT:
+            if rest > FAULTS.rest and self.driver.safety.mode is Mode.FAULT:
                 return
-            if rest > PATIENCE:
-                self._escape(f"the arm's time is at rest for {PATIENCE:g} s of work without a fault")
+            if rest > FAULTS.patience:
+                self._escape(f"the arm's time is at rest for {FAULTS.patience:g} s of work without a fault")
                 return
 
     def stamp(self) -> int:
@@ -234,7 +229,7 @@ class WatchedStack:
     def begin(self) -> str:
         """Start a trial with an enabled arm at rest; returns why that is not possible, '' where it is."""
         self._injected.clear()
-        self.allowed_force, self.allowed_motion = FORCE, MOTION
+        self.allowed_force, self.allowed_motion = FAULTS.force, FAULTS.motion
         self.driver.plant.release()
         if reason := self.recover():
             return reason
@@ -247,7 +242,7 @@ class WatchedStack:
 
     def recover(self) -> str:
         """Do what an operator does after a fault; returns why the arm cannot be enabled, '' where it can."""
-        end = worked() + PATIENCE
+        end = worked() + FAULTS.patience
         message = ""
         while worked() < end:
             if self.driver.safety.mode is Mode.ENABLED and self._goes_on():
@@ -255,7 +250,8 @@ class WatchedStack:
             self.ask("reset_fault")
             message = self.ask("enable", True)
             self.wait(lambda: self.driver.safety.mode is Mode.ENABLED, 0.2)
-        return f"the arm cannot be enabled again within {PATIENCE:g} s of work: {message or self.driver.safety.fault}"
+        why = message or self.driver.safety.fault
+        return f"the arm cannot be enabled again within {FAULTS.patience:g} s of work: {why}"
 
     def _goes_on(self) -> bool:
         before = self.driver.stamp
@@ -265,7 +261,9 @@ class WatchedStack:
     def ask(self, service: str, switch: bool | None = None) -> str:
         """Call a service of the driver; returns its message."""
         client = self._clients[service]
-        answer = answer_of(client, switch_request(switch)[1], ATTEMPTS, lambda future: self.wait(future.done, ANSWERED))
+        answer = answer_of(
+            client, switch_request(switch)[1], FAULTS.attempts, lambda future: self.wait(future.done, FAULTS.answered)
+        )
         return "no answer" if answer is None else str(answer.message)
 
     # faults

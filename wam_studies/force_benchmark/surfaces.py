@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +13,23 @@ from wam_description.rigid_body import RigidBody
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-GAP = 0.002  # m, between link and surface at the start
-CLEARANCE = 0.03  # m, between the surface and the rest of the arm
-ROD = (0.02, 0.08)  # m, radius and half length of a rod that the link touches at one position
-PLANE = 0.5  # m, half length
+
+@dataclass(frozen=True)
+class SurfaceShape:
+    """Size of the plane and the rod, and their distance from the arm at the start."""
+
+    gap: float = 0.002  # m, between link and surface
+    clearance: float = 0.03  # m, between the surface and the rest of the arm
+    rod: tuple[float, float] = (0.02, 0.08)  # m, radius and half length; the link touches it at one position
+    plane: float = 0.5  # m, half length
+    points: int = 20  # along each cover, at which the distance is checked
+    soft: float = 4000.0  # N/m, below which the damping follows the stiffness
+    soft_damping: float = 0.005  # s, damping per stiffness
+    damping: float = 20.0  # N s/m
+
+
+SHAPE = SurfaceShape()
 NAMES = ("surface", "second_surface")
-POINTS = 20  # along each cover, at which the distance is checked
 
 
 class Surface(NamedTuple):
@@ -63,18 +75,18 @@ class Surface(NamedTuple):
 
 
 def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
-    """Whether it touches nothing in the pose q, rad, and no other part of the arm is nearer than `CLEARANCE`."""
+    """Whether it touches nothing in the pose q, rad, and no other part of the arm is nearer than `SHAPE.clearance`."""
     covers = body.arm.covers
     centre, axis, into = position(body, q, surface), rotation(body, q, surface)[:, 2], np.array(surface.direction)
     for name, radius, length in zip(covers.names, covers.radius, covers.length, strict=True):
-        for place in np.linspace(0.0, length, POINTS):
+        for place in np.linspace(0.0, length, SHAPE.points):
             apart = centre - body.point(q, name, (place, *covers.aside(name, place)))
             if surface.is_plane:
                 distance = float(apart @ into)
             else:
-                along = min(max(float(-apart @ axis), -ROD[1]), ROD[1])
-                distance = float(np.linalg.norm(apart + along * axis)) - ROD[0]
-            if distance < radius + (0.9 * GAP if name == surface.cover else CLEARANCE):
+                along = min(max(float(-apart @ axis), -SHAPE.rod[1]), SHAPE.rod[1])
+                distance = float(np.linalg.norm(apart + along * axis)) - SHAPE.rod[0]
+            if distance < radius + (0.9 * SHAPE.gap if name == surface.cover else SHAPE.clearance):
                 return False
     return True
 
@@ -84,7 +96,7 @@ def position(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
     covers = body.arm.covers
     radius = covers.radius_of(surface.cover)
     point = body.point(q, surface.cover, (surface.position, *covers.aside(surface.cover, surface.position)))
-    return point + (radius + GAP + (0.0 if surface.is_plane else ROD[0])) * np.array(surface.direction)
+    return point + (radius + SHAPE.gap + (0.0 if surface.is_plane else SHAPE.rod[0])) * np.array(surface.direction)
 
 
 def rotation(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
@@ -101,15 +113,15 @@ def obstacles(body: RigidBody, q: Sequence[float], surfaces: Sequence[Surface]) 
     """Values of a configuration whose world are these surfaces alone, by the names `NAMES`."""
     found: dict[str, list[Any]] = {}
     for name, surface in zip(NAMES, surfaces, strict=False):
-        soft = surface.stiffness < 4000.0
+        soft = surface.stiffness < SHAPE.soft
         values = {
             "obstacles.names": [name],
             "obstacles.shapes": ["plane" if surface.is_plane else "cylinder"],
             "obstacles.positions": position(body, q, surface).tolist(),
             "obstacles.rotations": _angles(rotation(body, q, surface)),
-            "obstacles.sizes": [PLANE, PLANE, 0.0] if surface.is_plane else [*ROD, 0.0],
+            "obstacles.sizes": [SHAPE.plane, SHAPE.plane, 0.0] if surface.is_plane else [*SHAPE.rod, 0.0],
             "obstacles.stiffness": [surface.stiffness],
-            "obstacles.damping": [0.005 * surface.stiffness if soft else 20.0],
+            "obstacles.damping": [SHAPE.soft_damping * surface.stiffness if soft else SHAPE.damping],
             "obstacles.hardening": [0.0],
             "obstacles.friction": [surface.friction],
             "motions.obstacles": [name],
