@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import ESTIMATED, METRES_PER_NEWTON, STYLE, TRUE, draw_forces, seconds_at
+from wam_analysis.demo_figure import ESTIMATED, LAYOUT, STYLE, TRUE, draw_forces, seconds_at
 from wam_analysis.demo_summary import DemoSummary, summary_of
 from wam_analysis.demo_traces import TOPICS_READ, ForceSignal
 from wam_analysis.recorded import RecordedArm, recorded_arm
@@ -67,7 +67,7 @@ def frame(figure, scene, now, summary, recorded, q, view, stamp) -> Image.Image:
         contact = contact_at(signal, row)
         if contact.cover in recorded.arm.covers.names and np.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(recorded.arm, q, contact)
-            start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
+            start, end = view.project(np.array([point, point + LAYOUT.metres_per_newton * force]))
             arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
             scene.annotate("", end, start, arrowprops=arrow, zorder=30)
     step = next((step.name for step in summary.steps if step.begin <= stamp < step.end), "")
