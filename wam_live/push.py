@@ -7,7 +7,8 @@ from wam_description.arm import Shared
 from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.status import PAUSED
 from wam_live.hold import HeldTopic
-from wam_ros.call import SILENCE, CalledStack
+from wam_ros.call import CalledStack
+from wam_ros.limits import CALL_LIMITS
 from wam_ros.topics import stamp_of
 
 NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -32,7 +33,7 @@ def push(stack: CalledStack, shared: Shared, wrench: Wrench, seconds: float) -> 
     begin = stamp = 0
     try:
         paused = partial(_raise_if_paused, statuses)
-        for message in stack.messages("joint_states", SILENCE, paused):
+        for message in stack.messages("joint_states", CALL_LIMITS.silence, paused):
             driver = statuses["driver"]
             if driver.mode != "enabled":
                 stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from wam_description.configuration import Configuration
 from wam_description.interface import declared, require_parameters
 from wam_description.nodes import EACH, ONE
+from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
@@ -27,11 +28,8 @@ from wam_ros.run import FIRST, LAST, PARENT, Connection, prepare_logging_directo
 from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
-PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
-RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
 # codes of a recorder that SIGTERM ended before it had a bag
 NOT_BEGUN: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
-TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 
 def start(
@@ -149,7 +147,7 @@ class Processes:
 
         All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
         """
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + PROCESS_LIMITS.end
         was_first = self.ended().get(LAST) == 0
         others = [name for name in self._processes if name not in (self._first, LAST)]
         if any(code < 0 for code in self.ended().values()):
@@ -191,9 +189,11 @@ class Processes:
             now = time.monotonic()
             if (work := _work_of(process.pid)) != state:
                 state, moved = work, now
-            if now - moved > RECORDER_PATIENCE:
-                self._kill(LAST, f"has done nothing for {RECORDER_PATIENCE:.0f} s; 'wam bag repair' closes its bag")
-            elif now - printed > TOLD:
+            if now - moved > PROCESS_LIMITS.recorder_end:
+                self._kill(
+                    LAST, f"has done nothing for {PROCESS_LIMITS.recorder_end:.0f} s; 'wam bag repair' closes its bag"
+                )
+            elif now - printed > PROCESS_LIMITS.recorder_reports:
                 printed = now
                 LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
 
@@ -236,7 +236,7 @@ class NodeProcess:
         """End the node, the hard way where it does not end by itself."""
         self._process.terminate()
         try:
-            self._process.wait(PATIENCE)
+            self._process.wait(PROCESS_LIMITS.end)
         except subprocess.TimeoutExpired:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()

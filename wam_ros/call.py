@@ -19,18 +19,13 @@ from wam_description.parameters import build_part
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
+from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import read_status
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import answer_of, refusal_of, service_request
 from wam_ros.run import Connection
 from wam_ros.topics import qos
 
-PATIENCE: Final = 10.0  # s
-SILENCE: Final = 2.0  # s, after which a topic that comes in every period of the arm has stopped
-ATTEMPTS: Final = 20
-SET_ATTEMPTS: Final = 3  # the guard of the force loop takes its time over new gains
-WAITING: Final = 100  # messages that may wait for a slow terminal
-DISCOVERY: Final = 2.0  # s, after which no more of a stack comes
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
 START: Final = "start the stack with 'wam up'"
 
@@ -74,15 +69,15 @@ class CalledStack:
         service, kind, message = service_request(request)
         client = self.node.create_client(kind, service)
         name = self.node.resolve_service_name(service)
-        if not client.wait_for_service(PATIENCE):
+        if not client.wait_for_service(CALL_LIMITS.answer):
             there = self._nodes_without(request.node)
             advice = f"there are {', '.join(there)}" if there else START
-            return Reply(False, f"no service {name} within {PATIENCE:g} s; {advice}")
-        attempts = SET_ATTEMPTS if isinstance(request, SetParameters) else ATTEMPTS
-        wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / attempts)
+            return Reply(False, f"no service {name} within {CALL_LIMITS.answer:g} s; {advice}")
+        attempts = CALL_LIMITS.set_attempts if isinstance(request, SetParameters) else CALL_LIMITS.attempts
+        wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=CALL_LIMITS.answer / attempts)
         answer = answer_of(client, message, attempts, wait)
         if answer is None:
-            return Reply(False, f"no answer from {name} within {PATIENCE:g} s")
+            return Reply(False, f"no answer from {name} within {CALL_LIMITS.answer:g} s")
         refusal = refusal_of(request, answer)
         return Reply(not refusal, refusal or getattr(answer, "message", ""))
 
@@ -124,7 +119,7 @@ class CalledStack:
             requested.ask()
             if found():
                 first = min(first, time.monotonic())
-            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > DISCOVERY
+            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > CALL_LIMITS.discovery
 
         self._wait(is_answered, f"no node of a stack in {self.node.get_namespace()} answers")
         return build_part(Shared, found()[0])
@@ -144,11 +139,19 @@ class CalledStack:
             where it does not answer.
         """
         client = self.node.create_client(DescribeParameters, f"{node}/describe_parameters")
-        wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / ATTEMPTS)
+        wait = partial(
+            self._connection.executor.spin_until_future_complete, timeout_sec=CALL_LIMITS.answer / CALL_LIMITS.attempts
+        )
         question = DescribeParameters.Request(names=list(names))
-        answer = answer_of(client, question, ATTEMPTS, wait) if client.wait_for_service(PATIENCE) else None
+        answer = (
+            answer_of(client, question, CALL_LIMITS.attempts, wait)
+            if client.wait_for_service(CALL_LIMITS.answer)
+            else None
+        )
         if answer is None:
-            raise NoAnswerError(f"node '{node}' does not describe its parameters within {PATIENCE:g} s; {START}")
+            raise NoAnswerError(
+                f"node '{node}' does not describe its parameters within {CALL_LIMITS.answer:g} s; {START}"
+            )
         return [found.name for found in answer.descriptors if not found.read_only]
 
     def statuses(self) -> dict[str, NodeStatus]:
@@ -172,7 +175,7 @@ class CalledStack:
             found[status.node] = status
 
         profile = qos(BY_NAME[STATUS])
-        profile.depth = WAITING
+        profile.depth = CALL_LIMITS.waiting
         self.node.create_subscription(DiagnosticStatus, STATUS, take, profile)
         return found
 
@@ -207,10 +210,10 @@ class CalledStack:
         self._wait(kinds, f"no topic {name}", topics, check)
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
-        profile = QoSProfile(depth=WAITING, reliability=ReliabilityPolicy.BEST_EFFORT)
+        profile = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
         if row is not None and row.latched:
             profile = qos(row)
-            profile.depth = WAITING  # many nodes may have one each
+            profile.depth = CALL_LIMITS.waiting  # many nodes may have one each
         elif row is None:
             profile.durability = DurabilityPolicy.VOLATILE
         taken: list[Any] = []
@@ -254,9 +257,9 @@ class CalledStack:
         while not condition():
             now, before, there = time.monotonic(), there, others()
             since = now if there != before else since
-            if there and now - since > DISCOVERY:
+            if there and now - since > CALL_LIMITS.discovery:
                 raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
-            if now - begin > PATIENCE:
-                raise NoAnswerError(f"{failure} within {PATIENCE:g} s; {START}")
+            if now - begin > CALL_LIMITS.answer:
+                raise NoAnswerError(f"{failure} within {CALL_LIMITS.answer:g} s; {START}")
             check()
             self._connection.executor.spin_once(timeout_sec=0.05)

@@ -6,11 +6,10 @@ from typing import NamedTuple
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_ros.driver_bench import DriverBench, Restart, Untested
 from wam_ros.driver_probe import DriverProbe
+from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.message_checks import MESSAGE_CHECKS
 from wam_ros.stop_checks import STOP_CHECKS
 
-PAUSE = 0.02  # s in which the test itself did not run: what a driver does wrong then may be the machine's doing
-MOST_HELD_UP = 3  # times the attempts, that do not count as the test was held up
 OK, WRONG, NOT_TESTED = "ok", "WRONG", "not tested"
 ONCE = ("interface", "end", "session")  # a second attempt finds another driver, or none
 CHECKS = MESSAGE_CHECKS | STOP_CHECKS
@@ -71,7 +70,7 @@ class Conformance:
         """Test one row."""
         probe = self._bench.probe
         row = ConformanceRow(key, NOT_TESTED)
-        left, held_up, pause = self._attempts, MOST_HELD_UP * self._attempts, 0.0
+        left, held_up, pause = self._attempts, CONFORMANCE_LIMITS.held_up * self._attempts, 0.0
         while left and held_up:
             probe.longest_pause = 0.0
             try:
@@ -84,7 +83,7 @@ class Conformance:
             if row.verdict == OK or key in ONCE:
                 break
             pause = probe.longest_pause
-            left, held_up = (left, held_up - 1) if pause > PAUSE else (left - 1, held_up)
+            left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
         if row.verdict != OK and not held_up:
             row = row._replace(
                 found=f"{row.found} (this machine held up the test itself, last by {1e3 * pause:.0f} ms)"

@@ -6,10 +6,8 @@ from collections.abc import Callable
 
 from wam_description.driver_contract import REPLY, DriverContract
 from wam_ros.driver_probe import Arrived, DriverProbe
+from wam_ros.limits import CONFORMANCE_LIMITS
 
-TRIES = 3  # to enable
-SETTLE = 0.1  # s
-BAD = 0.15  # of the peak current, in commands that have to be refused
 Restart = Callable[[], None]
 
 
@@ -42,14 +40,14 @@ class DriverBench:
         """From any state to enabled, with commands that come."""
         probe = self.probe
         answer = (False, "")
-        for _ in range(TRIES):
+        for _ in range(CONFORMANCE_LIMITS.enable_attempts):
             self.brake()
             probe.is_answering = True
-            probe.watch(SETTLE)
+            probe.watch(CONFORMANCE_LIMITS.settle)
             answer = probe.ask("enable", True)
             if answer[0] and probe.wait(lambda: probe.status.mode == "enabled"):
                 probe.forget()
-                probe.watch(SETTLE)
+                probe.watch(CONFORMANCE_LIMITS.settle)
                 if probe.status.mode == "enabled":
                     return
         raise Untested(f"the driver cannot be enabled: {answer[1] or probe.status.message or 'no answer'}")
@@ -126,7 +124,7 @@ class DriverBench:
     def bad(self) -> list[float]:
         """Currents that may not flow, A: of the other sign than those that hold the arm up, so that the two differ."""
         pairs = zip(self.contract.peak, self.probe.carrying, strict=True)
-        return [-math.copysign(BAD * peak, carrying) for peak, carrying in pairs]
+        return [-math.copysign(CONFORMANCE_LIMITS.bad_current * peak, carrying) for peak, carrying in pairs]
 
     def bears(self, messages: dict[str, Callable[[int], object]]) -> str:
         """What is wrong with how bad commands after good ones are taken."""
@@ -135,7 +133,7 @@ class DriverBench:
             self.enable()
             probe.after = [make] * 5
             probe.wait(lambda: not probe.after)
-            probe.watch(SETTLE)
+            probe.watch(CONFORMANCE_LIMITS.settle)
             for state in self.states():
                 if not all(map(math.isfinite, state.message.effort)):
                     return f"{what}: the effort is no longer finite"

@@ -19,14 +19,11 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import Level, NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_description.transmission_map import TransmissionMap
+from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.ports import READY
 from wam_ros.topics import qos, stamp_of, topic_name
 
-KEPT = 20_000  # messages of a topic
-SWING = 50  # periods, after which the test current changes its sign
-PATIENCE = 10.0  # s, for a service to be found
-SPIN = 0.005  # s
 Spin = Callable[[float], None]
 
 
@@ -68,7 +65,7 @@ class DriverProbe(Node):
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
         self.carrying = [0.0] * len(self._motors)
         self.arrived: dict[str, deque[Arrived]] = {}
-        self.statuses: deque[tuple[float, NodeStatus]] = deque(maxlen=KEPT)
+        self.statuses: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
         self.diagnostics: set[str] = set()
         self.commanded = list(self.carrying)
         self.answered = 0
@@ -85,7 +82,7 @@ class DriverProbe(Node):
             "/clock": Clock,
             "robot_description": String,
         }.items():
-            self.arrived[topic] = deque(maxlen=KEPT)
+            self.arrived[topic] = deque(maxlen=CONFORMANCE_LIMITS.kept)
             name = topic_name(self, BY_NAME[topic])
             self.create_subscription(kind, name, self._keeping(topic), self._qos(topic))
         latched = self._qos("status")
@@ -126,7 +123,7 @@ class DriverProbe(Node):
             constant = self._shared.arm.motors.torque_constant
             self.carrying = [t / k for t, k in zip(torque, constant, strict=True)]
         self.commanded = list(self.carrying)
-        self.commanded[0] += self._current if tick // SWING % 2 else -self._current
+        self.commanded[0] += self._current if tick // CONFORMANCE_LIMITS.swing % 2 else -self._current
         self.send(self.wanted(stamp, self.commanded) if self.wanted else self.command(stamp, self.commanded))
         self.answered = stamp
         if self.after:
@@ -186,7 +183,7 @@ class DriverProbe(Node):
         now = time.monotonic()
         end = now + seconds
         while not (found := until()) and now < end:
-            self._spin(SPIN)
+            self._spin(CONFORMANCE_LIMITS.spin)
             before, now = now, time.monotonic()
             self.longest_pause = max(self.longest_pause, now - before)
         return bool(found)
@@ -198,11 +195,11 @@ class DriverProbe(Node):
     def ask(self, service: str, switch: bool | None = None) -> tuple[bool, str]:
         """The answer of a service; (False, '') where there is none."""
         client = self._requests[service]
-        if not self.wait(client.service_is_ready, PATIENCE):
+        if not self.wait(client.service_is_ready, CONFORMANCE_LIMITS.service_wait):
             return False, ""
         request = client.srv_type.Request(**({} if switch is None else {"data": switch}))
         future = client.call_async(request)
-        if not self.wait(future.done, PATIENCE):
+        if not self.wait(future.done, CONFORMANCE_LIMITS.service_wait):
             return False, ""
         return bool(future.result().success), str(future.result().message)
 

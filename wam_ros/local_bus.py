@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 
 from rclpy.context import Context
 
-MOST: Final = 16  # messages handed on in one turn, about two inner periods; then timers and services have theirs
+from wam_ros.limits import NODE_LIMITS
 
 Take = Callable[[bytes], None]
 
@@ -51,7 +51,7 @@ class LocalBus:
 
     def _turn(self) -> None:
         waiting = self._waiting
-        for _ in range(MOST):
+        for _ in range(NODE_LIMITS.turn):
             takers, data = waiting[0]
             for take in takers:
                 take(data)

@@ -11,13 +11,10 @@ from itertools import pairwise
 
 from wam_description.driver_contract import SENT, STATUS_AGE, TAKEN
 from wam_description.signals import State
-from wam_ros.driver_bench import SETTLE, DriverBench, Untested
+from wam_ros.driver_bench import DriverBench, Untested
+from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import joint_state
 
-LOOK = 0.4  # s of watching
-START = 20.0  # s, for a driver to appear
-TRAVEL = 0.02  # rad, below which a velocity cannot be compared
-RATE = 0.05  # largest relative difference of the period
 Check = Callable[[DriverBench], str]
 
 
@@ -29,20 +26,20 @@ def _interface(bench: DriverBench) -> str:
         name = f"{probe.get_namespace().strip('/')}: driver"
         return found if name in probe.diagnostics else [*found, f"/diagnostics of '{name}'"]
 
-    probe.wait(lambda: not lacking(), START)
+    probe.wait(lambda: not lacking(), CONFORMANCE_LIMITS.start)
     return f"{', '.join(found)} not found" if (found := lacking()) else ""
 
 
 def _rate(bench: DriverBench) -> str:
     bench.probe.forget()
-    bench.probe.watch(2 * LOOK)
+    bench.probe.watch(2 * CONFORMANCE_LIMITS.look)
     states, period = bench.states(), bench.contract.period
     elapsed = states[-1].when - states[0].when
     advanced = (states[-1].stamp - states[0].stamp) * 1e-9
-    if abs(advanced / elapsed - 1.0) > RATE:
+    if abs(advanced / elapsed - 1.0) > CONFORMANCE_LIMITS.period_error:
         return f"stamps advance by {advanced:.3f} s in {elapsed:.3f} s"
     share = len(states) * period * 1e-9 / elapsed
-    if not bench.contract.least_share <= share <= 1.0 + 2 * RATE:
+    if not bench.contract.least_share <= share <= 1.0 + 2 * CONFORMANCE_LIMITS.period_error:
         busy, cores = os.getloadavg()[0], os.cpu_count() or 1
         why = f"; {busy:.0f} processes want the {cores} processors of this machine" if busy > cores else ""
         return f"{len(states)} states in {elapsed:.2f} s, {share:.0%} of the periods{why}"
@@ -50,7 +47,7 @@ def _rate(bench: DriverBench) -> str:
 
 
 def _stamps(bench: DriverBench) -> str:
-    bench.probe.watch(LOOK)
+    bench.probe.watch(CONFORMANCE_LIMITS.look)
     stamps = [state.stamp for state in bench.states()]
     for before, stamp in pairwise(stamps):
         if stamp <= before:
@@ -61,7 +58,7 @@ def _stamps(bench: DriverBench) -> str:
 
 def _outer(bench: DriverBench) -> str:
     bench.probe.forget()
-    bench.probe.watch(LOOK)
+    bench.probe.watch(CONFORMANCE_LIMITS.look)
     states = {state.stamp for state in bench.states()}
     period, outer = bench.contract.period, bench.contract.outer_period
     due = sum((stamp - period) % outer == 0 for stamp in states)
@@ -76,7 +73,7 @@ def _outer(bench: DriverBench) -> str:
 
 
 def _arrays(bench: DriverBench) -> str:
-    bench.probe.watch(SETTLE)
+    bench.probe.watch(CONFORMANCE_LIMITS.settle)
     names = list(bench.contract.motors)
     for _, _, message in bench.states():
         if list(message.name) != names:
@@ -90,7 +87,7 @@ def _arrays(bench: DriverBench) -> str:
 
 def _velocity(bench: DriverBench) -> str:
     bench.enable()
-    bench.probe.watch(LOOK)
+    bench.probe.watch(CONFORMANCE_LIMITS.look)
     states = bench.states()
     compared = []
     for i, name in enumerate(bench.contract.motors):
@@ -101,13 +98,13 @@ def _velocity(bench: DriverBench) -> str:
             travelled += abs(step)
             dt = (after.stamp - before.stamp) * 1e-9
             integral += 0.5 * (before.message.velocity[i] + after.message.velocity[i]) * dt
-        if travelled < TRAVEL:
+        if travelled < CONFORMANCE_LIMITS.least_travel:
             continue
         compared.append(name)
         if abs(integral - moved) > 0.1 * travelled:
             return f"{name} moved {moved:.4f} rad, the integral of its velocity is {integral:.4f} rad"
     if not compared:
-        raise Untested(f"no motor moved {TRAVEL} rad; give a larger --current")
+        raise Untested(f"no motor moved {CONFORMANCE_LIMITS.least_travel} rad; give a larger --current")
     return ""
 
 
@@ -115,9 +112,9 @@ def _braked(bench: DriverBench) -> str:
     bench.brake()
     if wrong := bench.in_mode("braked"):
         return wrong
-    bench.probe.watch(SETTLE)
+    bench.probe.watch(CONFORMANCE_LIMITS.settle)
     bench.probe.forget()
-    bench.probe.watch(SETTLE)
+    bench.probe.watch(CONFORMANCE_LIMITS.settle)
     return "a current flows" if bench.last_flow() else ""
 
 
@@ -140,7 +137,7 @@ def _status(bench: DriverBench) -> str:
 def _silence(bench: DriverBench) -> str:
     bench.brake()
     bench.probe.is_answering = False
-    bench.probe.watch(3 * SETTLE)
+    bench.probe.watch(3 * CONFORMANCE_LIMITS.settle)
     done, text = bench.probe.ask("enable", True)
     if done or not text:
         return f"it answers {'success' if done else 'a refusal without a reason'}: '{text}'"

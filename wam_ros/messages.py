@@ -5,7 +5,7 @@ import struct
 from array import array
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Final
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, WrenchStamped
@@ -32,11 +32,9 @@ from wam_description.topics import (
     WRENCH,
     Topic,
 )  # fmt: skip
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.markers import contact_markers
 from wam_ros.topics import header, stamp_of
-
-LONGEST_TRAJECTORY: Final = 1000  # points
-LONGEST_REASON: Final = 400  # characters; a message may hold a name of any length
 
 
 class Refused(ValueError):
@@ -48,7 +46,7 @@ class Refused(ValueError):
     """
 
     def __init__(self, reason: str, kind: str = "") -> None:
-        super().__init__(printable(reason, LONGEST_REASON))
+        super().__init__(printable(reason, NODE_LIMITS.reason_length))
         self.kind = kind
 
 
@@ -194,8 +192,8 @@ def read_trajectory(message: JointTrajectory, names: list[str]) -> PosturePath:
         names the first thing that is wrong.
     """
     order = list(range(len(names))) if message.joint_names == names else _order(list(message.joint_names), names)
-    if not 0 < len(message.points) <= LONGEST_TRAJECTORY:
-        raise Refused(f"{len(message.points)} points; send 1 to {LONGEST_TRAJECTORY}")
+    if not 0 < len(message.points) <= NODE_LIMITS.trajectory_points:
+        raise Refused(f"{len(message.points)} points; send 1 to {NODE_LIMITS.trajectory_points}")
     found = []
     for i, point in enumerate(message.points):
         arrays = [point.positions.tolist(), point.velocities.tolist()]

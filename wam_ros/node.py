@@ -26,6 +26,7 @@ from wam_description.signals import Level, NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import Follower, declare, follow_together
@@ -35,11 +36,7 @@ from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import SECOND
 
-REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
 OUT_OF_TIME = "out of time"  # on a loaded machine all topics of other nodes are, at once
-SLOW_STEP = 0.5  # s, from which a step is reported
-SLOW_STEP_REPORTS = 5.0  # s between two of these reports
-PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
 
 
 class AdaptedNode(TolerantNode):
@@ -169,7 +166,10 @@ class AdaptedNode(TolerantNode):
         ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
             self._ports.set_problem("inputs", "")
-        elif not (known := self._ports.problems.get("inputs")) or self._ports.counts["steps"] % REPEATED == 0:
+        elif (
+            not (known := self._ports.problems.get("inputs"))
+            or self._ports.counts["steps"] % NODE_LIMITS.loss_repeated == 0
+        ):
             lost, stopped = self._interface.silent(ages)  # on a busy machine another node may just have been late
             silent = ", ".join(stopped)
             self._ports.set_problem(
@@ -222,13 +222,13 @@ class AdaptedNode(TolerantNode):
         began = time.monotonic()
         self._worked = inputs.stamp
         outputs = work(inputs)
-        if (taken := time.monotonic() - began) > SLOW_STEP:
+        if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
             is_own = not is_packaged(self._declaration)
             self.get_logger().warning(
                 f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
                 "brakes if they wait too long: "
                 f"{'let its steps compute less' if is_own else 'the machine is busy, end what else runs on it'}",
-                throttle_duration_sec=SLOW_STEP_REPORTS,
+                throttle_duration_sec=NODE_LIMITS.slow_step_reports,
             )
         self._report_refusals(inputs)
         requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
@@ -301,7 +301,7 @@ class AdaptedNode(TolerantNode):
 
         def ask_when_found() -> None:
             nonlocal is_reported
-            if not is_reported and time.monotonic() - began > PATIENCE:
+            if not is_reported and time.monotonic() - began > NODE_LIMITS.service_wait:
                 is_reported = True
                 self.get_logger().warning(
                     f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"

@@ -13,7 +13,7 @@ from wam_description.arm import Shared
 from wam_description.parameters import Field, ParameterError, build, fields, listed, values
 from wam_description.signals import NodeStatus
 from wam_description.wiring import raised
-from wam_ros.messages import LONGEST_REASON
+from wam_ros.limits import NODE_LIMITS
 
 T = TypeVar("T")
 OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
@@ -191,7 +191,7 @@ class Follower:
 
 
 def _why(error: Exception) -> str:
-    return printable(str(error) if isinstance(error, ParameterError) else raised(error), LONGEST_REASON)
+    return printable(str(error) if isinstance(error, ParameterError) else raised(error), NODE_LIMITS.reason_length)
 
 
 def _updated(own: T, given: Mapping[str, Any], prefix: str, take: Any) -> T:

@@ -18,6 +18,7 @@ from wam_description.signals import Level, NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
 from wam_ros.outlets import Outlets
 from wam_ros.priority import PRIORITY, set_priority
@@ -28,11 +29,6 @@ from wam_ros.wire import decoder, stamp_of
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
-STALE_AFTER = 5  # s without a step, as long as aggregators of diagnostics wait
-NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
-CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
-LONGEST_ON_ITS_WAY = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
-LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -105,7 +101,7 @@ class Ports:
         self._informed: tuple[str, bool, tuple[str, ...]] = ("", True, ())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
-        node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
+        node.create_timer(NODE_LIMITS.claim_period, self._look_for_rivals, clock=steady)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
             node.create_timer(1.0, self._report_standstill, clock=steady)
 
@@ -170,7 +166,7 @@ class Ports:
         if row.latched:
             profile.depth = DEPTH  # it may have many publishers, each with a message of its own
         elif self.shared.timing.mode == "realtime":
-            profile.depth = NEWEST  # a late node works on the newest state
+            profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
         kind = message_type(row)
         name = topic_name(self.node, row)
         bus, is_local = self._outlets.bus, False
@@ -190,10 +186,10 @@ class Ports:
     def repeat_taken_status(self) -> None:
         """`repeat_status`, but not over one that is still on its way: replaced, it would be a loss to a recorder.
 
-        One that a frozen node does not take holds up the others no longer than `LONGEST_ON_ITS_WAY`.
+        One that a frozen node does not take holds up the others no longer than `NODE_LIMITS.status_on_its_way`.
         """
         now = time.monotonic()
-        if now - self._repeated > LONGEST_ON_ITS_WAY or self._outlets.is_taken(STATUS):
+        if now - self._repeated > NODE_LIMITS.status_on_its_way or self._outlets.is_taken(STATUS):
             self._repeated = now
             self.repeat_status()
 
@@ -262,7 +258,7 @@ class Ports:
         if status != self._status:
             if self.shared.timing.mode == "lockstep" or status.session != self._status.session:
                 # only the last status is kept: a recording, and a driver that is followed, lack none
-                self._outlets.is_taken(STATUS, LONGEST_ECHO)
+                self._outlets.is_taken(STATUS, NODE_LIMITS.status_echo)
             self._status = status
             self._outlets.send(STATUS, diagnostic_status(status, self.shared.arm.name))
             self._inform()
@@ -373,7 +369,7 @@ class Ports:
         steps = self.counts["steps"]
         self._seconds_without_step = 0 if steps != self._last_steps else self._seconds_without_step + 1
         self._last_steps = steps
-        if self._seconds_without_step >= STALE_AFTER:
+        if self._seconds_without_step >= NODE_LIMITS.stale_after:
             reason = f"no step for {self._seconds_without_step} s" if self.ready else self._status.message
             self._publish_report(Level.STALE, reason, {})
 

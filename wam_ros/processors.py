@@ -21,17 +21,15 @@ from typing import Final
 
 from wam_description.arm import Shared
 from wam_description.interface import declared, process_groups
+from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.priority import fifo_is_granted, for_all_threads
 
 PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number, and a policy
 WAITING: Final = "batch"  # policy SCHED_BATCH
-FEWEST: Final = 3  # processors, of which the driver may have one to itself in realtime
 # share the driver's processor in lockstep where each node has a process: most of the messages are theirs
 CLOSEST: Final = {"transform", "velocity_loop", "gravity"}
 TIMES: Final = Path("/proc/stat")
-LOOK: Final = 0.05  # s, in which the idlest processor is found
 IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting for a disk
-STEPS: Final = 10  # of load; within one of them it is chance which processor is the idlest
 
 
 def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[str, str]]]:
@@ -49,7 +47,7 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
     permitted = os.sched_getaffinity(0)
     if shared.timing.mode == "lockstep":
         closest, policy = CLOSEST, [WAITING]
-    elif len(permitted) >= FEWEST and fifo_is_granted(shared.timing.fifo_priority):
+    elif len(permitted) >= PROCESS_LIMITS.processors and fifo_is_granted(shared.timing.fifo_priority):
         closest, policy = set(), []
     else:
         return [(group, {}) for group in groups]
@@ -70,14 +68,14 @@ def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
     -------
     The idlest one for the inner loop, the others; both alike where only one is permitted.
     """
-    inner = max(idle, key=lambda one: (round(STEPS * idle[one]), random.random()))
+    inner = max(idle, key=lambda one: (round(PROCESS_LIMITS.load_steps * idle[one]), random.random()))
     return {inner}, set(idle) - {inner} or {inner}
 
 
 def idle_parts(permitted: Collection[int]) -> dict[int, float]:
     """Part of the time that processors are idle, 0 to 1, measured for a moment; 0 where the system does not show it."""
     before = _times()
-    time.sleep(LOOK)
+    time.sleep(PROCESS_LIMITS.load_look)
     after = _times()
     parts = {}
     for one in permitted:

@@ -12,12 +12,9 @@ from wam_bag.losses import LOST_AT_END, UNFINISHED
 from wam_bag.printable import printable
 from wam_description.status import diagnosed_name
 from wam_description.topics import EVERY_NODE, Topic
+from wam_ros.limits import RECORDER_LIMITS
 
-_MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
-_MOST_PUBLISHERS: Final = 64  # publishers counted separately in one topic
-_MOST_HELD: Final = 1000  # messages that wait for the time at which the recording begins
 _LATEST: Final = 2**63 - 1  # ns; log times of a bag
-_LONGEST_NAME: Final = 200  # bytes of a publisher's name
 _NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 _NODE_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
@@ -85,7 +82,7 @@ class Numbering:
         self._lost_before, self._total = (self.lacking() if self._last else 0), 0
         self.missed += number - 1
         self._last.insert(0, number)
-        del self._last[_MOST_STREAMS:]
+        del self._last[RECORDER_LIMITS.streams :]
 
     def announce(self, total: int) -> None:
         """Take the number of messages that the publisher has sent; fewer than before are those of another one."""
@@ -143,7 +140,7 @@ class _Channel:
         """Counts of one publisher; if there are too many, the oldest is dropped."""
         found = self.publishers.get(publisher)
         if found is None:
-            if len(self.publishers) >= _MOST_PUBLISHERS:
+            if len(self.publishers) >= RECORDER_LIMITS.publishers:
                 self.publishers.popitem(last=False)
             found = self.publishers[publisher] = Numbering(partial(self._writers_of, publisher))
             for node, total in self.totals.items():
@@ -221,7 +218,7 @@ class Recorder:
         self._received += 1
         if self._held is not None:
             stamp = 0 if channel.topic.latched or is_foreign else channel.stamp_of(data)
-            if not stamp and len(self._held) < _MOST_HELD:
+            if not stamp and len(self._held) < RECORDER_LIMITS.held:
                 self._held.append((channel, publisher, data, number))
                 return
             self._begin_at(stamp if stamp and number > 1 else 0)  # before the first one of a publisher nothing was
@@ -245,7 +242,7 @@ class Recorder:
                 stamp = self._stamps.get(publisher, self._begin)
             else:
                 self._stamps[publisher] = stamp
-                if len(self._stamps) > _MOST_PUBLISHERS * len(self._channels):
+                if len(self._stamps) > RECORDER_LIMITS.publishers * len(self._channels):
                     del self._stamps[next(iter(self._stamps))]
             received = sent = max(stamp, self._begin) if is_free else stamp
         if not (0 <= received <= _LATEST and 0 <= sent <= _LATEST):  # anybody can send such a stamp
@@ -378,7 +375,7 @@ def _text(data: bytes, position: int) -> str:
         (length,) = struct.unpack_from("<I", data, position)
     except struct.error:
         return ""
-    end = position + 3 + min(length, _LONGEST_NAME)
+    end = position + 3 + min(length, RECORDER_LIMITS.name_length)
     return printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
 
 

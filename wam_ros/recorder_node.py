@@ -19,6 +19,7 @@ from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
+from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
@@ -29,11 +30,7 @@ from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, qos, topic_name
 
-DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
-LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
-SILENCE = 5.0  # s without any message, after which a recorder that was started by hand reports it
 _SHARED = frozenset(field.name for field in fields(Shared))
-MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
 
 class Silence:
@@ -49,11 +46,11 @@ class Silence:
         self._at, self._is_reported = time.monotonic(), False
 
     def begins(self) -> bool:
-        """Whether no message has come for `SILENCE`; true once for each pause."""
+        """Whether no message has come for `RECORDER_LIMITS.silence`; true once for each pause."""
         now = time.monotonic()
         if self.heard != self._before:
             self._before, self._at, self._is_reported = self.heard, now, False
-        elif not self._is_reported and now - self._at > SILENCE:
+        elif not self._is_reported and now - self._at > RECORDER_LIMITS.silence:
             self._is_reported = True
             return True
         return False
@@ -110,7 +107,7 @@ class RecorderNode(TolerantNode):
         self._two_runs = ""  # which node was started again with others
         self._silence = Silence()  # of others, recorded or not
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DRAIN_PERIOD, self._drain, clock=steady)
+        self.create_timer(RECORDER_LIMITS.drain_period, self._drain, clock=steady)
         self.create_timer(0.1, self.attend, clock=steady)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
             self.create_timer(1.0, self._report, clock=steady)
@@ -119,7 +116,7 @@ class RecorderNode(TolerantNode):
     def destroy_node(self) -> None:
         """Record the messages that have arrived, write parameters and counts, close the bag."""
         self._drain()
-        end = time.monotonic() + LONGEST_WAIT
+        end = time.monotonic() + RECORDER_LIMITS.announced
         while self.recorder.lost_at_end() and time.monotonic() < end:  # it may still be on the way
             time.sleep(0.02)
             self._drain()
@@ -161,13 +158,13 @@ class RecorderNode(TolerantNode):
             message = deserialize_message(data, DiagnosticArray)
         except Exception:  # rclpy raises its own kinds for bytes that are no such message
             return
-        for facts in (read_status(status).facts for status in message.status[:MOST_STATUSES]):
+        for facts in (read_status(status).facts for status in message.status[: RECORDER_LIMITS.statuses]):
             namespace, _, node = facts.get(NODE, "").rpartition("/")
             if node not in self._nodes or namespace != self.get_namespace().rstrip("/"):
                 continue  # a node of another arm
             for key, value in facts.items():
                 topic = key.removeprefix(PUBLISHED)
-                if topic != key and value.isdecimal() and len(value) < LONGEST_COUNT:
+                if topic != key and value.isdecimal() and len(value) < RECORDER_LIMITS.count_length:
                     self.recorder.announce(node, topic, int(value))
             if ENDED in facts:
                 self._unfinished.discard(node)
@@ -271,7 +268,7 @@ class RecorderNode(TolerantNode):
         """Report once that nothing comes, to a recorder that was started by hand and may wait for nobody."""
         if not self._ends_last and self._silence.begins():
             why = "the stack has ended, or is paused" if self._silence.heard else "no stack runs here"
-            self.get_logger().warning(f"no message for {SILENCE:g} s: {why}; Ctrl-C ends the recording")
+            self.get_logger().warning(f"no message for {RECORDER_LIMITS.silence:g} s: {why}; Ctrl-C ends the recording")
 
     def _report(self) -> None:
         state = self._state("recording")

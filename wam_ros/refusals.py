@@ -7,11 +7,9 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from wam_bag.printable import printable
-from wam_ros.messages import LONGEST_REASON
+from wam_ros.limits import NODE_LIMITS
 
-LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
-PROOF = 5  # messages out of order after which two publishers of one node name both count as alive
 
 
 class Claims:
@@ -53,7 +51,7 @@ class Claims:
             self._strays.pop(topic, None)
             return ""
         names = self._publishers(topic, count)
-        if len(names) == 1 and self._strays[topic] < PROOF:
+        if len(names) == 1 and self._strays[topic] < NODE_LIMITS.strays:
             return ""
         who = " and ".join(names) if len(names) > 1 else f"{count} nodes named {names[0]}"
         return f"{who} publish {topic}, which one node alone may; stop all others, then reset_fault"
@@ -98,12 +96,12 @@ class Refusals:
         kind = kind or topic
         self._by_kind[kind] += 1
         now = time.monotonic()
-        since, count = self._logged.get(kind, (-LOG_PERIOD, 0))
-        if now - since >= LOG_PERIOD:
+        since, count = self._logged.get(kind, (-NODE_LIMITS.log_period, 0))
+        if now - since >= NODE_LIMITS.log_period:
             others = self._by_kind[kind] - count - 1
             more = f" ({others} more were refused before)" if others else ""
             self._logged[kind] = now, self._by_kind[kind]
-            self._node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
+            self._node.get_logger().warning(f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}{more}")
 
     def show(self, topic: str, reason: str) -> bool:
         """Whether the status has to state now that messages of a topic are refused; it does up to a report without."""

@@ -3,13 +3,13 @@
 import time
 from collections.abc import Iterable
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
-_PATIENCE: Final = 2.0  # s; an answer can be lost while services are still being discovered
+from wam_ros.limits import CALL_LIMITS
 
 
 class RemoteParameters:
@@ -30,7 +30,7 @@ class RemoteParameters:
             )
             for name in names
         }
-        self._requested = dict.fromkeys(self._clients, -_PATIENCE)
+        self._requested = dict.fromkeys(self._clients, -CALL_LIMITS.parameters)
 
     @property
     def missing(self) -> list[str]:
@@ -42,7 +42,7 @@ class RemoteParameters:
         now = time.monotonic()
         for name in self.missing:
             lister, getter = self._clients[name]
-            if now - self._requested[name] < _PATIENCE:
+            if now - self._requested[name] < CALL_LIMITS.parameters:
                 continue
             if not (lister.service_is_ready() and getter.service_is_ready()):
                 continue

@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
+from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.process_signals import LISTENER_GONE, Stop, bound_leaving
@@ -33,10 +34,6 @@ from wam_ros.topics import NAMESPACE
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
-LONGEST_END = 0.5  # s, for what has arrived before the end
-# s, for the last messages of all nodes of this process together; only a listener that is frozen needs it
-LONGEST_DELIVERY = 4.0
-SHORT_DELIVERY = 0.4  # s, where a listener was killed: the middleware waits for it as for one that is frozen
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
@@ -68,7 +65,7 @@ def end_of_delivery(context: Context) -> float:
 
     There is one deadline for all of them: a listener that is frozen would hold up each node in turn.
     """
-    return _ENDS.get(context, time.monotonic() + LONGEST_DELIVERY)
+    return _ENDS.get(context, time.monotonic() + PROCESS_LIMITS.delivery)
 
 
 def spin(executor: Any, until: Callable[[], bool], end: Callable[[], object] = lambda: None) -> None:
@@ -82,7 +79,7 @@ def spin(executor: Any, until: Callable[[], bool], end: Callable[[], object] = l
         executor.spin_once(timeout_sec=0.1)
     end()
     future: rclpy.Future[None] = rclpy.Future()
-    limit = threading.Timer(LONGEST_END, executor.create_task, [future.set_result, None])
+    limit = threading.Timer(PROCESS_LIMITS.arrived, executor.create_task, [future.set_result, None])
     limit.start()
     executor.spin_until_future_complete(future, timeout_sec=0.1)
     limit.cancel()
@@ -137,7 +134,9 @@ class Connection:
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
-        _ENDS[self.context] = time.monotonic() + (SHORT_DELIVERY if self.listener_gone else LONGEST_DELIVERY)
+        _ENDS[self.context] = time.monotonic() + (
+            PROCESS_LIMITS.short_delivery if self.listener_gone else PROCESS_LIMITS.delivery
+        )
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.executor.remove_node(node)
             node.destroy_node()

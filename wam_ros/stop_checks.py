@@ -7,10 +7,9 @@ from collections.abc import Callable
 
 from wam_description.driver_contract import REPLY, STOP
 from wam_description.signals import Level
-from wam_ros.driver_bench import SETTLE, DriverBench, Untested
-from wam_ros.message_checks import START
+from wam_ros.driver_bench import DriverBench, Untested
+from wam_ros.limits import CONFORMANCE_LIMITS
 
-PATIENCE_OF_GRAPH = 5.0  # s, for a publisher to vanish
 Check = Callable[[DriverBench], str]
 
 
@@ -67,14 +66,14 @@ def _estop(bench: DriverBench) -> str:
 def _discard(bench: DriverBench) -> str:
     probe = bench.probe
     bench.brake()
-    probe.watch(SETTLE)
+    probe.watch(CONFORMANCE_LIMITS.settle)
     since = probe.status.since
     probe.is_answering = False
     probe.forget()
     done, text = probe.ask("enable", True)
     if not done:
         return f"enable, straight after a command, is refused: '{text}'"
-    probe.watch(SETTLE)
+    probe.watch(CONFORMANCE_LIMITS.settle)
     if bench.last_flow():
         return "a current of before flows"
     return "" if probe.status.since > since else f"since stays {since} ns"
@@ -90,7 +89,7 @@ def _peers(bench: DriverBench) -> str:
         return f"the fault '{probe.status.fault}' does not name velocity_loop and its fault, '{fault}'"
     probe.ask("reset_fault")
     probe.report(fault)
-    probe.watch(SETTLE)
+    probe.watch(CONFORMANCE_LIMITS.settle)
     probe.ask("reset_fault")
     done, text = probe.ask("enable", True)
     return f"enable is done: '{text}'" if done else ""
@@ -105,15 +104,15 @@ def _claims(bench: DriverBench) -> str:
         return "" if "motor_current_command" in fault else f"the fault is '{fault}'; it has to name the topic"
     finally:
         other.destroy_node()
-        bench.probe.wait(lambda: bench.probe.count_publishers("motor_current_command") == 1, PATIENCE_OF_GRAPH)
-        bench.probe.watch(3 * SETTLE)
+        bench.probe.wait(lambda: bench.probe.count_publishers("motor_current_command") == 1, CONFORMANCE_LIMITS.vanish)
+        bench.probe.watch(3 * CONFORMANCE_LIMITS.settle)
 
 
 def _agreement(bench: DriverBench) -> str:
     probe = bench.probe
     bench.enable()
     probe.report(node="transform", started_with="one")
-    probe.watch(SETTLE)
+    probe.watch(CONFORMANCE_LIMITS.settle)
     probe.report(started_with="another")
     try:
         if wrong := bench.in_mode("fault"):
@@ -130,7 +129,7 @@ def _end(bench: DriverBench) -> str:
         raise Untested("the driver runs already; give its command with --driver")
     bench.enable()
     bench.end()
-    bench.probe.watch(SETTLE)
+    bench.probe.watch(CONFORMANCE_LIMITS.settle)
     mode = bench.probe.status.mode
     return "" if mode in ("braked", "fault") else f"its last status has the mode '{mode}'"
 
@@ -142,7 +141,7 @@ def _session(bench: DriverBench) -> str:
     before = probe.status.session
     probe.statuses.clear()
     bench.restart()
-    if not probe.wait(lambda: probe.status.session, START):
+    if not probe.wait(lambda: probe.status.session, CONFORMANCE_LIMITS.start):
         return "no status has come since"
     if probe.status.session <= before:
         return f"its session is {probe.status.session} after {before}"

@@ -16,10 +16,9 @@ from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
 from wam_description.parameters import meant
 from wam_description.wiring import raised
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.process_signals import leaving
 
-HELD: Final = 1.0  # s without a further exception, after which a fault is over
-LONGEST: Final = 300  # characters of an exception that are reported
 _READABLE: Final = frozenset(kind.value for kind in Parameter.Type)
 
 
@@ -137,11 +136,11 @@ class TolerantNode(Node):
         self._exception_time = time.monotonic()
         if self._exception_fault:
             return
-        self._exception_fault = printable(self._described(what, error), LONGEST)
-        trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * LONGEST, "\n")
+        self._exception_fault = printable(self._described(what, error), NODE_LIMITS.exception_length)
+        trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * NODE_LIMITS.exception_length, "\n")
         self.get_logger().error(f"{self._exception_fault} ({self._exceptions} so far)\n{trace}")
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._exception_timer = super().create_timer(HELD, self._look_for_end, clock=steady)
+        self._exception_timer = super().create_timer(NODE_LIMITS.fault_held, self._look_for_end, clock=steady)
         self.take_fault(self._exception_fault)
 
     def _described(self, what: str, error: Exception) -> str:
@@ -153,7 +152,7 @@ class TolerantNode(Node):
 
     def _look_for_end(self) -> None:
         """Report that the fault is over, when callbacks have gone well for a while."""
-        if time.monotonic() - self._exception_time < HELD or self.is_failing:
+        if time.monotonic() - self._exception_time < NODE_LIMITS.fault_held or self.is_failing:
             return
         self._exception_fault = ""
         self.destroy_timer(self._exception_timer)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.wiring import Call
 from wam_ros.call import CalledStack
+from wam_ros.limits import CALL_LIMITS
 
 WAM = [sys.executable, "-P", "-m", "wam_cli.program"]
 
@@ -110,7 +112,7 @@ def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another
     ros: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`wam bag record` needs them, and a real driver need not have them."""
-    monkeypatch.setattr("wam_ros.call.PATIENCE", LONG)
+    monkeypatch.setattr("wam_ros.call.CALL_LIMITS", replace(CALL_LIMITS, answer=LONG))
     driver = ros.node("driver")
     driver.declare_parameter("serial", "WAM7")
     node = subprocess.Popen([*WAM, "node", "gravity", "-r", "__ns:=/wam", "-p", "timing.mode:=realtime"])

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from wam_description.signals import Answer, State
 from wam_ros import conformance, message_checks
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
+from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.node import make_node
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -99,7 +101,7 @@ def test_an_attempt_that_the_machine_held_up_does_not_count(
     monkeypatch.setitem(conformance.CHECKS, "rate", lambda bench: check())
     row = tested.row("rate")
     assert (row.verdict, len(made)) == (WRONG, tries)
-    assert ("held up" in row.found) == (pause > conformance.PAUSE)
+    assert ("held up" in row.found) == (pause > conformance.CONFORMANCE_LIMITS.pause)
 
 
 @pytest.mark.slow
@@ -134,7 +136,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
 ) -> None:
     for name in ("START", "LOOK"):
         monkeypatch.setattr(message_checks, name, 0.05)
-    monkeypatch.setattr("wam_ros.driver_probe.PATIENCE", 0.05)
+    monkeypatch.setattr("wam_ros.driver_probe.CONFORMANCE_LIMITS", replace(CONFORMANCE_LIMITS, service_wait=0.05))
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(bench.conformance(1).rows())
     assert [row.key for row in rows] == list(REQUIREMENTS)

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from test_nodes import Hand, Listener, bad
 
 from wam_description.status import guidance
-from wam_ros.ports import STALE_AFTER
+from wam_ros.limits import NODE_LIMITS
 
 MS = 1_000_000
 
@@ -66,7 +66,7 @@ def test_a_paused_arm_is_stale_in_realtime_until_it_goes_on(
     hand.ask("pause", True)
     while (report := next_report(hand, heard)).level != DiagnosticStatus.STALE:
         pass
-    assert report.message == f"no step for {STALE_AFTER} s"
+    assert report.message == f"no step for {NODE_LIMITS.stale_after} s"
     hand.ask("pause", False)
     while reports(heard)[-1].level == DiagnosticStatus.STALE:
         next_report(hand, heard)

@@ -3,7 +3,8 @@
 from collections import deque
 from collections.abc import Callable
 
-from wam_ros.local_bus import MOST, LocalBus
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.local_bus import LocalBus
 
 
 class FalseExecutor:
@@ -49,8 +50,8 @@ def test_nodes_that_answer_each_other_without_end_leave_turns_to_everything_else
     executor.create_task(lambda: others.append(count[0]))
     for _ in range(3):
         executor.spin_once()
-    assert others == [MOST]
-    assert count == [2 * MOST]
+    assert others == [NODE_LIMITS.turn]
+    assert count == [2 * NODE_LIMITS.turn]
     assert len(executor.tasks) == 1
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -786,7 +787,7 @@ def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
     from wam_ros.bring_up import Composition
 
     monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
-    monkeypatch.setattr(adapter, "PATIENCE", 0.0)
+    monkeypatch.setattr(adapter, "NODE_LIMITS", replace(adapter.NODE_LIMITS, service_wait=0.0))
     over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Requesting"]})
     said = []
     with Composition(over_topics, domain_id=domain_id) as composition:

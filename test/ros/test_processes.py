@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
 from wam_ros.bring_up import Processes
+from wam_ros.limits import CALL_LIMITS, PROCESS_LIMITS
 from wam_ros.process_signals import HELD_UP as HELD_UP_BY
 from wam_ros.process_signals import bound_leaving, leaving
 from wam_ros.topics import qos
@@ -90,9 +92,7 @@ def started(tmp_path: Path) -> Iterator[Callable[..., Stack]]:
 
 def soon_delivered() -> float:
     """The same for processes: first the driver, then the others wait until listeners have their last messages."""
-    from wam_ros.run import LONGEST_DELIVERY
-
-    return 2.0 * LONGEST_DELIVERY + soon()
+    return 2.0 * PROCESS_LIMITS.delivery + soon()
 
 
 def up(started: Callable[..., Stack], *arguments: str) -> Stack:
@@ -191,8 +191,8 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
 def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Processes:
     """A recorder as a process, with a bag that is open."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(bring_up, "PATIENCE", 0.2)
-    monkeypatch.setattr(bring_up, "TOLD", 0.2)
+    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, end=0.2))
+    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, recorder_reports=0.2))
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
     wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
     return processes
@@ -249,7 +249,7 @@ def test_a_recorder_that_is_ended_before_the_other_nodes_leaves_a_bag_that_is_no
 def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
     recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
-    monkeypatch.setattr(bring_up, "RECORDER_PATIENCE", 0.5)
+    monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, recorder_end=0.5))
     os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
     recording.stop()
     assert recording.killed == ["recorder"]
@@ -647,7 +647,7 @@ def test_record_takes_mode_and_nodes_from_the_running_stack(
 def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
     tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
-    monkeypatch.setattr("wam_ros.call.PATIENCE", 0.2)
+    monkeypatch.setattr("wam_ros.call.CALL_LIMITS", replace(CALL_LIMITS, answer=0.2))
     code, _, err = command(capfd, "bag", "record", "--directory", str(tmp_path / "bags"))
     assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
     assert err == "wam bag: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
@@ -725,7 +725,8 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
 REPORT_THE_DELIVERY = """
 import time
 from rclpy.node import Node
-from wam_ros.run import SHORT_DELIVERY, end_of_delivery, run
+from wam_ros.run import end_of_delivery, run
+from wam_ros.limits import PROCESS_LIMITS
 
 class Sender(Node):
     def __init__(self, context, namespace):
@@ -733,7 +734,7 @@ class Sender(Node):
         print("made", flush=True)
 
     def destroy_node(self):
-        print(end_of_delivery(self.context) - time.monotonic() <= SHORT_DELIVERY)
+        print(end_of_delivery(self.context) - time.monotonic() <= PROCESS_LIMITS.short_delivery)
         super().destroy_node()
 
 run({"sender": Sender})
@@ -776,7 +777,7 @@ def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     from wam_ros.bring_up import Composition
 
     patience = 4.0  # s; each of the six nodes would wait as long
-    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", patience)
+    monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=patience))
     configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
     begin = time.monotonic()
     with Composition(configured, domain_id=domain_id) as composition:
@@ -798,7 +799,7 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     """It is the only one that is kept: replaced before it is taken, it is a message that a recording lacks."""
     from wam_ros.bring_up import Composition
 
-    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", 0.2)
+    monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=0.2))
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
         published = composition.nodes["driver"]._ports._outlets.published

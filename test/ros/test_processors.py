@@ -13,8 +13,9 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import EACH, GROUPED
 from wam_ros import processors
 from wam_ros.bring_up import Processes
+from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.priority import fifo_is_granted
-from wam_ros.processors import FEWEST, PROCESSORS, divided, idle_parts, keep_to_processors, placed_groups
+from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors, placed_groups
 from wam_ros.run import PARENT
 
 OWN = os.getpriority(os.PRIO_PROCESS, 0)
@@ -136,7 +137,7 @@ def test_without_priority_or_a_third_processor_they_may_be_anywhere(
 
 def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_id: int) -> None:
     permitted = frozenset(os.sched_getaffinity(0))
-    is_apart = len(permitted) >= FEWEST and fifo_is_granted(REALTIME.shared.timing.fifo_priority)
+    is_apart = len(permitted) >= PROCESS_LIMITS.processors and fifo_is_granted(REALTIME.shared.timing.fifo_priority)
     with Processes(REALTIME) as processes:
         end = time.monotonic() + LONG
         expected = expected_priorities()

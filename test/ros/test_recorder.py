@@ -11,6 +11,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ from wam_description.parameters import ParameterError, flatten
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.bring_up import Composition
+from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
@@ -413,7 +415,7 @@ def test_a_node_that_is_started_again_with_another_parameter_of_its_own_is_named
 def test_a_recorder_to_which_nothing_came_ends_with_the_reason(
     ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
-    monkeypatch.setattr("wam_ros.recorder_node.SILENCE", 0.1)
+    monkeypatch.setattr("wam_ros.recorder_node.RECORDER_LIMITS", replace(RECORDER_LIMITS, silence=0.1))
     node, printed = by_hand(ros, tmp_path), ""
 
     def is_reported() -> bool:

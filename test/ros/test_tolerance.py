@@ -2,6 +2,7 @@
 
 import contextlib
 import random
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,10 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
-from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.messages import Refused, diagnostic_status, message_type
 from wam_ros.node import make_node
-from wam_ros.tolerance import HELD, TolerantNode
+from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import header, qos
 
 WAM = Configuration.load(packaged("wam"))
@@ -207,7 +209,7 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     state = JointState(header=header(5_000_000), name=names, position=[0.0] * 4, velocity=[0.0] * 4, effort=[0.0] * 4)
     sender.publish(state)
     ros.wait(lambda: "gravity: unexpected AttributeError" in driver.driver.safety.fault, what="a fault by name")
-    gravity._exception_time = -HELD  # long ago, and no step since
+    gravity._exception_time = -NODE_LIMITS.fault_held  # long ago, and no step since
     gravity._look_for_end()
     assert "unexpected AttributeError" in gravity._ports.problem, "it has not worked since"
     request(ros, Trigger, "driver/reset_fault")
@@ -222,7 +224,7 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
 def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
     ros: Any, tmp_path: Path, capfd: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("wam_ros.node.SLOW_STEP", -1.0)  # every step is slow
+    monkeypatch.setattr("wam_ros.node.NODE_LIMITS", replace(NODE_LIMITS, slow_step=-1.0))  # every step is slow
     gravity = make(ros, tmp_path, "gravity", ["gravity"])
     sender = ros.node("sender").create_publisher(JointState, "joint_states", 10)
     ros.wait(lambda: sender.get_subscription_count() == 1)
@@ -244,7 +246,7 @@ def test_a_directory_that_cannot_be_written_is_a_warning_and_no_end(ros: Any, tm
 
 
 def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, capfd: Any) -> None:
-    assert len(str(Refused("x" * 5_000_000))) < 1.2 * LONGEST_REASON
+    assert len(str(Refused("x" * 5_000_000))) < 1.2 * NODE_LIMITS.reason_length
     assert "\x1b" not in str(Refused("\x1b[2J"))
     gravity = make(ros, tmp_path, "gravity", ["gravity"])
     capfd.readouterr()

@@ -23,7 +23,8 @@ from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
-from wam_ros.call import SILENCE, START, CalledStack, Reply
+from wam_ros.call import START, CalledStack, Reply
+from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
@@ -219,7 +220,7 @@ class Waiting:
         silent = time.monotonic() - self._since
         if silent > self._timeout:
             raise TimeoutError(f"{self.text}; none for {self._timeout:g} s (--timeout){self._hint}")
-        if not self._is_reported and silent > SILENCE:
+        if not self._is_reported and silent > CALL_LIMITS.silence:
             self._is_reported = True
             row = BY_NAME.get(self._topic)
             seldom = ", which is published only when it changes" * bool(row and row.latched)

@@ -1,0 +1,98 @@
+"""Limits of the adapter: waits, counts and lengths, each with its unit and its reason."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NodeLimits:
+    """A node, its messages and its status."""
+
+    loss_repeated: int = 10  # steps, after which a loss is reported again while the arm is enabled
+    slow_step: float = 0.5  # s, from which a step is reported
+    slow_step_reports: float = 5.0  # s between two of these reports
+    service_wait: float = 2.0  # s, after which a request reports that it still waits for its service
+    stale_after: int = 5  # s without a step, as long as aggregators of diagnostics wait
+    newest_kept: int = 2  # messages; one alone would be lost when the next comes just as it is taken
+    claim_period: float = 0.1  # s, between looks for second publishers of topics on which nothing comes
+    status_on_its_way: float = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
+    status_echo: float = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
+    log_period: float = 1.0  # s between two refusals of a topic in the log
+    strays: int = 5  # messages out of order after which two publishers of one node name both count as alive
+    fault_held: float = 1.0  # s without a further exception, after which a fault is over
+    exception_length: int = 300  # characters of an exception that are reported
+    trajectory_points: int = 1000  # of a trajectory that is taken
+    reason_length: int = 400  # characters; a message may hold a name of any length
+    turn: int = 16  # messages handed on in one turn, about two inner periods; then timers and services have theirs
+
+
+@dataclass(frozen=True)
+class ProcessLimits:
+    """Processes of nodes: their end and their processors."""
+
+    arrived: float = 0.5  # s, for what has arrived before the end
+    # s, for the last messages of all nodes of this process together; only a listener that is frozen needs it
+    delivery: float = 4.0
+    short_delivery: float = 0.4  # s, where a listener was killed: the middleware waits for it as for one that is frozen
+    end: float = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
+    recorder_end: float = 30.0  # s without any sign of work, before a recorder that does not end is killed
+    recorder_reports: float = 2.0  # s between two lines about a recorder that is still writing
+    processors: int = 3  # processors, of which the driver may have one to itself in realtime
+    load_look: float = 0.05  # s, in which the idlest processor is found
+    load_steps: int = 10  # of load; within one of them it is chance which processor is the idlest
+
+
+@dataclass(frozen=True)
+class RecorderLimits:
+    """The recorder."""
+
+    streams: int = 8  # numberings tracked for one topic and publisher
+    publishers: int = 64  # publishers counted separately in one topic
+    held: int = 1000  # messages that wait for the time at which the recording begins
+    name_length: int = 200  # bytes of a publisher's name
+    # s, between two looks for messages; one after the other by the executor they cost twice as much
+    drain_period: float = 0.01
+    announced: float = 1.0  # s, at the end, for messages that were announced
+    silence: float = 5.0  # s without any message, after which a recorder that was started by hand reports it
+    statuses: int = 64  # in a message of /diagnostics
+    count_length: int = 16  # digits of a count in /diagnostics
+
+
+@dataclass(frozen=True)
+class CallLimits:
+    """Requests from a shell and to other nodes."""
+
+    answer: float = 10.0  # s, for an answer
+    silence: float = 2.0  # s, after which a topic that comes in every period of the arm has stopped
+    attempts: int = 20  # requests to a service that is just being discovered
+    set_attempts: int = 3  # requests to set parameters: the guard of the force loop takes its time over new gains
+    waiting: int = 100  # messages that may wait for a slow terminal
+    discovery: float = 2.0  # s, after which no more of a stack comes
+    parameters: float = 2.0  # s; an answer can be lost while services are still being discovered
+
+
+@dataclass(frozen=True)
+class ConformanceLimits:
+    """The test of a driver against its contract."""
+
+    # s in which the test itself did not run: what a driver does wrong then may be the machine's doing
+    pause: float = 0.02
+    held_up: int = 3  # times the attempts, that do not count as the test was held up
+    enable_attempts: int = 3  # requests to enable
+    settle: float = 0.1  # s, for a command to act
+    bad_current: float = 0.15  # of the peak current, in commands that have to be refused
+    kept: int = 20_000  # messages of a topic
+    swing: int = 50  # periods, after which the test current changes its sign
+    service_wait: float = 10.0  # s, for a service to be found
+    spin: float = 0.005  # s of one turn of the executor
+    look: float = 0.4  # s of watching
+    start: float = 20.0  # s, for a driver to appear
+    least_travel: float = 0.02  # rad, below which a velocity cannot be compared
+    period_error: float = 0.05  # largest relative difference of the period
+    vanish: float = 5.0  # s, for a publisher to vanish
+
+
+NODE_LIMITS = NodeLimits()
+PROCESS_LIMITS = ProcessLimits()
+RECORDER_LIMITS = RecorderLimits()
+CALL_LIMITS = CallLimits()
+CONFORMANCE_LIMITS = ConformanceLimits()
