@@ -18,25 +18,26 @@ from wam_ros.process_signals import SIGNALS, end_at_once_on_signals, ignore_sign
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
 COMMANDS = {
-    "demo": "run the demonstration or a whole-arm task, record it and print its report",
+    "demo": "play the demonstration or a task, record it, print its report",
     "up": "start the nodes and run them until Ctrl-C",
     "node": "start one node, with ROS arguments if needed",
-    "call": "one request to a running stack: enable, disable, pause, get, set, echo, push and others",
-    "live": "show a running stack or a recording in the browser; or serve a running stack to MoveIt, /tf",
-    "bag": "record a running stack, print the contents of a bag, or repair a broken one",
-    "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
-    "identify": "identify the controllers' model (friction, gravity, inertia) from a recording of free motion",
-    "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
-    "experiment": "run experiments of the thesis, record them and print predicted against measured",
-    "sweep": "play a scenario with many parameter sets: a table and a plot",
-    "evaluate": "seeded studies (contact, force, guard, identify, faults, soak); the thesis's figures",
-    "guard": "assess the force loop of an arm, or your own, by the stability guard",
-    "conform": "test a driver, the simulated one or yours, against the contract of drivers",
-    "model": "print the arm's model as URDF or MJCF, or compare it with the requisites of chapter 3",
+    "call": "one request to a running stack: enable, set, echo, push, ...",
+    "live": "show a running stack or a recording in the browser",
+    "bag": "record a running stack, list a bag or repair it",
+    "analyse": "analyse a recording and compare it with theory",
+    "identify": "identify friction, gravity and inertia from a recording",
+    "replay": "run a node on its recorded inputs, compare its outputs",
+    "experiment": "run experiments of the thesis: predicted against measured",
+    "sweep": "play a scenario with many parameter sets: table and plot",
+    "evaluate": "run a benchmark: contact, force, guard, ...; draw the figures",
+    "guard": "assess a force loop by the stability guard",
+    "conform": "test a driver against the contract of drivers",
+    "model": "print the arm as URDF or MJCF, or its scorecard",
 }
 
 # libraries of the system that wheels need and a small container has not, and their packages in Debian
 LIBRARIES = {"libgomp.so.1": "libgomp1"}
+FILES = ("scenario", "task", "json", "directory", "to")  # options that take a file, apart from those of another type
 COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on
 # the extras of setup.py, and the modules that come with them
 EXTRAS = {
@@ -51,6 +52,16 @@ EXTRAS = {
 }  # fmt: skip
 
 
+class CommandParser(argparse.ArgumentParser):
+    """Options of a command; of a word that is none of the choices, the one that was meant is named."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        near = difflib.get_close_matches(str(value), map(str, action.choices or ()), n=1)
+        if near and value not in (action.choices or ()):
+            raise argparse.ArgumentError(action, f"there is no '{value}'; did you mean '{near[0]}'?")
+        super()._check_value(action, value)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exits with 0 on success."""
     if COMPLETING in os.environ:
@@ -58,7 +69,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     words = list(sys.argv[1:] if arguments is None else arguments)
     command = _command(words)
     parser = _parser(command)
-    _check_name(parser, words)
+    if not words:
+        parser.print_help()
+        sys.exit(0)
     given, rest = parser.parse_known_args(words)
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
@@ -93,7 +106,7 @@ def _ended_by(error: BaseException, command: str, parser: argparse.ArgumentParse
         return 128 + signal.SIGINT
     if isinstance(error, ModuleNotFoundError):
         return _missing(command, error)
-    if isinstance(error, ValueError | OSError):
+    if isinstance(error, ValueError | OSError | argparse.ArgumentTypeError):
         parser.exit(1, printable(f"wam {command}: {error}{_hint(error, command)}", kept="\n") + "\n")
     raise error
 
@@ -113,6 +126,7 @@ def _offer_files(parser: argparse.ArgumentParser) -> None:
     """Offer files where a file is wanted, and the names of what is installed; nothing for a name or a number."""
     from argcomplete.completers import FilesCompleter
 
+    from wam_cli.options import OutputFile
     from wam_description.configuration import packaged_names
 
     files = FilesCompleter()
@@ -122,7 +136,7 @@ def _offer_files(parser: argparse.ArgumentParser) -> None:
                 _offer_files(below)
         elif action.dest == "config":
             action.completer = lambda prefix, **_: [*packaged_names(), *files(prefix)]  # type: ignore[attr-defined]
-        elif action.type is Path or action.metavar == "FILE" or action.dest in ("scenario", "task"):
+        elif action.type is Path or isinstance(action.type, OutputFile) or action.dest in FILES:
             action.completer = files  # type: ignore[attr-defined]
 
 
@@ -150,13 +164,6 @@ def program() -> None:
         ignore_signals()
 
 
-def _unknown(word: str) -> str:
-    """What to print about a command that does not exist."""
-    near = difflib.get_close_matches(word, COMMANDS, n=1)
-    meant = f"; did you mean '{near[0]}'?" if near else ""
-    return f"no command '{word}'" + (meant or f"; choose from {', '.join(COMMANDS)}")
-
-
 def _command(words: list[str]) -> Any:
     """The module of the command that is called, if there is one."""
     if not words or words[0] not in COMMANDS:
@@ -167,27 +174,6 @@ def _command(words: list[str]) -> Any:
         sys.exit(_missing(words[0], error))
     except ImportError as error:
         sys.exit(_without_library(words[0], error))
-
-
-def _check_name(parser: argparse.ArgumentParser, words: list[str]) -> None:
-    """End with the help where no command is given, and with what was meant where there is none of that name."""
-    if not words:
-        parser.print_help()
-        sys.exit(0)
-    if words[0] not in COMMANDS and not words[0].startswith("-"):
-        parser.error(_unknown(words[0]))
-    for action in parser._actions:
-        if words[1:] and isinstance(action, argparse._SubParsersAction):
-            _check_request(action.choices[words[0]], words[1])
-
-
-def _check_request(parser: argparse.ArgumentParser, word: str) -> None:
-    """End with what was meant where a command of requests has none of that name."""
-    names = [
-        name for action in parser._actions if isinstance(action, argparse._SubParsersAction) for name in action.choices
-    ]
-    if near := difflib.get_close_matches(word, names, n=1) if word not in names else []:
-        parser.error(f"no '{word}'; did you mean '{near[0]}'?")
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:
@@ -228,8 +214,8 @@ def _hint(error: Exception, command: str) -> str:
 
 
 def _parser(command: Any) -> argparse.ArgumentParser:
-    """All commands with their texts; arguments only of the one that is called."""
-    parser = argparse.ArgumentParser(
+    """All commands with their texts; options only of the one that is called."""
+    parser = CommandParser(
         prog="wam",
         description="Force control of the cable-driven MIT/WAM arm, simulated down to its motor shafts.",
         epilog="Start with: wam demo.  With ROS 2 sourced, 'ros2 run wam_stack <node>' starts a single node.",

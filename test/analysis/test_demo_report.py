@@ -1415,7 +1415,7 @@ def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys,
     with pytest.raises(SystemExit) as ended:
         main(["analyse", str(bag), "--steps"])
     assert ended.value.code == int(bool(failure))
-    assert ("not as it should be" in capsys.readouterr().out) is bool(failure)
+    assert ("checks failed" in capsys.readouterr().out) is bool(failure)
     assert [one.partition(failure)[:2] for one in report(bag).unmet] == [("FAILED: ", failure)] * bool(failure)
 
 

@@ -16,7 +16,7 @@ from test_bag import STORE, joint_state, wrench
 from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import evenly, motion, recorded_motion
-from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
+from wam_analysis.identification.overlay import HEADING, estimator_values, model_values, write_overlay
 from wam_analysis.identification.parameters import DIRECTIONS as WAYS
 from wam_analysis.identification.regressor import Regressor, about_origin
 from wam_analysis.identification.report import report
@@ -346,20 +346,22 @@ def test_a_wrong_bag_is_refused(bag: str, text: str) -> None:
 
 def test_nothing_of_somebody_elses_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own, steps, above = tmp_path / "own.yaml", tmp_path / "steps.yaml", tmp_path / "above.yaml"
-    own.write_text("base: wam\n")
+    written = f"{HEADING}\nbase: wam\n"
+    own.write_text(written)
     above.write_text("base: own.yaml\n")
     steps.write_text("steps: []\n")
+    read, foreign = "would be written over, and this command reads it", "exists, and this command did not write it"
     for words, reason in (
-        (["bag", "--config", str(own), "--write", str(own)], "is the configuration itself"),
-        (["bag", "--config", str(above), "--write", str(own)], f"own.yaml is a base of the configuration {above}"),
-        (["bag", "--write", str(packaged("wam"))], "is the configuration itself"),
-        (["--excite", str(steps), "--only-write"], "exists, and this command did not write it; give a new file"),
+        (["bag", "--config", str(own), "--write", str(own)], read),
+        (["bag", "--config", str(above), "--write", str(own)], read),
+        (["bag", "--write", str(packaged("wam"))], foreign),
+        (["--excite", str(steps), "--only-write"], foreign),
     ):
         with pytest.raises(SystemExit) as ended:
             main(["identify", *words])
-        assert ended.value.code == 1
+        assert ended.value.code in (1, 2)
         assert reason in capsys.readouterr().err
-    assert (own.read_text(), steps.read_text()) == ("base: wam\n", "steps: []\n")
+    assert (own.read_text(), steps.read_text()) == (written, "steps: []\n")
 
 
 @pytest.mark.slow

@@ -43,19 +43,22 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
     assert re.fullmatch(r"wam_stack .+, inner loop: (compiled|plain Python)\n", out)
 
 
-def test_a_misspelt_command_is_answered_with_the_one_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = said(capsys, "anlyse")
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("anlyse", "there is no 'anlyse'; did you mean 'analyse'?"),
+        ("xyzzy", "invalid choice: 'xyzzy' (choose from 'demo', 'up', "),
+        ("call enabel", "there is no 'enabel'; did you mean 'enable'?"),
+        ("evaluate contct", "there is no 'contct'; did you mean 'contact'?"),
+        ("up --name left", "unrecognized arguments: --name left"),  # no abbreviation of --namespace
+    ],
+)
+def test_a_word_that_does_not_exist_is_answered_with_the_one_that_was_meant(
+    words: str, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = said(capsys, *words.split())
     assert (code, out) == (2, "")
-    assert "no command 'anlyse'; did you mean 'analyse'?" in err
-    assert "choose from demo" in said(capsys, "xyzzy")[2]
-    assert "no 'enabel'; did you mean 'enable'?" in said(capsys, "call", "enabel")[2]
-    assert "no 'contct'; did you mean 'contact'?" in said(capsys, "evaluate", "contct")[2]
-
-
-def test_an_abbreviated_option_is_no_other_one(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        main(["up", "--name", "left"])  # of `wam demo` and `wam bag record`; it was taken for --namespace
-    assert "unrecognized arguments: --name left" in capsys.readouterr().err
+    assert reason in err
 
 
 def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,16 +109,6 @@ def test_values_of_a_sweep_are_refused_with_the_reason(values: str, reason: str,
     printed = " ".join(capsys.readouterr().err.split())
     assert reason in printed
     assert len(printed) < 2000
-
-
-@pytest.mark.parametrize("command", ["analyse bag --steps --picture FILE", "sweep t.csv --vary seed=1 --picture FILE"])
-def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
-    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    words = command.replace("FILE", str(tmp_path / "x.foo")).replace("t.csv", str(tmp_path / "t.csv")).split()
-    code, out, err = said(capsys, *words)
-    assert (code, out) == (1, "")
-    assert "there is no format '.foo'; give a .png" in err
 
 
 def test_nodes_that_do_not_fit_are_refused_before_the_demonstration_is_announced(
@@ -188,14 +181,6 @@ def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     assert code == 1
     assert "nosuch" in err
     assert "started" not in out
-
-
-@pytest.mark.parametrize("command", ["demo", "up --live", "live", "live bag"])
-@pytest.mark.parametrize("port", ["99999", "0", "-1", "web"])
-def test_a_port_that_does_not_exist_is_refused(command: str, port: str, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = said(capsys, *command.split(), f"--port={port}")
-    assert (code, out) == (2, "")
-    assert f"argument --port: '{port}' is no port; allowed: 1 to 65535" in err
 
 
 def test_a_library_of_the_system_that_is_missing_is_named_with_its_package(
@@ -319,6 +304,12 @@ def test_every_command_and_each_of_its_requests_has_a_help(command: str, capsys:
     for words in [(command,), *requests_of(parser, command)]:
         code, out, err = said(capsys, *words, "--help")
         assert (code, err, out.startswith(f"usage: wam {' '.join(words)} ")) == (0, "", True), words
+
+
+def test_the_help_is_one_screen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert len(COMMANDS) == 15
+    assert said(capsys, "--help")[1].count("\n") <= 30
 
 
 def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

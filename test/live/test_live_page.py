@@ -31,8 +31,8 @@ from test_lockstep import STEPS, configuration, record_composed
 from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
-from wam_cli.commands import take_page
 from wam_cli.commands.live import NICENESS, PageProcess, lateness, page_next_to
+from wam_cli.options import take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf

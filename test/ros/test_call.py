@@ -134,14 +134,11 @@ def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("nan", "0", "0"), "the force is nan; it must be finite"),
         (("0", "0", "1e6"), "the force is 1e+06 N; allowed: up to disturbance_force_limit, 500 N"),
-        (("0", "-inf", "0"), "the force is inf; it must be finite"),
         (("0", "-6e2", "0"), "the force is 600 N; allowed: up to disturbance_force_limit, 500 N"),
-        (("0", "0", "1", "--seconds", "inf"), "--seconds is inf; it must be finite"),
     ],
 )
-def test_a_push_that_is_no_number_or_too_great_is_refused(words: tuple[str, ...], message: str, stack: None) -> None:
+def test_a_push_that_is_too_great_is_refused(words: tuple[str, ...], message: str, stack: None) -> None:
     code, out, err = called("push", "outer_link", *words)
     assert (code, out) == (1, "")
     assert message in err
@@ -200,7 +197,7 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
         f"{waits}, which is published only when it changes; Ctrl-C ends, --timeout S after S seconds",
         f"wam call: {waits}; none for 3 s (--timeout)",
     ]
-    assert "--timeout is -1" in called("echo", "status", "--timeout", "-1")[2]
+    assert "argument --timeout: '-1' is not allowed" in called("echo", "status", "--timeout", "-1")[2]
 
 
 def test_where_the_arm_is_paused_a_silent_topic_ends_with_what_continues_it(stack: None) -> None:

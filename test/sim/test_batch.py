@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from conftest import LONG
 
-from wam_cli.commands import batch_of
+from wam_cli.options import batch_of
 from wam_sim import batch, pieces
 from wam_sim.pieces import FinishedPieces
 from wam_sim.progress import Progress

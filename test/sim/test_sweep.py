@@ -251,8 +251,6 @@ def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
         (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
         ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
         (("arm.payload=0", "--set=arm.payload=3"), "--set arm.payload has no effect here: --vary sets it"),
-        ((f"{GAIN}=0.001", "--runs=3"), "--runs has no effect without --random; leave it out, or give --random"),
-        ((f"{GAIN}=0.001", "--seed=1"), "--seed has no effect without --random"),
         (("seed=1:2:1000", "arm.payload=0.1:0.2:1000"), "1000000 sets in all, seed: 1000, arm.payload: 1000; at most"),
     ],
 )
@@ -263,32 +261,6 @@ def test_an_axis_that_would_not_be_used_is_refused(
         main(["sweep", str(tmp_path / "s.csv"), *(axis if axis[0] == "-" else f"--vary={axis}" for axis in axes)])
     assert ended.value.code
     assert re.search(words, capsys.readouterr().err)
-
-
-@pytest.mark.parametrize(
-    ("target", "words"),
-    [
-        ("own.yaml", "FILE .*own.yaml is the configuration itself; give another file"),
-        ("base.yaml", "FILE .*base.yaml is a base of the configuration .*own.yaml; give another file"),
-        ("steps.yaml", "FILE .*steps.yaml is read by this command; give another file"),
-    ],
-)
-def test_a_sweep_does_not_write_over_what_it_reads(
-    target: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    texts = {
-        "base.yaml": "base: testbed\n",
-        "own.yaml": "base: base.yaml\n",
-        "steps.yaml": "steps:\n  - {name: wait, seconds: 0.01}\n",
-    }
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text)
-    command = ["sweep", str(tmp_path / target), "--config", str(tmp_path / "own.yaml"), "--jobs", "1", "--fresh"]
-    with pytest.raises(SystemExit) as ended:
-        main([*command, "--scenario", str(tmp_path / "steps.yaml"), "--vary", f"{GAIN}=0.004"])
-    assert ended.value.code == 1
-    assert re.search(words, capsys.readouterr().err)
-    assert {name: (tmp_path / name).read_text() for name in texts} == texts
 
 
 @pytest.mark.slow

@@ -202,16 +202,16 @@ def test_the_options_of_a_study_are_those_of_the_harness_and_its_fields(
     monkeypatch.setattr(sys, "argv", ["study.py", "--seconds", "0.5"])
     with pytest.raises(SystemExit):
         program("press", example.PressStudy)
-    assert "--seconds is 0.5; it must be at least 1" in capsys.readouterr().err
+    assert "argument --seconds: '0.5' is not allowed; give a number of at least 1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ("--cases 0", "--cases is 0; it must be at least 1"),
-        ("--only -3", "--only is -3"),
-        ("--seeds -1", "--seeds is -1; it must be at least 0"),
-        ("--write no/page.md", "is no directory; give another file as --write"),
+        ("--cases 0", "argument --cases: '0' is not allowed; give a whole number of at least 1"),
+        ("--only -3", "argument --only: '-3' is not allowed"),
+        ("--seeds -1", "argument --seeds: '-1' is not allowed"),
+        ("--write no/page.md", "is no directory; give another file"),
         ("--set timing.mode=realtime", "--set timing.mode has no effect: the runs are in Python"),
         ("--set force_loop:contact_source=pinned", "has no effect here: each case sets it"),
     ],
@@ -221,5 +221,5 @@ def test_a_wrong_option_is_refused_in_a_sentence(
 ) -> None:
     with pytest.raises(SystemExit) as end:
         main(["evaluate", "force", "--results", str(tmp_path / "results.jsonl"), *words.split()])
-    assert end.value.code == 1
+    assert end.value.code in (1, 2)
     assert reason in capsys.readouterr().err

@@ -8,16 +8,9 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.commands import (
-    HTML,
-    JSON,
-    exit_code_of,
-    take_arm,
-    take_topic_map,
-    topic_map_of,
-    writable_file,
-    writable_picture,
-)
+from wam_cli.options import HTML, JSON, PICTURE, exit_code_of, require_option, take_arm, take_topic_map, topic_map_of
+
+STANDARD_OUTPUT = Path("-")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,10 +19,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "bag", type=Path, help="directory of the bag, or its file: MCAP, or .bag and .db3 through rosbags"
     )
     parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="also write one HTML page with pictures; it needs no network"
+        "--html", type=HTML, metavar="FILE", help="also write one HTML page with pictures; it needs no network"
     )
     parser.add_argument(
-        "--json", metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
+        "--json", type=_json, metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress output")
     parser.add_argument(
@@ -38,21 +31,22 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="instead: the report of 'wam demo', whether each step of the scenario did what was commanded; exit code 1 "
         "if a result is NO or the run failed",
     )
-    parser.add_argument("--picture", type=Path, help="of --steps: draw the arm, the forces and the contact positions")
+    parser.add_argument(
+        "--picture", type=PICTURE, help="of --steps: draw the arm, the forces and the contact positions"
+    )
     take_arm(parser)
     take_topic_map(parser)
+
+
+def _json(text: str) -> Path:
+    return STANDARD_OUTPUT if text == str(STANDARD_OUTPUT) else JSON(text)
 
 
 def run(given: argparse.Namespace) -> int:
     """Analyse, print, write."""
     if given.steps:
         return _steps(given)
-    if given.picture:
-        raise ValueError("--picture has no effect without --steps; leave it out, or write a page with --html")
-    if given.html:
-        writable_file("--html", given.html, HTML)
-    if given.json and given.json != "-":
-        writable_file("--json", Path(given.json), JSON)
+    require_option(given, "--steps", "--picture")
     mapped = topic_map_of(given)
     begin = time.monotonic()
 
@@ -61,12 +55,12 @@ def run(given: argparse.Namespace) -> int:
             print(f"{time.monotonic() - begin:5.1f} s  {doing}", file=sys.stderr, flush=True)
 
     analysis = analyse(given.bag, progress, mapped, given.namespace or "")
-    if given.json == "-":
+    if given.json == STANDARD_OUTPUT:
         print(json_text(analysis))
     else:
         print(text(analysis))
         if given.json:
-            Path(given.json).write_text(json_text(analysis) + "\n", encoding="utf-8")
+            given.json.write_text(json_text(analysis) + "\n", encoding="utf-8")
             progress(f"wrote {given.json}")
     if given.html:
         progress("drawing")
@@ -81,8 +75,6 @@ def _steps(given: argparse.Namespace) -> int:
 
     if given.html or given.json:
         raise ValueError("--steps prints text alone; leave out --html and --json")
-    if given.picture:
-        writable_picture("--picture", given.picture)
     made = report(given.bag, given.picture, given.namespace or "")
     print(made.text)
     return exit_code_of(made.unmet)

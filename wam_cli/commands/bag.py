@@ -7,7 +7,7 @@ from pathlib import Path
 from wam_bag.contents import Contents, contents
 from wam_bag.losses import PARAMETERS, RECORDING, Losses, losses
 from wam_bag.repair import Repaired, repair
-from wam_cli.commands import configuration_of, namespace, new_bag, take_configuration, writable_directory
+from wam_cli.options import configuration_of, recording_folder, take_configuration, take_stack, writable_directory
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, option_values
 from wam_description.interface import Interface
@@ -24,28 +24,29 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
     for name, text in (("info", "print the contents of a bag"), ("repair", "repair a broken bag")):
-        found = requests.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        found.add_argument("bag", help="directory of the bag, or an .mcap file", type=Path)
+        requests.add_parser(name, help=text, description=text).add_argument(
+            "bag", help="directory of the bag, or an .mcap file", type=Path
+        )
     text = "record every topic of a running stack until Ctrl-C"
-    record = requests.add_parser("record", help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=OF_RECORDER)
+    record = requests.add_parser("record", help=text, description=text, epilog=OF_RECORDER)
     record.add_argument("--name", default="", help="name of the bag; default: arm, date and time")
-    record.add_argument("--directory", help="directory for the bag, instead of that of the configuration")
-    record.add_argument("--namespace", type=namespace, default="wam", help="of the stack; default: %(default)s")
+    record.add_argument("--directory", type=writable_directory, help="for the bag; default: that of the configuration")
+    take_stack(record)
     take_configuration(record)
 
 
 def run(given: argparse.Namespace) -> int:
     """Record until Ctrl-C, print what is in a bag, or repair it."""
     if given.request == "record":
-        return _record(given)
-    if given.request == "info":
+        _record(given)
+    elif given.request == "info":
         print("\n".join(described(contents(given.bag))))
     else:
         print("\n".join(stated(result) for result in repair(given.bag)))
     return 0
 
 
-def _record(given: argparse.Namespace) -> int:
+def _record(given: argparse.Namespace) -> None:
     """Record until Ctrl-C."""
     for name in option_values(given.values):
         if not name.startswith(f"{RECORDER}:"):
@@ -55,12 +56,9 @@ def _record(given: argparse.Namespace) -> int:
             )
     own = {f"{RECORDER}:name": given.name}
     if given.directory:
-        own[f"{RECORDER}:directory"] = given.directory
+        own[f"{RECORDER}:directory"] = str(given.directory)
     configuration = configuration_of(given).with_values(own)
-    directory = Path(str(configuration.sections[RECORDER]["directory"]))
-    writable_directory("--directory", directory)
-    if given.name:
-        new_bag(directory / given.name)
+    recording_folder(configuration, given.name)
     from wam_ros.bring_up import parameter_file  # the other requests need no ROS
     from wam_ros.call import CalledStack
     from wam_ros.node import node_makers
@@ -73,7 +71,6 @@ def _record(given: argparse.Namespace) -> int:
     with parameter_file(_of_stack(configuration, shared)) as file:
         where = f"__ns:=/{given.namespace}"
         run_node(node_makers([RECORDER]), ["wam", "--ros-args", "--params-file", str(file), "-r", where])
-    return 0
 
 
 def _of_stack(configuration: Configuration, shared: Shared) -> Configuration:

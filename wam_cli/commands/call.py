@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import yaml
 
-from wam_cli.commands import at_least, namespace
+from wam_cli.options import ARM, COUNT, bounded, namespace
 from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
@@ -49,7 +49,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--namespace", type=namespace, default=argparse.SUPPRESS, help="namespace of the stack; default: wam"
     )
-    parser.add_argument("--namespace", type=namespace, default="wam", help="namespace of the stack; default: wam")
+    parser.add_argument("--namespace", type=namespace, default=ARM, help="namespace of the stack; default: wam")
     requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
     for name, (text, _) in SERVICES.items():
         requests.add_parser(name, parents=[where], help=text, description=f"{text[0].upper()}{text[1:]}.")
@@ -60,19 +60,27 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help=f"for example {EXAMPLE}")
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
-    heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
+    heard.add_argument("--count", type=COUNT, metavar="N", help="end after so many; default: Ctrl-C")
     heard.add_argument(
         "--timeout",
-        type=float,
+        type=bounded(float, unit="s"),
         metavar="S",
         help="end with exit code 1 after S seconds without a message, the search for the topic included; default: wait",
     )
     pushed = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     pushed._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
     pushed.add_argument("cover", help="link that is pushed, for example outer_link")
-    pushed.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
+    pushed.add_argument(
+        "force",
+        type=bounded(float, -math.inf, unit="N"),
+        nargs=3,
+        metavar="N",
+        help="x, y and z, in the frame of the link",
+    )
     pushed.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
-    pushed.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
+    pushed.add_argument(
+        "--seconds", type=bounded(float, unit="s"), default=1.0, help="of the arm's time; default: %(default)g"
+    )
 
 
 def run(given: argparse.Namespace) -> int:
@@ -156,9 +164,6 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 
 def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
     silence = math.inf if given.timeout is None else given.timeout
-    at_least("--timeout", silence, 0.0)
-    if given.count is not None:
-        at_least("--count", given.count, 1)
     is_published = partial(stack.is_published, given.topic)
     waiting = Waiting(given.topic, given.count, silence, stack.heard_statuses(), is_published)
     try:
@@ -247,10 +252,6 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
 
 def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrench, float, Shared]:
     """What is to be sent, the contact position, m, and the shared parameters among those of the driver."""
-    at_least("--seconds", given.seconds, 0.0)
-    for what, value in (("the force", math.hypot(*given.force)), ("--seconds", given.seconds)):
-        if not math.isfinite(value):
-            raise ValueError(f"{what} is {value:g}; it must be finite")
     shared = build_part(Shared, driver)
     covers = shared.arm.covers
     if given.cover not in covers.names:

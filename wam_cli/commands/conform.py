@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from wam_cli.commands import at_least, configuration_of, namespace, take_configuration
+from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
 from wam_description.configuration import Configuration
 from wam_description.driver_contract import DriverContract
 from wam_description.interface import declared
@@ -15,15 +15,11 @@ from wam_ros.driver_probe import DriverProbe
 from wam_ros.network import require_places
 from wam_ros.run import Connection
 
-LEAST_SHARE = 0.9
-ATTEMPTS = 5
-TEST_CURRENT = 0.4  # A
-
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_configuration(parser)
-    parser.add_argument("--namespace", type=namespace, default="wam", help="namespace of the driver; default: wam")
+    take_stack(parser)
     parser.add_argument(
         "--running",
         action="store_true",
@@ -31,22 +27,22 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--current",
-        type=float,
-        default=TEST_CURRENT,
+        type=bounded(float, unit="A"),
+        default=0.4,
         metavar="A",
         help="current on the first motor beyond what carries the links, with a changing sign; default: %(default)s",
     )
     parser.add_argument(
         "--share",
-        type=float,
-        default=LEAST_SHARE,
+        type=bounded(float, 0.0, 1.0),
+        default=0.9,
         metavar="FRACTION",
         help="of the periods in which a state has to come; default: %(default)s",
     )
     parser.add_argument(
         "--attempts",
-        type=int,
-        default=ATTEMPTS,
+        type=COUNT,
+        default=5,
         metavar="N",
         help="at each row, as a busy machine delays a driver that is right; default: %(default)s",
     )
@@ -58,8 +54,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Print the rows as they are found; 1 where one is wrong."""
-    at_least("--attempts", given.attempts, 1)
-    at_least("--share", given.share, 0.0)
     configuration = driver_alone(configuration_of(given))
     print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)

@@ -1,38 +1,47 @@
-"""`wam demo`: the demonstration, or a whole-arm task, from start to report."""
+"""`wam demo`: the demonstration, or a whole-arm task, from start to report; with ROS nodes, or without ROS."""
 
 import argparse
 import math
+import os
 import shlex
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wam_bag.bag import read
 from wam_bag.errors import BagError
-from wam_cli.commands import (
+from wam_cli.options import (
     configuration_of,
     exit_code_of,
     filled,
-    new_bag,
+    is_paced,
+    processes_of,
+    recording_folder,
     take_configuration,
     take_page,
     take_time,
     timed,
-    writable_directory,
 )
-from wam_cli.commands.demo_nodes import play
 from wam_control.task.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, require_parameters
+from wam_description.nodes import ONE
 from wam_description.status import DONE
-from wam_ros.process_signals import end_at_once_on_signals
+from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_sim.recording import recorded_run
+from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
     "Exit code: 0 if it was played to its end and no result is wrong; 1 if a result is NO, as for a force that was "
     "refused, a quantity of a task is MISSED, or it failed; 130 if it was stopped."
+)
+PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
+LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
+WITHOUT_ROS = (
+    "ROS is not installed (no rclpy): the same nodes run in this process, with the same numbers, without topics and "
+    "live page; for those: pip install 'wam_stack[ros,live]'"
 )
 
 
@@ -67,9 +76,8 @@ def run(given: argparse.Namespace) -> int:
     if given.scenario:
         base = base.with_values({"scenario:script": given.scenario})
     name = given.name or f"{task.name if task else 'demo'}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    directory = Path(str(base.sections["recorder"]["directory"]))
-    writable_directory("recorder:directory in the file of --config, or run it elsewhere", directory)
-    bag = new_bag(directory / name)
+    directory = recording_folder(base, name)
+    bag = directory / name
     if task:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
     configuration = base.with_nodes("scenario", "recorder").with_values({"recorder:name": name})
@@ -179,3 +187,76 @@ def _next(mode: str, bag: Path | None) -> list[str]:
         commands.append("wam demo    # without --realtime: lockstep waits for a busy machine")
     other = "if something else runs in this ROS domain, end it, or set another ROS_DOMAIN_ID"
     return commands or [f"correct what is named above; {other}; then wam demo"]
+
+
+class PlayedDemo(NamedTuple):
+    """How it ended: why it failed, if it did, and whether somebody stopped it."""
+
+    failures: list[str]
+    stopped: bool
+
+
+def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> PlayedDemo:
+    """Play the scenario of a configuration and record it into a bag.
+
+    Raises
+    ------
+    ValueError
+        if an option needs the nodes and there is no ROS.
+    """
+    end_at_once_on_signals()
+    try:
+        import rclpy  # noqa: F401 - whether there is ROS
+    except ModuleNotFoundError:
+        return _simulated(configuration, steps, bag, given)
+    return _with_nodes(configuration, given)
+
+
+def _simulated(
+    configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
+) -> PlayedDemo:
+    if processes_of(configuration, given) != ONE or given.live:
+        option = "--live" if given.live else "--processes" if given.processes else "--realtime"
+        raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
+    print(WITHOUT_ROS, flush=True)
+    stop = Stop()
+    failure = record(configuration, steps, bag, report=_stated, is_stopped=lambda: stop.is_set)
+    if failure:
+        print(f"error: {failure}", file=sys.stderr, flush=True)
+    return PlayedDemo([failure] if failure else [], stop.is_set)
+
+
+def _stated(seconds: float, step: str) -> None:
+    print(f"{seconds:5.1f} s  {step}", flush=True)
+
+
+def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
+    from wam_cli.commands.live import page_next_to
+    from wam_cli.commands.up import import_nodes
+    from wam_ros.bring_up import start
+    from wam_ros.network import move_to_free_domain
+    from wam_ros.topics import NAMESPACE
+
+    os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
+    import_nodes(configuration, given)
+    stop = Stop()
+    if moved := move_to_free_domain(NAMESPACE, os.environ):
+        print(moved, flush=True)
+    late = time.monotonic() + LONGEST_START
+    with (
+        page_next_to(given, NAMESPACE, is_paced(configuration)) as close_page,
+        start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
+    ):
+        driver: Any = getattr(stack, "nodes", {}).get("driver")
+
+        def is_over(ended: dict[str, int]) -> bool:
+            return stop.is_set or bool(ended) or (time.monotonic() > late and bool(getattr(driver, "awaited", "")))
+
+        ended = stack.wait(is_over)
+        failures = stack.failures
+        if not ended and not stop.is_set:
+            failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
+        for failure in failures:  # before the others end and print what follows from it
+            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
+        close_page()
+    return PlayedDemo([*failures, *([stack.bag_failure] if stack.bag_failure else [])], stop.is_set)

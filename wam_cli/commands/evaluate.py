@@ -8,21 +8,21 @@ from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
-from wam_cli.commands import (
-    PAGE,
-    at_least,
-    batch_of,
-    configuration_of,
-    refuse_overridden,
-    refuse_source,
-    require_effect,
-    take_batch,
-    take_configuration,
-    writable_file,
-)
 from wam_cli.commands import evaluate_faults as faults
 from wam_cli.commands import evaluate_figures as figures
 from wam_cli.commands import evaluate_soak as soak
+from wam_cli.options import (
+    COUNT,
+    PAGE,
+    SEED,
+    batch_of,
+    bounded,
+    configuration_of,
+    refuse_overridden,
+    require_effect,
+    take_batch,
+    take_configuration,
+)
 from wam_description.configuration import option_values
 from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load
 from wam_studies.page import block, report, with_section
@@ -52,10 +52,16 @@ def run(given: argparse.Namespace) -> int:
 def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study[Any, Any]]) -> None:
     """Options of a study: those of all, and its own."""
     seeds = " ".join(map(str, kind.seeds))
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(kind.seeds), help=f"of the cases, default {seeds}")
-    parser.add_argument("--cases", type=int, metavar="N", help=f"the first of each seed, default {kind.count or 'all'}")
-    parser.add_argument("--only", type=int, nargs="+", metavar="NUMBER", help="cases of these numbers, each in full")
-    parser.add_argument("--write", type=Path, help=f"page whose section is written, for example {kind.page}")
+    parser.add_argument(
+        "--seeds", type=SEED, nargs="+", default=list(kind.seeds), help=f"of the cases, default {seeds}"
+    )
+    parser.add_argument(
+        "--cases", type=COUNT, metavar="N", help=f"the first of each seed, default {kind.count or 'all'}"
+    )
+    parser.add_argument(
+        "--only", type=bounded(int), nargs="+", metavar="NUMBER", help="cases of these numbers, each in full"
+    )
+    parser.add_argument("--write", type=PAGE, help=f"page whose section is written, for example {kind.page}")
     for one in _options(kind):
         _add(parser, one)
     take_configuration(parser)
@@ -77,7 +83,10 @@ def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
         chosen = " ".join(default) or "none"
         parser.add_argument(name, nargs="+", default=default, metavar="NAME", help=f"{text}; default: {chosen}")
     else:
-        parser.add_argument(name, type=type(default), default=default, help=f"{text}, default {default}")
+        least = one.metadata["least"]
+        kind: Any = type(default)
+        kind = kind if least is None else bounded(kind, least)
+        parser.add_argument(name, type=kind, default=default, help=f"{text}, default {default}")
 
 
 def run_study(given: argparse.Namespace) -> int:
@@ -116,14 +125,8 @@ def program(name: str, kind: type[Study[Any, Any]]) -> int:
 def _study(given: argparse.Namespace) -> Study[Any, Any]:
     """The study with its options; refuses what could not be done after the work."""
     kind: type[Study[Any, Any]] = given.study
-    for name, low, values in (("--seeds", 0, given.seeds), ("--only", 0, given.only), ("--cases", 1, [given.cases])):
-        for value in values or ():
-            if value is not None:
-                at_least(name, value, low)
     require_effect("--set", option_values(given.values))
     if given.write:
-        writable_file("--write", given.write, PAGE)
-        refuse_source(given, "--write", given.write)
         with_section(given.write, given.part, "")
     own = {one.name: getattr(given, one.name) for one in _options(kind)}
     return kind(configuration_of(given), **{name: tuple(v) if isinstance(v, list) else v for name, v in own.items()})

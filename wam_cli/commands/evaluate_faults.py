@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
+from wam_cli.options import COUNT, PAGE, SEED, bounded, configuration_of, take_configuration
 from wam_sim.progress import Progress
 from wam_studies.faults import interruptions
 from wam_studies.faults.kinds import REPLAYED, kinds
@@ -20,26 +20,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     names = list(kinds(Path("/")))
     parser.add_argument("--only", nargs="+", choices=names, metavar="KIND", help=f"some kinds: {', '.join(names)}")
-    parser.add_argument("--seed", type=int, default=1, help="seed of all trials, default 1")
-    parser.add_argument("--first", type=int, default=0, help="number of the first trial, default 0")
-    parser.add_argument("--count", type=int, help="trials of each kind; default: those of the page")
+    parser.add_argument("--seed", type=SEED, default=1, help="seed of all trials, default 1")
+    parser.add_argument("--first", type=bounded(int), default=0, help="number of the first trial, default 0")
+    parser.add_argument("--count", type=COUNT, help="trials of each kind; default: those of the page")
     parser.add_argument("--short", action="store_true", help="a few trials of each kind, half a minute")
     parser.add_argument("--bag", type=Path, default=REPLAYED, help="recording that is replayed, default %(default)s")
     parser.add_argument(
-        "--ctrl-c", type=int, metavar="COUNT", help="instead: interrupt so many demonstrations at random moments"
+        "--ctrl-c", type=COUNT, metavar="COUNT", help="instead: interrupt so many demonstrations at random moments"
     )
-    parser.add_argument("--write", type=Path, help="page to update, for example docs/reliability.md")
+    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/reliability.md")
     take_configuration(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Play the trials; 1 if any escaped."""
-    at_least("--seed", given.seed, 0)
-    at_least("--first", given.first, 0)
-    if given.count is not None:
-        at_least("--count", given.count, 1)
-    if given.write:
-        writable_file("--write", given.write, PAGE)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # nothing broken leaves this machine
     logging.getLogger().setLevel(logging.ERROR)
     results = list(_interrupted(given) if given.ctrl_c is not None else _played(given))
@@ -67,7 +61,6 @@ def _played(given: argparse.Namespace) -> list[KindResult]:
 
 
 def _interrupted(given: argparse.Namespace) -> list[KindResult]:
-    at_least("--ctrl-c", given.ctrl_c, 1)
     kind = FaultKind(
         INTERRUPTIONS,
         "Ctrl-C during `wam demo`",

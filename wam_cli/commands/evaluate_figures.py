@@ -1,23 +1,21 @@
 """`wam evaluate figures`: the thesis's figures that carry data."""
 
 import argparse
-from pathlib import Path
 
-from wam_cli.commands import batch_of, take_batch, writable_directory
+from wam_cli.options import batch_of, take_batch, writable_directory
 from wam_studies.figures.catalogue import FIGURES, file_of, known, numbers, table
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}; default: all")
-    parser.add_argument("--to", type=Path, default=Path("docs/figures"), help="directory; default: %(default)s")
+    parser.add_argument("--to", type=writable_directory, default="docs/figures", help="directory; default: %(default)s")
     take_batch(parser, "figures")
 
 
 def run(given: argparse.Namespace) -> int:
     """Compute, draw, print how far the plant is from the lines."""
     names = known(given.names or list(FIGURES))  # before anything is started
-    writable_directory("--to", given.to)
     with batch_of(given, len(names)) as batch:
         found = numbers(names, *batch)
     given.to.mkdir(parents=True, exist_ok=True)

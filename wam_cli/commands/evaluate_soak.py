@@ -2,9 +2,8 @@
 
 import argparse
 import sys
-from pathlib import Path
 
-from wam_cli.commands import PAGE, at_least, configuration_of, take_configuration, writable_file
+from wam_cli.options import PAGE, bounded, configuration_of, take_configuration
 from wam_sim.progress import Progress
 from wam_studies.faults.soak import soak
 from wam_studies.page import with_section
@@ -12,16 +11,15 @@ from wam_studies.page import with_section
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("--seconds", type=float, default=600.0, help="of the arm's time, default 600")
-    parser.add_argument("--write", type=Path, help="page to update, for example docs/reliability.md")
+    parser.add_argument(
+        "--seconds", type=bounded(float, 2.0, unit="s"), default=600.0, help="of the arm's time, default 600"
+    )
+    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/reliability.md")
     take_configuration(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Run; 1 if memory grows or messages are lost."""
-    at_least("--seconds", given.seconds, 2.0)
-    if given.write:
-        writable_file("--write", given.write, PAGE)
     found = soak(configuration_of(given), given.seconds, Progress("soak, seconds", sys.stderr))
     text = found.section(f"wam evaluate soak --seconds {given.seconds:g}")
     print(text)

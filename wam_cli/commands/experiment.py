@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from wam_cli.commands import PAGE, writable_directory, writable_file
+from wam_cli.options import PAGE, writable_directory
 from wam_ros.process_signals import Stop
 from wam_studies.experiment_runs import record
 from wam_studies.thesis.definition import Experiment, Run, load, names, tasks
@@ -29,6 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="run every experiment")
     parser.add_argument(
         "--evaluate",
+        type=Path,
         metavar="DIRECTORY",
         help="evaluate the bags in this directory and run nothing; the picture goes to --directory",
     )
@@ -38,9 +39,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="instead: check the sample bags that the index in --directory lists, or record and cut them again; of "
         "experiments and tasks, default all",
     )
-    parser.add_argument("--directory", default="bags", help="directory for bags and pictures; default: bags")
+    parser.add_argument(
+        "--directory", type=Path, default=Path("bags"), help="directory for bags and pictures; default: bags"
+    )
     parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
-    parser.add_argument("--write", metavar="PAGE", help="also write tables and pictures into this documentation page")
+    parser.add_argument(
+        "--write", type=PAGE, metavar="PAGE", help="also write tables and pictures into this documentation page"
+    )
 
 
 def run(given: argparse.Namespace) -> int:
@@ -53,19 +58,17 @@ def run(given: argparse.Namespace) -> int:
         return _samples(given)
     if bool(given.experiment) == given.all:
         raise ValueError("name an experiment, or give --all; --list prints the names")
-    writable_directory("--directory", Path(given.directory))
-    if given.write:
-        writable_file("--write", Path(given.write), PAGE)
+    writable_directory(str(given.directory))
     results: dict[str, tuple[Experiment, Result, Path]] = {}
     chosen = names() if given.all else given.experiment
     is_one = len(chosen) == 1 and not given.all
     for number, experiment in enumerate(map(load, chosen), 1):
         if given.evaluate:
-            directory = Path(given.evaluate) if is_one else Path(given.evaluate) / experiment.name
-            picture = Path(given.directory) / f"{experiment.name}.png"
+            directory = given.evaluate if is_one else given.evaluate / experiment.name
+            picture = given.directory / f"{experiment.name}.png"
         else:
             name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-            directory = Path(given.directory) / (name if is_one or not given.name else f"{name}/{experiment.name}")
+            directory = given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}")
             picture = directory / PICTURE
             if not _record(experiment, directory, "" if is_one else f"{number}/{len(chosen)} "):
                 return 130
@@ -78,7 +81,7 @@ def run(given: argparse.Namespace) -> int:
         print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         results[experiment.name] = (experiment, result, picture)
     if given.write:
-        write(Path(given.write), list(results.values()))
+        write(given.write, list(results.values()))
     return 0 if all(result.agrees for _, result, _ in results.values()) else 1
 
 
@@ -119,23 +122,23 @@ def _show(words: str, end: str = "") -> None:
 
 def _samples(given: argparse.Namespace) -> int:
     """Check the samples, or record them; 0 if every sample is as the index lists it."""
-    directory = Path(given.directory)
+    folder = given.directory
     every = [load(name) for name in given.experiment or [*names(), *tasks()]]
     chosen = [experiment for experiment in every if given.experiment or experiment.sample is not None]
-    if given.samples == "make" and not _make(chosen, directory):
+    if given.samples == "make" and not _make(chosen, folder):
         return 130
-    entries = read_index(directory)
+    entries = read_index(folder)
     wrong = []
     for experiment in chosen:
         if experiment.name not in entries:
             wrong.append(
-                f"{directory} lists no sample of {experiment.name}; 'wam experiment {experiment.name} --samples make'"
+                f"{folder} lists no sample of {experiment.name}; 'wam experiment {experiment.name} --samples make'"
             )
             continue
         entry = entries[experiment.name]
-        found = check(experiment, entry, directory)
+        found = check(experiment, entry, folder)
         wrong += found
-        print(_stated(entry, directory, not found))
+        print(_stated(entry, folder, not found))
     size = sum(entry.size for entry in entries.values())
     if size >= LIMIT:
         wrong.append(f"the samples have {size} bytes together; {LIMIT} are allowed: cut less in their experiments")
@@ -143,29 +146,29 @@ def _samples(given: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
-def _make(chosen: list[Experiment], directory: Path) -> bool:
+def _make(chosen: list[Experiment], folder: Path) -> bool:
     """Record, cut and list; False if it was interrupted."""
     stop = Stop()
-    entries = read_index(directory)
+    entries = read_index(folder)
     for experiment in chosen:
         if experiment.sample is None:
             raise ValueError(f"experiment {experiment.name} declares no sample; add one to its YAML")
-        recorded = directory / RECORDED / experiment.name
+        recorded = folder / RECORDED / experiment.name
         shutil.rmtree(recorded, ignore_errors=True)
         play(experiment, experiment.run(experiment.sample.run), recorded, experiment.name, stop)
         if stop.is_set:
             return False
-        shutil.rmtree(directory / FOLDER / experiment.name, ignore_errors=True)
-        entries[experiment.name] = make(experiment, recorded / experiment.sample.run, directory)
+        shutil.rmtree(folder / FOLDER / experiment.name, ignore_errors=True)
+        entries[experiment.name] = make(experiment, recorded / experiment.sample.run, folder)
         shutil.rmtree(recorded)
-        write_index(directory, entries)
+        write_index(folder, entries)
     with contextlib.suppress(OSError):  # where another one's recording was left in it
-        (directory / RECORDED).rmdir()
+        (folder / RECORDED).rmdir()
     return True
 
 
-def _stated(entry: Entry, directory: Path, is_right: bool) -> str:
+def _stated(entry: Entry, folder: Path, is_right: bool) -> str:
     begin, end = entry.seconds
     word = "ok   " if is_right else "WRONG"
-    bag = directory / FOLDER / entry.name
+    bag = folder / FOLDER / entry.name
     return f"{word} {bag}  {entry.size / 1e3:.0f} kB, {begin:g} to {end:g} s\n      {entry.shows}"

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.identification.recorded_loop import LoopNumber, RecordedLoop, recorded_loop
-from wam_cli.commands import (
+from wam_cli.options import (
     BASE_CONFIGURATION,
+    PICTURE,
     configuration_of,
     take_configuration,
     take_topic_map,
     topic_map_of,
-    writable_picture,
 )
 from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -40,8 +40,7 @@ NUMBERS = (*PLANT, "stiction", *LOOP)
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    take_configuration(parser)
-    parser.set_defaults(config="")
+    take_configuration(parser, default=None)
     own = parser.add_argument_group("a force loop of your own", "the first six are needed; consistent units")
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
@@ -51,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     own.add_argument(
         "--bag", type=Path, help="take from this recording what is not given: wam identify for a force loop"
     )
-    own.add_argument("--picture", type=Path, help="write the stability map with the loop on it, PNG, PDF or SVG")
+    own.add_argument("--picture", type=PICTURE, help="write the stability map with the loop on it, PNG, PDF or SVG")
     take_topic_map(parser)
 
 
@@ -85,8 +84,6 @@ def _assess_configuration(configuration: Configuration) -> int:
 
 
 def _assess(given: argparse.Namespace) -> int:
-    if given.picture:
-        writable_picture("--picture", given.picture)
     recorded = recorded_loop(given.bag, topic_map_of(given)) if given.bag else RecordedLoop({}, "")
     known = recorded.numbers | {
         name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None

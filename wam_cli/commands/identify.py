@@ -15,19 +15,20 @@ from wam_analysis.identification.overlay import HEADING as MODEL_HEADING
 from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
-from wam_cli.commands import (
+from wam_cli.options import (
+    SEED,
     YAML_SUFFIXES,
-    FileKind,
-    at_least,
+    OutputFile,
+    bounded,
+    configuration_file,
     configuration_of,
-    refuse_source,
+    require_option,
     take_arm,
     take_configuration,
     writable_directory,
-    writable_file,
 )
 from wam_description.arm import Shared
-from wam_description.configuration import Configuration
+from wam_description.configuration import Configuration, files_of
 from wam_description.parameters import ParameterError
 from wam_ros.bring_up import Composition
 from wam_ros.network import move_to_free_domain
@@ -38,9 +39,8 @@ from wam_sim.recording import RecordedRun, recorded_run
 from wam_studies.identification.excitation import scenario
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
-MODEL = FileKind("a configuration", YAML_SUFFIXES, MODEL_HEADING)
-MOVES = FileKind("a scenario", YAML_SUFFIXES, HEADING)
-LONGEST = 3600.0  # s of motion; the choice of its moves takes minutes
+MODEL = OutputFile("a configuration", YAML_SUFFIXES, MODEL_HEADING)
+MOVES = OutputFile("a scenario", YAML_SUFFIXES, HEADING)
 TOPICS = ("motor_states", "status", *LOADS)
 
 
@@ -50,14 +50,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--excite",
         metavar="SCENARIO",
-        type=Path,
+        type=MOVES,
         help="write a scenario of moves that show the parameters, play it in the simulation and identify from its bag",
     )
-    parser.add_argument("--seconds", type=float, default=60.0, help="with --excite: length of the motion, default 60")
-    parser.add_argument("--seed", type=int, default=1, help="with --excite: seed of the moves, default 1")
+    length = bounded(float, 10.0, 3600.0, "s")  # the choice of its moves takes minutes
+    parser.add_argument("--seconds", type=length, help="with --excite: length of the motion, default 60")
+    parser.add_argument("--seed", type=SEED, help="with --excite: seed of the moves, default 1")
     parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
-    parser.add_argument("--directory", type=Path, default=Path("bags"), help="with --excite: of the bag, default bags")
-    parser.add_argument("--write", type=Path, metavar="YAML", help="configuration to write, for --config or base:")
+    parser.add_argument("--directory", type=writable_directory, help="with --excite: of the bag, default bags")
+    parser.add_argument("--write", type=MODEL, metavar="YAML", help="configuration to write, for --config or base:")
     take_arm(parser)
     take_configuration(parser)
 
@@ -66,12 +67,10 @@ def run(given: argparse.Namespace) -> int:
     """Identify."""
     if (given.bag is None) == (given.excite is None):
         raise ValueError("give a bag, or --excite SCENARIO to make one")
+    require_option(given, "--excite", "--seconds", "--seed", "--only-write", "--directory")
     configuration = configuration_of(given)
-    if given.write is not None:
-        refuse_source(given, "--write", given.write)
-        writable_file("--write", given.write, MODEL)
-    if given.excite is not None:
-        writable_file("--excite", given.excite, MOVES)
+    if given.write and given.write.resolve() in [one.resolve() for one in files_of(configuration_file(given))]:
+        raise ValueError(f"{given.write} would be written over, and this command reads it; give another file")
     bag = given.bag
     if given.excite is not None:
         bag = _excite(configuration, given)
@@ -120,25 +119,23 @@ def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
 def _base(given: argparse.Namespace) -> str:
     """The present configuration as the overlay names it."""
     name: str = given.config
-    if not name.endswith((".yaml", ".yml")):
+    if not name.endswith(YAML_SUFFIXES):
         return name
     return os.path.relpath(Path(name).resolve(), given.write.resolve().parent)
 
 
 def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | None:
     """Write the scenario and play it; the bag, None where it was not played to its end."""
-    at_least("--seconds", given.seconds, 10.0, LONGEST)
-    at_least("--seed", given.seed, 0)
-    if not given.only_write:
-        writable_directory("--directory", given.directory)
-    text = yaml.safe_dump(scenario(configuration, given.seed, given.seconds), sort_keys=False, default_flow_style=None)
-    command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {given.seed} --seconds {given.seconds:g}"
+    seconds, seed = given.seconds or 60.0, 1 if given.seed is None else given.seed
+    text = yaml.safe_dump(scenario(configuration, seed, seconds), sort_keys=False, default_flow_style=None)
+    command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {seed} --seconds {seconds:g}"
     given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
     record = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
     print(f"written: {given.excite}; on an arm of yours: {record}", flush=True)
     if given.only_write:
         return None
+    folder = given.directory or writable_directory("bags")
     name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
     played = configuration.with_nodes("scenario", "recorder")
     values = {
@@ -146,10 +143,10 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
         "timing.real_time_factor": 0.0,
         "timing.dither_cycle": 0,
         "scenario:script": str(given.excite.resolve()),
-        "recorder:directory": str(given.directory),
+        "recorder:directory": str(folder),
         "recorder:name": name,
     }
-    return given.directory / name if _play(played.with_values(values), given.seconds) else None
+    return folder / name if _play(played.with_values(values), seconds) else None
 
 
 def _play(configuration: Configuration, seconds: float) -> bool:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from wam_cli.commands import RERUN, namespace, take_port, writable_file
+from wam_cli.options import ARM, RERUN, namespace, require_option, take_port
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
@@ -33,7 +33,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--at", type=float, metavar="SECONDS", help="of a bag: show this time and do not play")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--rerun", action="store_true", help="of a bag: open the Rerun viewer instead of the page")
-    way.add_argument("--save", type=Path, metavar="FILE", help="of a bag: write this .rrd file for Rerun, open nothing")
+    way.add_argument(
+        "--save", type=RERUN, metavar="FILE", help="of a bag: write this .rrd file for Rerun, open nothing"
+    )
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
     way.add_argument(
@@ -45,22 +47,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Show or serve until Ctrl-C."""
-    if given.bag is None:
-        for option, value in (("--at", given.at), ("--rerun", given.rerun), ("--save", given.save)):
-            if value not in (None, False):
-                raise ValueError(f"{option} is for a recording; give its directory")
-    elif given.tf or given.trajectories:
+    require_option(given, "BAG", "--at", "--rerun", "--save")
+    require_option(given, "--tf", "--frame-prefix")
+    if given.bag is not None and (given.tf or given.trajectories):
         raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
-    if given.frame_prefix and not given.tf:
-        raise ValueError("--frame-prefix has no effect without --tf; leave it out")
     if given.save or given.rerun:
         return _rerun(given)
     if given.bag is not None:
         return _recording(given)
     from wam_ros.run import die_with_parent  # a recording is shown without ROS
-    from wam_ros.topics import NAMESPACE
 
-    given.namespace = given.namespace or NAMESPACE
+    given.namespace = given.namespace or ARM
     end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
     die_with_parent()
     if given.tf:
@@ -136,9 +133,7 @@ def _rerun(given: argparse.Namespace) -> int:
     from wam_analysis.rerun_view import load_rerun, view, viewer
 
     load_rerun()  # before the work
-    if given.save:
-        writable_file("--save", given.save, RERUN)
-    else:
+    if not given.save:
         viewer()
     print(f"{given.save or 'viewer'}: {view(_run_of(given), given.save)}")
     return 0

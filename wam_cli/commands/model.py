@@ -2,7 +2,7 @@
 
 import argparse
 
-from wam_cli.commands import configuration_of, namespace, take_configuration
+from wam_cli.options import configuration_of, namespace, take_configuration
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part

@@ -2,24 +2,24 @@
 
 import argparse
 
-from wam_cli.commands import configuration_of, take_arm, take_values
+from wam_cli.options import configuration_of, take_arm, take_configuration
 from wam_description.configuration import option_values
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
-EXIT_CODES = "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
-_MOST_GAPS, _MOST_VALUES = 5, 8  # named one by one
+ENDS = (
+    "Without --config the values are those in the bag. "
+    "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
+)
+LISTED = 8  # values or gaps that are named one by one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.epilog = EXIT_CODES
+    parser.epilog = ENDS
     parser.add_argument("bag", help="directory of the bag, or an .mcap file")
     parser.add_argument("node", help=f"{', '.join(REPLAYED)}, or my_package.module:Class")
-    parser.add_argument(
-        "--config", help="values instead of those in the bag: a YAML file, or the name of an installed one"
-    )
     take_arm(parser)
-    take_values(parser)
+    take_configuration(parser, default=None)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -46,8 +46,8 @@ def other_values(done: Replay) -> list[str]:
         return []
     scalar = next((one for one in done.changed if not isinstance(one.recorded, tuple)), None)
     keep = f"; to keep one: --set {scalar.name}={_brief(scalar.recorded)}" if scalar else ""
-    more = f" and {len(named) - _MOST_VALUES} more" if len(named) > _MOST_VALUES else ""
-    return [f"--config differs from the recording in {', '.join(named[:_MOST_VALUES])}{more}{keep}"]
+    more = f" and {len(named) - LISTED} more" if len(named) > LISTED else ""
+    return [f"--config differs from the recording in {', '.join(named[:LISTED])}{more}{keep}"]
 
 
 def _brief(value: object) -> str:
@@ -77,10 +77,10 @@ def reasons(done: Replay) -> list[str]:
         )
         lines += [
             f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
-            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:_MOST_GAPS]
+            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:LISTED]
         ]
-        if len(gaps) > _MOST_GAPS:
-            lines.append(f"    and {len(gaps) - _MOST_GAPS} gaps that are not longer")
+        if len(gaps) > LISTED:
+            lines.append(f"    and {len(gaps) - LISTED} gaps that are not longer")
     different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
     if done.mode == "realtime" and different:
         lines.append(

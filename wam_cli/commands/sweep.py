@@ -7,25 +7,26 @@ import re
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from wam_cli.commands import (
+from wam_cli.options import (
     BASE_CONFIGURATION,
+    PICTURE,
+    SEED,
     TABLE,
-    at_least,
     batch_of,
+    bounded,
     configuration_of,
     filled,
     refuse_overridden,
-    refuse_source,
     require_effect,
+    require_option,
     take_batch,
     take_configuration,
-    writable_file,
-    writable_picture,
 )
 from wam_control.task.scenario import load, script_file
 from wam_description import yaml_text
@@ -35,14 +36,14 @@ from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, poi
 from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_studies.thesis import definition, sweeping
 
-RANDOM_RUNS, RANDOM_SEED = 100, 1
 SCENARIO = "demo_scenario"
+SWEPT = replace(TABLE, advice="give the scenario with --scenario")
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("file", type=Path, help="table to write, for example sweep.csv")
+    parser.add_argument("file", type=SWEPT, help="table to write, for example sweep.csv")
     take_configuration(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
@@ -70,15 +71,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     kind.add_argument("--list", action="store_true", help="first values together, then the second ones and so on")
     kind.add_argument(
         "--random",
-        action="store_true",
-        help="draw numbers between the two values of each parameter, evenly, or by a factor where both are above 0; "
-        "not for whole numbers",
+        type=bounded(int, 1, MOST_SETS),
+        metavar="RUNS",
+        help="draw so many sets of numbers between the two values of each parameter, evenly, or by a factor where both "
+        "are above 0; not for whole numbers",
     )
-    parser.add_argument("--runs", type=int, help=f"of --random; default: {RANDOM_RUNS}")
-    parser.add_argument("--seed", type=int, help=f"of --random; default: {RANDOM_SEED}")
+    parser.add_argument("--seed", type=SEED, help="of --random; default: 1")
     parser.add_argument(
         "--picture",
-        type=Path,
+        type=PICTURE,
         help="plot over each parameter of the force error, or of what an experiment measures, PNG, PDF or SVG",
     )
     take_batch(parser, "sweep")
@@ -86,16 +87,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Compute what is not kept from before, write table and plot; 1 where every run failed."""
-    count, seed = _drawn(given)
-    for option, file in (("FILE", given.file), ("--picture", given.picture)):
-        if file:
-            refuse_source(given, option, file, *([] if given.experiment else [_scenario_file(given)]))
-    writable_file("FILE", given.file, TABLE, "give the scenario with --scenario")
-    if given.picture:
-        writable_picture("--picture", given.picture)
+    require_option(given, "--random", "--seed")
     axes: list[Axis] = given.vary
     _refuse_idle(given, axes)
-    sets = drawn(axes, count, seed) if given.random else listed(axes) if given.list else grid(axes)
+    seed = 1 if given.seed is None else given.seed
+    sets = drawn(axes, given.random, seed) if given.random else listed(axes) if given.list else grid(axes)
     failures, reported = (_of_experiment if given.experiment else _of_scenario)(given, axes, sets)
     failed, doubted = sum(map(bool, failures)), sum(map(bool, reported))
     doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
@@ -103,18 +99,6 @@ def run(given: argparse.Namespace) -> int:
     if failed == len(sets):
         print(f"each set failed; the first: {failures[0]}", file=sys.stderr)
     return int(failed == len(sets))
-
-
-def _drawn(given: argparse.Namespace) -> tuple[int, int]:
-    """How many sets are drawn, and their seed; refused where none are drawn."""
-    for option, value in (("--runs", given.runs), ("--seed", given.seed)):
-        if value is not None and not given.random:
-            raise ValueError(f"{option} has no effect without --random; leave it out, or give --random")
-    count = RANDOM_RUNS if given.runs is None else given.runs
-    seed = RANDOM_SEED if given.seed is None else given.seed
-    at_least("--runs", count, 1, MOST_SETS)
-    at_least("--seed", seed, 0)
-    return count, seed
 
 
 def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:

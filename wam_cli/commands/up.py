@@ -3,18 +3,18 @@
 import argparse
 import sys
 
-from wam_cli.commands import (
+from wam_cli.commands.live import page_next_to
+from wam_cli.options import (
     configuration_of,
     filled,
     is_paced,
-    namespace,
     processes_of,
     take_configuration,
     take_page,
+    take_stack,
     take_time,
     timed,
 )
-from wam_cli.commands.live import page_next_to
 from wam_control.task.scenario import load_for
 from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
@@ -22,7 +22,6 @@ from wam_ros.bring_up import start
 from wam_ros.node import node_factory
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_ros.run import die_with_parent
-from wam_ros.topics import NAMESPACE
 
 WHERE = {
     ONE: "this process",
@@ -34,12 +33,9 @@ WHERE = {
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_time(parser)
-    parser.add_argument("--mode", choices=("realtime", "lockstep"), help=argparse.SUPPRESS)  # what it was called before
     parser.add_argument("--scenario", type=filled, help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")
-    parser.add_argument(
-        "--namespace", type=namespace, default=NAMESPACE, help="namespace of the nodes; default: %(default)s"
-    )
+    take_stack(parser)
     parser.add_argument(
         "--log-level",
         choices=("debug", "info", "warn", "error", "fatal"),

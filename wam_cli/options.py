@@ -1,0 +1,372 @@
+"""Options that several commands share: types with their bounds, files that are written, and groups."""
+
+import argparse
+import math
+import os
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
+from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.nodes import EACH, GROUPED, ONE
+from wam_live.thresholds import LIVE
+from wam_sim.batch import executor
+from wam_sim.pieces import default_file
+from wam_sim.progress import Progress
+
+BASE_CONFIGURATION = "wam"
+ARM = "wam"  # namespace of a stack, unless another one is given
+YAML_SUFFIXES = (".yaml", ".yml")
+
+# types: a text becomes a value, or a reason why not, which argparse prints with the option's name
+
+
+def bounded(
+    kind: type[int] | type[float], low: float = 0, high: float = math.inf, unit: str = ""
+) -> Callable[[str], Any]:
+    """The type of a finite number within bounds, both of which are allowed."""
+    what = "a whole number" if kind is int else "a number" if math.isfinite(low) else "a finite number"
+    bounds = f"of at least {low:g}" * math.isfinite(low) if high == math.inf else f"from {low:g} to {high:g}"
+
+    def parse(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not (low <= value <= high and math.isfinite(value)):
+            allowed = " ".join(filter(None, (what, bounds))) + f", in {unit}" * bool(unit)
+            raise argparse.ArgumentTypeError(f"'{text}' is not allowed; give {allowed}")
+        return value
+
+    return parse
+
+
+COUNT = bounded(int, 1)
+SEED = bounded(int, 0)
+_PORT = bounded(int, 1, 65535)
+_JOBS = bounded(int, 1, 1024)
+
+
+def namespace(text: str) -> str:
+    """The namespace of an arm, as ROS takes it."""
+    inner = text.strip("/")
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", inner):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is no namespace; give words of letters, digits and '_' that begin with no digit, joined by '/'"
+        )
+    return inner
+
+
+def filled(text: str) -> str:
+    """A name or file; an empty one, as that of a variable that is not set, would be as if none was given."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("it is empty; give a name or a file, or leave the option out")
+    return text
+
+
+def writable_directory(text: str) -> Path:
+    """A directory that can be made or written into."""
+    path = Path(text)
+    if reason := unwritable(path):
+        raise argparse.ArgumentTypeError(f"{reason}; give another directory")
+    return path
+
+
+def unwritable(path: Path) -> str:
+    """Why a directory cannot be made or written into; '' where it can."""
+    there = next(folder for folder in (path, *path.parents) if folder.exists() or folder == folder.parent)
+    if not there.is_dir():
+        return f"cannot write into {path}: {there} is no directory"
+    if not os.access(there, os.W_OK | os.X_OK):
+        return f"cannot write into {path}: no permission to write into {there.absolute()}"
+    return ""
+
+
+@dataclass(frozen=True)
+class OutputFile:
+    """The type of a file that is written: refused before the work if it could not be written, or should not be.
+
+    Attributes
+    ----------
+    kind : what is written, as messages have it.
+    suffixes : that it may have, in lower case.
+    heading : how those begin that this program wrote; others are not written over.  '' where any may be.
+    advice : what was meant by a YAML file in the place of another kind.
+    """
+
+    kind: str
+    suffixes: tuple[str, ...]
+    heading: str = ""
+    advice: str = ""
+
+    def __call__(self, text: str) -> Path:
+        """The file; the reason where it is refused."""
+        file = Path(text)
+        if reason := self._obstacle(file):
+            raise argparse.ArgumentTypeError(reason)
+        return file
+
+    def _obstacle(self, file: Path) -> str:
+        folder, suffix = file.parent, file.suffix.lower()
+        if suffix not in self.suffixes:
+            advice = f"; {self.advice}" * bool(self.advice and suffix in YAML_SUFFIXES)
+            allowed = ", ".join(filter(None, self.suffixes))
+            return f"{file} would be {self.kind}; give a file that ends in {allowed}{advice}"
+        why = ""
+        if file.is_dir():
+            why = "it is a directory"
+        elif not folder.is_dir():
+            why = f"{folder} is no directory"
+        elif not os.access(file if file.exists() else folder, os.W_OK):
+            why = f"no permission to write {'it' if file.exists() else f'into {folder}'}"
+        if why:
+            return f"cannot write {file}: {why}; give another file"
+        if self.heading and file.exists():
+            there = file.read_text(encoding="utf-8", errors="replace")
+            if there.strip() and not there.startswith(self.heading):
+                return f"{file} exists, and this command did not write it; give a new file"
+        return ""
+
+
+# '' is for devices and pipes, as /dev/stdout
+TABLE = OutputFile("a table", (".csv", ".tsv", ".txt", ".dat", ""))
+JSON = OutputFile("JSON", (".json", ".txt", ""))
+HTML = OutputFile("a page of HTML", (".html", ".htm", ""))
+PAGE = OutputFile("a page of the documentation", (".md",))
+PICTURE = OutputFile("a picture", (".png", ".pdf", ".svg", ".jpg", ".eps"))
+RERUN = OutputFile("a recording for Rerun", (".rrd", ""))
+
+
+# groups
+
+
+def take_configuration(parser: argparse.ArgumentParser, default: str | None = BASE_CONFIGURATION) -> None:
+    """Give a command the options --config and --set."""
+    parser.add_argument(
+        "--config", default=default, help="configuration: a YAML file, or the name of one that is installed"
+    )
+    parser.add_argument(
+        "--set",
+        dest="values",
+        action="append",
+        default=[],
+        metavar="[NODE:]PARAMETER=VALUE",
+        help="change a parameter, e.g. force_loop:force_gain=[0.01] or timing.period=0.002; may be repeated",
+    )
+
+
+def configuration_of(given: argparse.Namespace) -> Configuration:
+    """The configuration that --config names, with the values of --set."""
+    loaded = Configuration.load(configuration_file(given))
+    return loaded.with_values(option_values(given.values)) if given.values else loaded
+
+
+def configuration_file(given: argparse.Namespace) -> Path:
+    """The file of the configuration that --config names."""
+    name: str = given.config
+    return Path(name) if name.endswith(YAML_SUFFIXES) else packaged(name)
+
+
+def refuse_overridden(given: argparse.Namespace, own: Collection[str], what: str) -> None:
+    """Refuse a value of --set that would have no effect.
+
+    Parameters
+    ----------
+    own : parameters, '[node:]parameter', that every run sets itself.
+    what : what sets them.
+    """
+    names = {*own, *(name.rpartition(":")[2] for name in own)}
+    for name in option_values(given.values):
+        if name in names:
+            raise ValueError(f"--set {name} has no effect here: {what} sets it; leave it out")
+
+
+def require_effect(option: str, names: Iterable[str]) -> None:
+    """Refuse parameters that do nothing in runs without ROS."""
+    from wam_sim.simulation import WITHOUT_EFFECT
+
+    for name in names:
+        if name in WITHOUT_EFFECT:
+            raise ValueError(
+                f"{option} {name} has no effect: the runs are in Python without ROS, in lockstep and as fast as they "
+                "can; leave it out, and play 'wam demo' with each of its values"
+            )
+
+
+def require_option(given: argparse.Namespace, needed: str, *options: str) -> None:
+    """Refuse options that do nothing without another one; an option that is not given is None or False."""
+    if not _is_given(given, needed):
+        for option in options:
+            if _is_given(given, option):
+                raise ValueError(f"{option} has no effect without {needed}; leave it out, or give {needed}")
+
+
+def _is_given(given: argparse.Namespace, option: str) -> bool:
+    value = getattr(given, option.removeprefix("--").replace("-", "_").lower())
+    return value is not None and value is not False
+
+
+def take_arm(parser: argparse.ArgumentParser) -> None:
+    """Give a command that reads a bag the option --namespace."""
+    parser.add_argument("--namespace", type=namespace, help="of the arm in the bag; default: that with the most topics")
+
+
+def take_stack(parser: argparse.ArgumentParser) -> None:
+    """Give a command that starts a stack, or talks to one, the option --namespace."""
+    parser.add_argument("--namespace", type=namespace, default=ARM, help="namespace of the arm; default: %(default)s")
+
+
+def recording_folder(configuration: Configuration, name: str) -> Path:
+    """The directory in which the recorder makes a bag of this name; refused where it cannot."""
+    folder = Path(str(configuration.sections["recorder"]["directory"]))
+    if reason := unwritable(folder):
+        raise ValueError(f"{reason}; give another one as --set recorder:directory=DIRECTORY")
+    if name and (folder / name).exists():
+        raise ValueError(f"bag {folder / name} exists already; give another name as --name, or move it away")
+    return folder
+
+
+def take_time(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options for how time passes."""
+    parser.add_argument(
+        "--processes",
+        nargs="?",
+        const=EACH,
+        choices=(EACH, GROUPED),
+        help="a process for each node, or grouped: for the inner loop, the outer loop and the recorder; default: all "
+        "in one process; grouped in realtime",
+    )
+    parser.add_argument(
+        "--realtime",
+        action="store_true",
+        help="do not wait for commands, as a real driver; default: timing.mode, lockstep",
+    )
+    parser.add_argument(
+        "--real-time-factor",
+        type=bounded(float),
+        metavar="FACTOR",
+        help="speed of lockstep: 1 as the wall clock, 0 as fast as it can; default: timing.real_time_factor",
+    )
+
+
+def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
+    """The configuration with what the options set for time."""
+    mode = "realtime" if given.realtime else None
+    values = {"timing.mode": mode, "timing.real_time_factor": given.real_time_factor}
+    timed = configuration.with_values({name: value for name, value in values.items() if value is not None})
+    if given.real_time_factor is not None and timed.shared.timing.mode == "realtime":
+        raise ValueError("--real-time-factor is for lockstep; leave out --realtime")
+    return timed
+
+
+def processes_of(configuration: Configuration, given: argparse.Namespace) -> str:
+    """How the nodes are distributed to processes: ONE, GROUPED or EACH, of `wam_description.nodes`."""
+    return given.processes or (GROUPED if configuration.shared.timing.mode == "realtime" else ONE)
+
+
+def is_paced(configuration: Configuration) -> bool:
+    """Whether the nodes leave the processor time to others; not in lockstep as fast as it can."""
+    timing = configuration.shared.timing
+    return timing.mode == "realtime" or timing.real_time_factor > 0.0
+
+
+def take_port(parser: argparse.ArgumentParser) -> None:
+    """Give a command the option --port."""
+    parser.add_argument(
+        "--port", type=_PORT, help=f"of the page on this machine; default: {LIVE.port}, or the next one that is free"
+    )
+
+
+def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
+    """Give a command the options --live and --no-live; None: a page where that is possible."""
+    parser.add_argument(
+        "--live",
+        action=argparse.BooleanOptionalAction,
+        default=default,
+        help="show the arm in the browser; default: " + ("no" if default is False else "where that is possible"),
+    )
+    take_port(parser)
+
+
+class BatchOptions(NamedTuple):
+    """Executor, file of finished pieces, and progress report of a batch."""
+
+    executor: Executor
+    file: Path | None
+    report: Progress
+
+
+def take_executor(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of where it computes."""
+    parser.add_argument("--jobs", type=_JOBS, help="processes; default: one for each core")
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
+    )
+
+
+def executor_of(given: argparse.Namespace, pieces: int) -> AbstractContextManager[Executor]:
+    """What the options of `take_executor` name, with no more processes than pieces."""
+    return executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask)
+
+
+def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
+    """Give a command of this name the options of a long computation."""
+    take_executor(parser)
+    kept = parser.add_mutually_exclusive_group()
+    kept.add_argument(
+        "--results",
+        type=Path,
+        default=default_file(name),
+        metavar="FILE",
+        help="what is finished is kept and looked for here, a line of JSON each; default: %(default)s",
+    )
+    kept.add_argument("--fresh", action="store_true", help="compute everything, keep nothing")
+
+
+@contextmanager
+def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
+    """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
+    if not given.fresh and (reason := unwritable(given.results.parent)):
+        raise ValueError(f"{reason}; give another directory as --results")
+    with executor_of(given, pieces) as found:
+        progress = Progress(getattr(given, "part", given.command), sys.stderr)
+        yield BatchOptions(found, None if given.fresh else given.results, progress)
+
+
+OTHER_ROBOT = (
+    ("--topic", "TOPIC", "analyse this topic only; of any type, with --map"),
+    ("--joint", "JOINT", "analyse this joint only; or the names of joints that have none in the messages"),
+    ("--command", "TOPIC", "what is commanded; else topics named command, cmd, desired, reference, target, goal"),
+    (
+        "--map",
+        "QUANTITY=FIELD",
+        f"field of the messages, as effort=current or position=state.q; {', '.join(MAPPED)}",
+    ),
+    ("--unit", "QUANTITY=UNIT", "of what was recorded, as position=deg or effort=mA, or a factor as effort=0.12"),
+)
+
+
+def take_topic_map(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of what is taken from another robot's recording."""
+    other = parser.add_argument_group("a recording of another robot", "each may be repeated")
+    for option, name, text in OTHER_ROBOT:
+        dest = f"only_{option[2:]}"  # `command` is that of the program
+        other.add_argument(option, dest=dest, action="append", default=[], metavar=name, help=text)
+
+
+def topic_map_of(given: argparse.Namespace) -> TopicMap:
+    """What the options of `take_topic_map` name; errors are those of `topic_map`."""
+    return topic_map(given.only_topic, given.only_joint, given.only_command, given.only_map, given.only_unit)
+
+
+def exit_code_of(unmet: Sequence[object]) -> int:
+    """Print what in a report is not as it should be, if anything; the exit code."""
+    if unmet:
+        print(f"\nchecks failed: {'; '.join(str(one) for one in unmet)}")
+    return int(bool(unmet))
