@@ -20,6 +20,7 @@
 - driver_contract: what a driver of the arm promises, row by row
 - nodes, topics, interface: table of nodes, table of topics, who publishes and takes each topic
 - signals, status: the values that nodes exchange; the status of a node
+- thresholds: how exact the numbers of an arm are, and numbers of a model without effect
 - agreement: whether nodes that were started apart have the same shared parameters
 - defects: what makes such a value unusable, in a message and in what a node returns
 """

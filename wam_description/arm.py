@@ -15,11 +15,10 @@ from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
 from wam_description.parameters import lengths, parameter, require, tunable
 from wam_description.parts import Joints, Links, Motors, distinct
+from wam_description.thresholds import MODEL
 from wam_description.units import STANDARD_GRAVITY
 
-LARGEST_CONDITION = 1e8  # of joint_from_motor
 SLOWEST = 1e-3  # of timing.real_time_factor: 1 s of the arm takes 17 min, and a period of 0.1 s nearly two
-TOLERANCE = 1e-3  # m, by which numbers that describe the same point may differ
 
 
 @dataclass(frozen=True)
@@ -109,9 +108,9 @@ class Arm:
         )
         condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (joints, motors))))
         require(
-            condition < LARGEST_CONDITION,
+            condition < MODEL.condition,
             f"parameter 'arm.joint_from_motor' is singular (condition number {condition:.3g}, allowed below "
-            f"{LARGEST_CONDITION:g}): each joint needs its own combination of motors",
+            f"{MODEL.condition:g}): each joint needs its own combination of motors",
         )
         require(
             len(self.links.names) == joints,
@@ -150,24 +149,24 @@ class Arm:
                 here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
                 beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]
                 short = sum(a * b for a, b in zip(beyond, x, strict=True))
-                is_on_axis = math.dist(beyond, [short * along for along in x]) <= TOLERANCE
+                is_on_axis = math.dist(beyond, [short * along for along in x]) <= MODEL.same_point
                 apart = max(0.0, short) if is_on_axis else 0.0  # a tool may be beyond the link or next to it
             require(
-                apart <= TOLERANCE,
+                apart <= MODEL.same_point,
                 f"{name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {links[link]}, but {where}"
                 + coupled.format(here),
             )
             before = (-joints.length[link], 0.0, -joints.offset[link])  # the joint before, in this link's frame
             origin = covers.origin[three]
             require(
-                min(math.hypot(*origin), math.dist(origin, before)) <= TOLERANCE,
+                min(math.hypot(*origin), math.dist(origin, before)) <= MODEL.same_point,
                 f"{name}: arm.covers.origin is {_point(origin)} m; its link begins at (0, 0, 0) or, by "
                 f"arm.joints.offset of {joints.names[link]}, at {_point(before)}"
                 + coupled.format("arm.covers.origin, arm.joints.offset"),
             )
             far = max(covers.start[3 * k], covers.end[3 * k])
             require(
-                far <= covers.length[k] + TOLERANCE,
+                far <= covers.length[k] + MODEL.same_point,
                 f"{name}: the tube ends at {far:g} m, arm.covers.end, but arm.covers.length is {covers.length[k]:g} m"
                 + coupled.format(here),
             )

@@ -17,13 +17,8 @@ from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
 from wam_description.parameters import lengths, require
 from wam_description.parts import Links, Motors
+from wam_description.thresholds import MODEL
 from wam_description.world import SHAPES, Folding, Obstacles, Pushers, Springs, World
-
-NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, if slack is switched off
-FAR = 1e6  # rad or m, beyond the range of every tendon
-NEVER_YIELDS = 1e9  # N m; a yield torque that is never reached adds the creep to MuJoCo's state
-FAR_AWAY = 50.0  # m; position of pushers before their start
-ROTOR_MASS = 1e-3  # kg; without effect, as a rotor turns about its centre of mass
 
 
 def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
@@ -139,7 +134,13 @@ def _add_rotors(world: ElementTree.Element, motors: Motors) -> None:
     for i, name in enumerate(motors.names):
         body = _add(world, "body", name=f"{name}_rotor", pos=_numbers((-0.3, 0.15 * i, -0.3)))
         inertia = motors.inertia[i]
-        _add(body, "inertial", pos="0 0 0", mass=repr(ROTOR_MASS), diaginertia=_numbers((inertia, inertia, inertia)))
+        _add(
+            body,
+            "inertial",
+            pos="0 0 0",
+            mass=repr(MODEL.rotor_mass),
+            diaginertia=_numbers((inertia, inertia, inertia)),
+        )
         _add(
             body,
             "joint",
@@ -244,7 +245,7 @@ def _add_pushers(world: ElementTree.Element, pushers: Pushers) -> None:
     for i, name in enumerate(pushers.names):
         if pushers.force[i] == 0.0:
             continue
-        body = _add(world, "body", name=name, mocap="true", pos=_numbers((FAR_AWAY, FAR_AWAY, float(i))))
+        body = _add(world, "body", name=name, mocap="true", pos=_numbers((MODEL.far_away, MODEL.far_away, float(i))))
         size = pushers.sizes[3 * i : 3 * i + (1 if pushers.shapes[i] == "sphere" else 3)]
         _add(body, "geom", name=name, type=pushers.shapes[i], size=_numbers(size), rgba="0.85 0.6 0.5 1")
 
@@ -273,10 +274,10 @@ def _add_cables(tendons: ElementTree.Element, arm: Arm, effects: Effects) -> Non
     size = len(arm.motors.names)
     motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(size, size))
     for i, (motor, circuit) in enumerate(zip(arm.motors.names, arm.circuits, strict=True)):
-        stretch, share = circuit.slack_stretch if effects.slack else NEVER_SLACK, 0.5
+        stretch, share = circuit.slack_stretch if effects.slack else MODEL.never_slack, 0.5
         if play := effects.play(i):
             stretch, share = -0.5 * play, 1.0
-        for strand, springlength in (("tight", (-FAR, -stretch)), ("loose", (stretch, FAR))):
+        for strand, springlength in (("tight", (-MODEL.far, -stretch)), ("loose", (stretch, MODEL.far))):
             tendon = _add(
                 tendons,
                 "fixed",
@@ -284,7 +285,7 @@ def _add_cables(tendons: ElementTree.Element, arm: Arm, effects: Effects) -> Non
                 stiffness=repr(circuit.stiffness * share),
                 damping=repr(circuit.damping / 2.0),
                 springlength=_numbers(springlength),
-                springyield=repr(NEVER_YIELDS),
+                springyield=repr(MODEL.never_yields),
             )
             _add(tendon, "joint", joint=motor, coef="1")
             for joint, ratio in zip(arm.joints.names, motor_from_joint[i], strict=True):
@@ -303,7 +304,7 @@ def _add_springs(tendons: ElementTree.Element, springs: Springs) -> None:
             "fixed",
             name=f"spring{i}",
             stiffness=repr(springs.stiffness[i]),
-            springlength=_numbers((rest, rest) if springs.bilateral[i] else (rest, FAR)),
+            springlength=_numbers((rest, rest) if springs.bilateral[i] else (rest, MODEL.far)),
         )
         _add(tendon, "joint", joint=joint, coef=repr(lever))
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.parameters import lengths, parameter, require
-
-ROUNDED = 1e-6  # of an inertia, by which it may be rounded
+from wam_description.thresholds import MODEL
 
 
 def distinct(group: str, names: tuple[str, ...]) -> None:
@@ -137,7 +136,7 @@ class Links:
         for i, name in enumerate(self.names):
             least, middle, largest = np.linalg.eigvalsh(self.tensor(i)).tolist()
             require(
-                largest <= (least + middle) * (1.0 + ROUNDED),
+                largest <= (least + middle) * (1.0 + MODEL.rounded),
                 f"{name}: arm.links.inertia and product give the principal inertias {least:.4g}, {middle:.4g} and "
                 f"{largest:.4g} kg m^2; of no body is the largest one above the sum of the others, "
                 f"{least + middle:.4g} kg m^2",

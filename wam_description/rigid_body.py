@@ -9,10 +9,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wam_description.arm import Arm
+from wam_description.thresholds import MODEL
 
 Array = NDArray[np.float64]
 FLOAT = np.dtype(float)
-SMALL = 1e-9  # m, lever arms that are zero apart from rounding
 
 
 class Pose(NamedTuple):
@@ -102,7 +102,7 @@ class RigidBody:
         """Whether some joint moves the point p, (3,), m, of a cover, given in its frame."""
         n = self._model.nv
         poses = ([0.3 * (i + 1) * sign for i in range(n)] for sign in (1.0, -1.0))
-        return any(float(np.abs(self.point_jacobian(q, cover, p)).max()) >= SMALL for q in poses)
+        return any(float(np.abs(self.point_jacobian(q, cover, p)).max()) >= MODEL.small for q in poses)
 
     def start_velocities(self, q: ArrayLike, qd: ArrayLike) -> dict[str, Array]:
         """Velocity, (3,), m/s, of the origin of every cover in `moving`."""

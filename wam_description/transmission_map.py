@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_description.arm import LARGEST_CONDITION, Arm
+from wam_description.arm import Arm
+from wam_description.thresholds import MODEL
 
 
 class TransmissionMap:
@@ -91,10 +92,10 @@ def _check(matrix: NDArray[np.float64]) -> None:
     if not np.all(np.isfinite(matrix)):
         raise ValueError(f"joint_from_motor has a value that is not finite: {matrix.tolist()}")
     condition = np.linalg.cond(matrix)
-    if not condition < LARGEST_CONDITION:
+    if not condition < MODEL.condition:
         raise ValueError(
             f"joint_from_motor is singular (condition number {condition:.3g}, allowed below "
-            f"{LARGEST_CONDITION:g}): some joint angles have no motor angles; each joint needs its own "
+            f"{MODEL.condition:g}): some joint angles have no motor angles; each joint needs its own "
             f"combination of motors, got {matrix.tolist()}"
         )
 

@@ -14,12 +14,11 @@
 - plant: the arm in MuJoCo, stepped with motor torques
 - compiled_steps: its steps in C, where the package is built with WAM_COMPILE
 - step_size: which step fits the plant's stiffest mode
-- start_contacts: that nothing is inside a link at power-up
 - friction: laws of dry friction and their parameters
 - dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of all that a cover can touch
-- reach: whether anything can be touched at all
+- reach: whether anything can be touched at all, and that nothing is inside a link at power-up
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
 - thresholds: what counts as stuck, touching and stable; when the driver warns and waits

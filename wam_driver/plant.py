@@ -31,7 +31,7 @@ from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
 from wam_driver.objects import TrueObjects, moving_obstacles
 from wam_driver.pusher import pushers
-from wam_driver.start_contacts import require_free_start
+from wam_driver.reach import require_free_start
 from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Mover, Surfaces
 from wam_driver.thresholds import PLANT

@@ -4,7 +4,7 @@
 - bus: the topics of a simulation, and what was published on them
 - simulated_bag: a simulation recorded as the recorder node records the nodes
 - recording, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
-- recorded_commands: the commands of a bag as the stack took them; several_runs: whether a bag has more than one
+- recorded_commands: the commands of a bag as the stack took them; whether a bag has several runs
 - reactions: what the force loop did instead of what was commanded, and whether a step was carried out
 - replay: recorded inputs through a node again, its outputs compared with the recorded ones
 - batch: one function over many inputs on any executor; pieces: its finished results on disk

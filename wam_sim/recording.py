@@ -15,9 +15,8 @@ from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
 from wam_sim.reactions import FAULT, RecordedReaction, lasting
-from wam_sim.recorded_commands import RefusedCommands, taken_commands
+from wam_sim.recorded_commands import RefusedCommands, several_runs, taken_commands
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
-from wam_sim.several_runs import several_runs
 
 
 class RecordedStep(NamedTuple):

@@ -6,6 +6,7 @@ requisites           chapter 3: impact, grasp, and the scorecard
 resonance            chapter 4: bandwidth of position and force, best stiffness
 linear_loop          5.3, 5.5, 5.7: force loop without friction; margin of the sampled loop
 velocity_servo       sampled velocity servo on motors behind elastic cables
+thresholds           where the searches begin and end
 zero_order_hold      a linear system and its input held over a sample, as one matrix exponential
 stiction             5.4: node with little inertia; staircase: its step response
 regimes              5.5: behaviour of an inertial node by gamma and zeta; half_cycle: its slip

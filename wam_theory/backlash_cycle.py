@@ -12,11 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_theory.arguments import Array
+from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
-
-TOLERANCE = 1e-8  # relative change of the state at the flank from one half cycle to the next
-MOST = 5000  # half cycles
-STEPS = 200  # per time constant of the loop, in the search of the end of a contact
 
 
 class GearedTorqueLoop(NamedTuple):
@@ -102,16 +99,16 @@ def exact_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
         return NO_CYCLE
     guess = predicted_cycle(loop)
     speed, wound = guess.frequency * loop.play, 0.0  # rad/s at the flank; G_I integral of tau
-    for _ in range(MOST):
+    for _ in range(SEARCH.half_cycles):
         contact, most, back, wound_then = _flank(loop, speed, wound)
         crossing, reached = _play(loop, back, wound_then)
         if math.isnan(crossing):
             return NO_CYCLE  # it comes to rest within the play
         change = abs(reached - speed) / speed + abs(wound_then + wound) / (abs(wound_then) + 1e-300)
         speed, wound = reached, -wound_then
-        if change < TOLERANCE:
+        if change < SEARCH.flank_change:
             return BacklashCycle(2.0 * most, math.pi / (contact + crossing))
-    raise ValueError(f"no cycle of {loop} has settled after {MOST} half cycles")
+    raise ValueError(f"no cycle of {loop} has settled after {SEARCH.half_cycles} half cycles")
 
 
 def _flank(loop: GearedTorqueLoop, speed: float, wound: float) -> tuple[float, float, float, float]:
@@ -125,7 +122,7 @@ def _flank(loop: GearedTorqueLoop, speed: float, wound: float) -> tuple[float, f
         ]
     )
     state, time, most = np.array([0.0, speed, wound]), 0.0, 0.0
-    dt = 1.0 / (STEPS * float(np.abs(np.linalg.eigvals(rate)).max()))
+    dt = 1.0 / (SEARCH.contact_steps * float(np.abs(np.linalg.eigvals(rate)).max()))
     ahead = zero_order_hold(rate, np.zeros((3, 1)), dt)[0]
     while (after := ahead @ state)[0] > 0.0:
         if after[1] < 0.0 <= state[1]:

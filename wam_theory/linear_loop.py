@@ -14,10 +14,8 @@ from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
-
-FAST = 1e-3  # rad per sample at the margin: below, the polynomials of the held loop cancel
-SHORT = 0.5  # rad of delay at the margin: up to it the first crossing has the smallest gain
 
 
 class SampledMargin(NamedTuple):
@@ -217,7 +215,7 @@ def sampled_margin(
     the loop oscillates where Q/(P z^d) is real and negative on the unit circle; its imaginary part is
     sin(theta) times a polynomial in cos(theta), whose roots are all candidates apart from theta = pi.
     It is kept as a Chebyshev series: in powers of the cosine the roots of a long delay are lost.  Where the
-    loop is `FAST`, the angle vanishes in rounding, and the margin is that of `_fast_margin`.
+    loop is `SEARCH.fast`, the angle vanishes in rounding, and the margin is that of `_fast_margin`.
 
     Parameters
     ----------
@@ -240,7 +238,7 @@ def sampled_margin(
     if delay_samples < 0 or int(delay_samples) != delay_samples:
         raise ValueError(f"delay_samples is {delay_samples}; it must be a whole number, zero or more")
     fast = _fast_margin(j, b, ktr, kc, period, int(delay_samples))
-    if fast.frequency * period < FAST and fast.frequency * period * (delay_samples + 0.5) < SHORT:
+    if fast.frequency * period < SEARCH.fast and fast.frequency * period * (delay_samples + 0.5) < SEARCH.short_delay:
         return fast
     p, q = _held_loop(j, b, ktr, kc, period)
     p = np.concatenate([np.zeros(int(delay_samples)), p])

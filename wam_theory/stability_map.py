@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.many_slips import Array, Modes, modes, slip
-
-_FIRST = 1e-3  # of the friction, first step in the search for a stiction cycle
-_ROUNDS = 200  # slips within which a cycle is found or the response diverges, with stiction
+from wam_theory.thresholds import SEARCH
 
 
 def largest_stable_steps(
@@ -138,7 +136,7 @@ def _boundaries(nodes: _Nodes, rtol: float) -> Array:
 def _sticking_edge(nodes: _Nodes) -> Array:
     """Approximately the greatest error, (n,), from which the node sticks again before the response diverges."""
     unit = slip(nodes.modes, -np.ones(nodes.stiction.size), np.zeros(nodes.stiction.size))
-    low = np.full(nodes.stiction.size, _FIRST)
+    low = np.full(nodes.stiction.size, SEARCH.first_step)
     high = 2.0 * np.maximum(nodes.guess, (1.0 + nodes.stiction) / np.abs(unit.acceleration))
     for _ in range(14):
         middle = np.sqrt(low * high)
@@ -154,7 +152,7 @@ def _stable_steps(nodes: _Nodes) -> Array:
     stiction small errors grow to those of the limit cycle, and the step must exceed them: first some steps
     below the greatest that still sticks are tried, then the limit of the growing errors is extrapolated.
     """
-    first = np.full(nodes.stiction.size, _FIRST)
+    first = np.full(nodes.stiction.size, SEARCH.first_step)
     steps = np.where(_next_errors(nodes, first) <= first, first, 0.0)
     left = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
     edge = _sticking_edge(nodes.take(left))
@@ -165,8 +163,8 @@ def _stable_steps(nodes: _Nodes) -> Array:
         left, edge = left[~held], edge[~held]
     index = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
     nodes = nodes.take(index)
-    errors, rises = np.full(index.size, _FIRST), np.full(index.size, math.nan)
-    for _ in range(_ROUNDS):
+    errors, rises = np.full(index.size, SEARCH.first_step), np.full(index.size, math.nan)
+    for _ in range(SEARCH.slips):
         after = _next_errors(nodes, errors)
         rise = after - errors
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -20,6 +20,7 @@ from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from, state_after
 from wam_theory.staircase import Staircase, inertialess_staircase
+from wam_theory.thresholds import SEARCH
 from wam_theory.verdicts import Outcome, Verdict, assess, largest_stable_step
 
 __all__ = [
@@ -39,8 +40,6 @@ __all__ = [
     "largest_stable_step",
     "simulate",
 ]
-
-_HUGE = 1e100  # rad; the simulation ends beyond it
 
 
 class Event(NamedTuple):
@@ -153,6 +152,6 @@ def simulate(
         if phase[0] > until:
             return Trajectory(until, False, model, tuple(seen))
         seen.append(phase)
-        if len(seen) >= max_events or not abs(phase[5]) < _HUGE:
+        if len(seen) >= max_events or not abs(phase[5]) < SEARCH.diverged:
             return Trajectory(phase[0], False, model, tuple(seen))
     return Trajectory(until, True, model, tuple(seen))

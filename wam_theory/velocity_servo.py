@@ -12,13 +12,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_theory.thresholds import SEARCH
 from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
-ON_THE_CIRCLE = 1e-7  # growth of a mode in one period that counts as none
-MEMORY = 1e-9  # of a mode after a period, below which it is none
-STEP = 0.8  # from one scale that is tried to the next
-SMALLEST = 1e-15  # scale at which a search ends
 
 
 def locked_rotors(
@@ -80,7 +77,7 @@ def is_stable(period_map: Array) -> bool:
     ----------
     period_map : (m, m), state after a period from the state before it.
     """
-    return bool(np.abs(np.linalg.eigvals(period_map)).max() <= 1.0 + ON_THE_CIRCLE)
+    return bool(np.abs(np.linalg.eigvals(period_map)).max() <= 1.0 + SEARCH.mode_growth)
 
 
 def least_damping(period_map: Array, slow: float) -> float:
@@ -92,7 +89,7 @@ def least_damping(period_map: Array, slow: float) -> float:
     slow : largest size of a mode that counts, rad per period.
     """
     values = np.linalg.eigvals(period_map).astype(np.complex128)
-    rates = np.log(values[np.abs(values) > MEMORY])
+    rates = np.log(values[np.abs(values) > SEARCH.mode_memory])
     size = np.abs(rates)
     used = (np.abs(rates.imag) > 0.0) & (size < slow)
     return float(min(-rates.real[used] / size[used], default=1.0))
@@ -109,14 +106,14 @@ def largest_scale(is_stable_at: Callable[[float], bool], top: float) -> float:
     Returns
     -------
     float
-        `top` if it is stable there, 0 if it is not even at `SMALLEST` of it.
+        `top` if it is stable there, 0 if it is not even at `SEARCH.smallest_scale` of it.
     """
     if is_stable_at(top):
         return top
     above = top
-    while not is_stable_at(below := above * STEP):
+    while not is_stable_at(below := above * SEARCH.scale_step):
         above = below
-        if below < SMALLEST * top:
+        if below < SEARCH.smallest_scale * top:
             return 0.0
     while above > 1.001 * below:
         middle = math.sqrt(below * above)

@@ -8,6 +8,7 @@ import pytest
 
 from wam_theory import linear_loop
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
+from wam_theory.thresholds import SearchThresholds
 from wam_theory.zero_order_hold import zero_order_hold
 
 
@@ -124,9 +125,9 @@ def test_sampled_margin_has_no_step_where_the_fast_form_begins(
     zeta: float, delay: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = (1.0, 2.0 * zeta, 0.3, 0.7, 2e-3, delay)
-    monkeypatch.setattr(linear_loop, "FAST", 1.0)
+    monkeypatch.setattr(linear_loop, "SEARCH", SearchThresholds(fast=1.0))
     fast = linear_loop.sampled_margin(*values)
-    monkeypatch.setattr(linear_loop, "FAST", 0.0)
+    monkeypatch.setattr(linear_loop, "SEARCH", SearchThresholds(fast=0.0))
     sampled = linear_loop.sampled_margin(*values)
     assert fast.gain == pytest.approx(sampled.gain, rel=1e-5)
     assert fast.frequency == pytest.approx(sampled.frequency, rel=1e-6)
