@@ -70,10 +70,8 @@ if [ -n "$$failed" ]; then echo "make $@: failed:$$failed" >&2; exit 1; fi
 endef
 
 # demo_under_load.py takes an hour by itself
-BENCHMARKS := $(filter-out benchmarks/demo_under_load.py,$(sort $(wildcard benchmarks/*.py)))
-
 bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of one run
-	@for script in $(BENCHMARKS); do echo "== $$script"; $(PY) "$$script" $(ARGS) || exit 1; done
+	@$(PY) benchmarks/bench.py $(ARGS)
 
 soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/reliability.md
 	@$(VENV)/bin/wam evaluate soak --seconds $(SOAK_SECONDS) --write docs/reliability.md $(ARGS)

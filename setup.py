@@ -16,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
 PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
-# The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py).
+# The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (the benchmark `compiled`).
 # The substeps of the plant are C then, too: wam_driver/fast_steps.c.  WAM_COMPILE=auto: only where that is possible.
 COMPILED = (
     "wam_control/force/arm_push.py",

@@ -1,6 +1,6 @@
 """Inverse and solution of a few equations, as numpy.linalg computes them, without what it looks at first.
 
-For four by four numbers that takes longer than the work, as `benchmarks/small_matrices.py` shows: numpy's own functions
+For four by four numbers that takes longer than the work, as was measured: numpy's own functions
 are called, and numpy.linalg itself wherever one of them finds a matrix singular.  The bits and the refusals are equal.
 """
 

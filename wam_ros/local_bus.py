@@ -5,7 +5,7 @@ them from it again, once for each listener.  Here a listener of a topic that onl
 called with the bytes themselves.  They go to the middleware, too, for the recorder and everybody else.  The
 subscription of the middleware stays, but nothing fetches its messages: the graph shows it, and it reveals a second
 publisher.  It is the reference: it carries what a node of another process publishes, the status, which many publish,
-and everything in realtime.  benchmarks/speed.py shows the gain; the bits are the same.
+and everything in realtime.  benchmarks/README.md shows the gain; the bits are the same.
 """
 
 from collections import deque

@@ -4,10 +4,10 @@ A message between two processes wakes its reader.  The kernel starts that at onc
 to be woken itself and has nothing of the reader in its cache, and the writer is interrupted before it has sent its
 message to the next reader.  In lockstep, where the nodes wait for each other anyway, most of a period went into that.
 Here the inner loop has a processor, all others have the rest, and who reads waits until who writes has finished
-(SCHED_BATCH, which needs no right).  benchmarks/speed.py shows the gain; the bits are the same.
+(SCHED_BATCH, which needs no right).  benchmarks/README.md shows the gain; the bits are the same.
 
 In realtime the driver works for most of a period.  Where three processors are permitted, its process has one to itself,
-and all others the rest.  benchmarks/real_time.py shows it.
+and all others the rest.  benchmarks/README.md shows it.
 """
 
 import os

@@ -2,7 +2,7 @@
 
 `wam_ros.messages` does the same through message objects; it is the reference, and whatever does not have
 the expected layout (another byte order, other names or their order, other arrays) goes through it, so that both
-refuse the same.  Padding is written as zeros.  benchmarks/speed.py shows the gain.
+refuse the same.  Padding is written as zeros.  benchmarks/README.md shows the gain.
 """
 
 from collections.abc import Callable

@@ -5,18 +5,16 @@ About 10 s in all.
 
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+import solve_ivp
 
 from wam_theory.many_slips import modes, slip
 from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, largest_stable_step
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
-from comparing import solve_ivp
 
 CLOSE = 5e-3  # of a boundary
 

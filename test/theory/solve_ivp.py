@@ -1,4 +1,4 @@
-"""The largest stable step by scipy's solve_ivp with events: slow, and without a formula of ours.
+"""Growth of a step by scipy's solve_ivp with events: slow, and without a formula of ours.
 
 The node of figure 5.4 as it stands, (x, x', x_m) with friction of a given sign, each slip ended by an
 event at x' = 0; breakaway after a stick as in (5.3).  What a response becomes is assessed as early as
@@ -18,10 +18,6 @@ class Tolerances(NamedTuple):
     method: str
     rtol: float
     atol: float  # of the step
-
-
-# Of RK23, RK45, DOP853 and LSODA at rtol 1e-3 to 1e-6 the fastest that keeps the boundary to 0.5 %
-BEST = Tolerances("DOP853", 1e-5, 1e-7)
 
 
 class Node(NamedTuple):
@@ -47,7 +43,7 @@ def _standstill(t, s, *_):
 _standstill.terminal = True
 
 
-def grows(node: Node, step: float, how: Tolerances = BEST) -> bool:
+def grows(node: Node, step: float, how: Tolerances) -> bool:
     """Whether the response to a step grows: its next stick is at a greater error, or there is none."""
     ktr, kc, b, gain, static = node
     end = 100.0 / math.sqrt(ktr + kc)
@@ -76,19 +72,3 @@ def grows(node: Node, step: float, how: Tolerances = BEST) -> bool:
             return False
         sign = math.copysign(1.0, net)
         s = [x, 0.0, m]
-
-
-def largest_stable_step(node: Node, guess: float, how: Tolerances = BEST, rtol: float = 2.5e-3) -> float:
-    """Boundary by bisection, 0 where even a hundredth of the friction grows."""
-    if grows(node, 0.01, how):
-        return 0.0
-    low, high = 0.01, guess
-    while not grows(node, high, how):
-        low, high = high, 1.5 * high
-    while high > low * (1.0 + rtol):
-        middle = math.sqrt(low * high)
-        if grows(node, middle, how):
-            high = middle
-        else:
-            low = middle
-    return math.sqrt(low * high)

@@ -1,0 +1,145 @@
+"""Reading and analysing bags that were recorded without ROS."""
+
+import struct
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bench import Benchmark, Measured, Row
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from simulation import scenario_steps, seconds
+
+from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
+from wam_analysis.findings.page import page
+from wam_bag.bag import Messages, raw, read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.message_layout import stamp_reader
+from wam_description.configuration import Configuration, packaged
+from wam_description.topics import TOPICS
+from wam_ros.topics import qos
+from wam_sim.simulated_bag import record
+
+
+@contextmanager
+def recorded(quick: bool) -> Iterator[Path]:
+    """A bag of a short form of the demonstration."""
+    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
+        configuration = Configuration.load(packaged("wam"))
+        steps = scenario_steps(1.0 if quick else 20.0, configuration.shared)
+        if failure := record(configuration, steps, Path(folder) / "bag"):
+            raise SystemExit(failure)
+        yield Path(folder) / "bag"
+
+
+def everything(bag: Path) -> int:
+    """Every topic as columns, and every message that has none as an object; returns how many."""
+    count = 0
+    for columns in read(bag).topics.values():
+        count += len(list(columns.messages)) if isinstance(columns, Messages) else len(columns.log_time_ns)
+    return count
+
+
+def columns_only(bag: Path) -> int:
+    """The topics that become columns; the few others are read and left serialized."""
+    return sum(len(columns.log_time_ns) for columns in read(bag).topics.values())
+
+
+def rosbags(bag: Path) -> int:
+    """Every message as an object of rosbags."""
+    with AnyReader([bag]) as reader:
+        return sum(1 for c, _, data in reader.messages() if reader.deserialize(data, c.msgtype) is not None)
+
+
+def mcap_ros2(bag: Path) -> int:
+    """Every message as an object of mcap-ros2-support."""
+    with next(bag.glob("*.mcap")).open("rb") as stream:
+        return sum(1 for _ in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+
+
+def cost(reader: Callable[[Path], int], bag: Path, times: int) -> tuple[float, int]:
+    """Processor time for a message, us, which other programs disturb less; and how many there were."""
+    begin = time.process_time()
+    for _ in range(times):
+        count = reader(bag)
+    return (time.process_time() - begin) / times / count * 1e6, count
+
+
+def bag_reading(quick: bool) -> Measured:
+    """Each message of the same bag by every reader."""
+    readers = {"everything": (everything, 5), "columns": (columns_only, 5)}
+    readers |= {"rosbags": (rosbags, 1), "mcap-ros2-support": (mcap_ros2, 1)}
+    with recorded(quick) as bag:
+        while True:
+            found = {name: cost(reader, bag, times) for name, (reader, times) in readers.items()}
+            if len(counts := {count for _, count in found.values()}) != 1:
+                raise SystemExit(f"the readers found different numbers of messages: {counts}")
+
+            one = {name: each for name, (each, _) in found.items()}
+            yield one | {f"{name}, columns": each for name, each in one.items()}
+
+
+BAG_READING = Benchmark(
+    bag_reading,
+    "reading a message [us]",
+    (
+        Row("rosbags", "everything"),
+        Row("mcap-ros2-support", "everything"),
+        Row("rosbags, columns", "columns"),
+        Row("mcap-ros2-support, columns", "columns"),
+    ),
+    rounds=5,
+)
+
+
+def repeated(source: Path, target: Path, length: float) -> None:
+    """Write the bag so often that it lasts `length`, s, each time with later stamps."""
+    topics = {name: found for name, found in raw(source).items() if len(found.data)}
+    last = max(int(found.log_time_ns.max()) for found in topics.values())
+    first = min(int(at) for found in topics.values() for at in found.log_time_ns if at > 0)
+    once = last - first + 1_000_000
+    order = sorted(
+        (int(at), name, i) for name, found in topics.items() for i, at in enumerate(found.log_time_ns.tolist())
+    )
+    stamped = {name: stamp_reader(found.type) for name, found in topics.items()}
+    whole, count = read(source), 0
+    with BagWriter(target) as bag:
+        for name, found in topics.items():
+            bag.add_topic(name, found.type, qos(next(row for row in TOPICS if name.endswith(row.name))))
+        for turn in range(max(1, round(length * 1e9 / once))):
+            for at, name, i in order:
+                data = topics[name].data[i]
+                stamp = stamped[name](data)
+                if stamp is None and turn:
+                    continue  # latched: published once
+                if stamp is not None and turn and topics[name].type != "visualization_msgs/msg/MarkerArray":
+                    later = divmod(stamp + turn * once, 1_000_000_000)
+                    data = data[:4] + struct.pack("<iI", *later) + data[12:]
+                bag.write(name, data, at + turn * once, at + turn * once, count)
+                count += 1
+        for name, attached in whole.attachments.items():
+            bag.attach(name, "application/yaml", attached)
+        bag.metadata("recording", whole.metadata.get("recording", {}))
+
+
+def long_bag(quick: bool) -> Measured:
+    """`wam analyse` of ten minutes, a short recording again and again, in times real time."""
+    length = 60.0 * (0.2 if quick else 10.0)
+    with recorded(quick) as short:
+        repeated(short, bag := short.with_name("long"), length)
+        while True:
+            kept: list = []
+            times = {
+                "reading": seconds(lambda to=kept: to.append(read(bag, TOPICS_READ, may_lack=True))),
+                "analysis": seconds(lambda to=kept: to.append(analyse_bag(to[0], lambda doing: None))),
+                "page": seconds(lambda to=kept: page(to[1])),
+            }
+            yield {name: length / taken for name, taken in times.items()}
+
+
+LONG_BAG = Benchmark(
+    long_bag, "ten minutes, in times real time", tuple(map(Row, ("reading", "analysis", "page"))), rounds=3
+)
