@@ -8,7 +8,8 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.plant import Plant
-from wam_studies.figures.open_loop import KNOWN, STEP, OpenLoopArm
+from wam_studies.figures.conditions import CASE
+from wam_studies.figures.open_loop import OpenLoopArm
 from wam_studies.plant.ideal_testbed import EMPTY
 from wam_theory.stiction import play
 
@@ -42,7 +43,7 @@ def test_no_error_is_beyond_that_of_statics_and_some_are_near_it(quiet: bool) ->
 
 @pytest.mark.slow
 def test_feed_forward_of_friction_and_cogging_halves_the_error() -> None:
-    plain, known = OpenLoopArm(False), OpenLoopArm(False, KNOWN)
+    plain, known = OpenLoopArm(False), OpenLoopArm(False, CASE.fed_forward)
     pushes = plain.pushes()[:12]
     before, after = (np.median([abs(arm.error(q, 0.1 * f)) for q, f in pushes]) for arm in (plain, known))
     assert after < 0.65 * before
@@ -61,7 +62,7 @@ def test_arm_with_cogging_has_the_measured_breakaway_torque_of_its_motors() -> N
 def breakaway(q: float) -> float:
     """Torque at which rotor 1 of the configured plant, without gravity, starts to turn from a joint angle q."""
     arm = changed(WAM, joints={"start": (q, *WAM.joints.start[1:])}, gravity=(0.0, 0.0, 0.0))
-    plant = Plant(arm, EMPTY, CONFIGURATION.node("driver", DriverParameters).effects, STEP)
+    plant = Plant(arm, EMPTY, CONFIGURATION.node("driver", DriverParameters).effects, CASE.open_loop_step)
     plant.brake(False)
     begin, torque = plant.theta[0], 0.03
     while abs(plant.theta[0] - begin) < 1e-7:

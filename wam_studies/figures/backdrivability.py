@@ -10,11 +10,8 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.series import Numbers
-
-PAYLOAD = 2.0  # kg, 7.2.2
-POSES, DIRECTIONS, GRID = 1000, 200, 61
-SEED = 7
 
 
 class Backdriven(NamedTuple):
@@ -59,7 +56,7 @@ class Backdriving:
         self._rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
         self._armature = np.diag(arm.joints.armature)
         self._friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
-        directions = np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3))
+        directions = np.random.default_rng(CASE.backdriven_seed).normal(size=(CASE.backdriven_directions, 3))
         self._directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def mobility(self, q: tuple[float, ...], payload: float, rotors: bool = True) -> NDArray[np.float64]:
@@ -94,10 +91,10 @@ def backdrivability() -> BackdrivabilityMap:
     """Maps with the parameters of config/wam.yaml."""
     arm = Configuration.load(packaged("wam")).shared.arm
     tip, low, high = Backdriving(arm), np.array(arm.joints.lower), np.array(arm.joints.upper)
-    pitch, elbow = (np.linspace(low[i], high[i], GRID) for i in (1, 3))
-    rows = np.array([[tip.at((0.0, a, 0.0, b), PAYLOAD)[:3] for a in pitch] for b in elbow])
-    poses = np.random.default_rng(SEED).uniform(low, high, (POSES, 4))
-    loaded, free = (np.array([tip.at(tuple(q), m)[:3] for q in poses], dtype=np.float64) for m in (PAYLOAD, 0.0))
+    pitch, elbow = (np.linspace(low[i], high[i], CASE.backdriven_grid) for i in (1, 3))
+    rows = np.array([[tip.at((0.0, a, 0.0, b), CASE.payload)[:3] for a in pitch] for b in elbow])
+    poses = np.random.default_rng(CASE.backdriven_seed).uniform(low, high, (CASE.backdriven_poses, 4))
+    loaded, free = (np.array([tip.at(tuple(q), m)[:3] for q in poses], dtype=np.float64) for m in (CASE.payload, 0.0))
     return BackdrivabilityMap(pitch, elbow, rows[..., 0], rows[..., 1], rows[..., 2], loaded, free)
 
 

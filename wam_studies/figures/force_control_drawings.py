@@ -5,15 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from wam_analysis.drawing import INK, TRUE
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.responses import (
-    DESIRED,
-    STAIRS,
     CoulombResponse,
     LostContact,
     SimpleResponses,
     StaircaseResponse,
 )
-from wam_studies.figures.stability import STICTION, DescribingFunction, StabilityBound
+from wam_studies.figures.stability import DescribingFunction, StabilityBound
 from wam_studies.figures.style import GREY, SECOND, THEORY, UNSTABLE, legend, picture, plant, theory_and_plant
 
 
@@ -22,18 +21,23 @@ def draw_simple(numbers: SimpleResponses, file: Path) -> None:
     with picture(file, 7.0, 2.9) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         for axes, series in ((left, numbers.proportional), (right, numbers.integral)):
-            axes.axhline(DESIRED, color=GREY, linewidth=0.7, linestyle=":")
+            axes.axhline(CASE.desired, color=GREY, linewidth=0.7, linestyle=":")
             theory_and_plant(axes, series)
-            axes.set(xlabel="time [s]", ylim=(0.0, 1.12 * DESIRED))
-        left.text(1.45, DESIRED + 0.3, r"$F_{des}$", ha="right", color=GREY)
+            axes.set(xlabel="time [s]", ylim=(0.0, 1.12 * CASE.desired))
+        left.text(1.45, CASE.desired + 0.3, r"$F_{des}$", ha="right", color=GREY)
         left.set(title="a) proportional control", ylabel="contact force $F_c$ [N m]")
         left.annotate(
-            "", (1.2, DESIRED), (1.2, DESIRED - numbers.steady_error), arrowprops={"arrowstyle": "<->", "color": GREY}
+            "",
+            (1.2, CASE.desired),
+            (1.2, CASE.desired - numbers.steady_error),
+            arrowprops={"arrowstyle": "<->", "color": GREY},
         )
-        left.text(1.17, DESIRED - numbers.steady_error / 2.0, "steady error (5.1)", ha="right", va="center", color=GREY)
+        left.text(
+            1.17, CASE.desired - numbers.steady_error / 2.0, "steady error (5.1)", ha="right", va="center", color=GREY
+        )
         right.set(title="b) integral control")
         tau = numbers.time_constant
-        right.plot([tau, tau], [0.0, DESIRED * (1.0 - np.exp(-1.0))], color=GREY, linewidth=0.7, linestyle=":")
+        right.plot([tau, tau], [0.0, CASE.desired * (1.0 - np.exp(-1.0))], color=GREY, linewidth=0.7, linestyle=":")
         right.annotate(r"$\tau = 1/(G_I K)$ (5.2)", (tau, 0.0), (4, 4), textcoords="offset points", color=GREY)
         legend(right, loc="center right")
 
@@ -46,7 +50,7 @@ def draw_staircase(numbers: StaircaseResponse, file: Path) -> None:
         axes.plot(*numbers.jumps, color=GREY, linewidth=0.9, linestyle="--", label="$F_c$, no inertia (5.3), (5.8)")
         theory_and_plant(axes, numbers.force, THEORY, "$F_c$, exact")
         plant(axes, numbers.motor)
-        axes.axhline(STAIRS, color=GREY, linewidth=0.7, linestyle=":")
+        axes.axhline(CASE.stairs, color=GREY, linewidth=0.7, linestyle=":")
         axes.set(xlabel="time [s]", ylabel="[N m]")
         legend(axes, loc="lower right", ncols=2)
 
@@ -81,7 +85,7 @@ def draw_bound(numbers: StabilityBound, file: Path) -> None:
         axes.fill_between(bound.x, 0.0, bound.y, color=UNSTABLE, alpha=0.10, linewidth=0)
         axes.axvspan(end, 2.6, color=UNSTABLE, alpha=0.10, linewidth=0)
         axes.plot([*bound.x, end], [*bound.y, top], color=THEORY, linewidth=2.0, label="Coulomb friction, exact")
-        label = rf"$F_{{static}}$ = {STICTION:g} $F_{{dynamic}}$"
+        label = rf"$F_{{static}}$ = {CASE.stiction:g} $F_{{dynamic}}$"
         axes.plot(*numbers.with_stiction, color=SECOND, linestyle="--", label=label)
         for zeta, gamma, height in numbers.others:
             axes.plot(gamma, height, color=GREY, linewidth=0.8)
@@ -118,7 +122,7 @@ def draw_coulomb(numbers: CoulombResponse, file: Path) -> None:
     with picture(file, 7.0, 4.2) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         theory_and_plant(upper, numbers.force, THEORY, "exact")
-        upper.axhline(DESIRED, color=GREY, linewidth=0.7, linestyle=":")
+        upper.axhline(CASE.desired, color=GREY, linewidth=0.7, linestyle=":")
         upper.set(ylabel="$F_c$ [N m]", title=rf"$\gamma$ = {numbers.gamma:g}, $\zeta$ = {numbers.zeta:g}")
         theory_and_plant(lower, numbers.motor, SECOND, "exact")
         lower.set(xlabel="time [s]", ylabel="motor $x_m$ at the joint [rad]")
@@ -146,8 +150,8 @@ def draw_lost_contact(numbers: LostContact, file: Path) -> None:
         axes.axvspan(1.08 * low, 0.0, color=GREY, alpha=0.12, linewidth=0)
         axes.text(0.98 * low, 0.0, "no contact", va="center", fontsize=8.0)
         theory_and_plant(axes, numbers.cycle, THEORY, "exact")
-        axes.plot(DESIRED, 0.0, "+", color=INK, markersize=8)
-        axes.annotate("$F_{des}$", (DESIRED, 0.0), (4, 4), textcoords="offset points")
+        axes.plot(CASE.desired, 0.0, "+", color=INK, markersize=8)
+        axes.annotate("$F_{des}$", (CASE.desired, 0.0), (4, 4), textcoords="offset points")
         axes.set(
             xlabel="$k_c x$ [N m] (right of 0 the contact force)",
             ylabel="velocity of the link [rad/s]",

@@ -5,7 +5,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from wam_analysis.drawing import TRUE
-from wam_studies.figures.friction_claims import ORDERS, ZETAS, AsymmetricStart, HarmonicsOfFriction, KeptContact
+from wam_studies.figures.conditions import CASE
+from wam_studies.figures.friction_claims import AsymmetricStart, HarmonicsOfFriction, KeptContact
 from wam_studies.figures.series import Series
 from wam_studies.figures.style import GREY, SHADES, THEORY, legend, picture
 
@@ -14,7 +15,9 @@ def draw_start(numbers: AsymmetricStart, file: Path) -> None:
     """Figure 5.4."""
     with picture(file, 7.4, 2.9) as figure:
         left, right = figure.subplots(1, 2)
-        for zeta, asymmetry, period, colour in zip(ZETAS, numbers.asymmetry, numbers.period, SHADES[1:], strict=False):
+        for zeta, asymmetry, period, colour in zip(
+            CASE.zetas, numbers.asymmetry, numbers.period, SHADES[1:], strict=False
+        ):
             line_and_exact(left, asymmetry, colour, rf"$\zeta$ = {zeta:g}")
             line_and_exact(right, period, colour, rf"$\zeta$ = {zeta:g}")
         left.set(title="a) asymmetry", xlabel="slips", ylabel="asymmetry over D", yscale="log")
@@ -28,7 +31,7 @@ def draw_harmonics(numbers: HarmonicsOfFriction, file: Path) -> None:
     """Figure 5.5.1."""
     with picture(file, 7.4, 2.9) as figure:
         left, right = figure.subplots(1, 2)
-        for order, share, colour in zip(ORDERS, numbers.shares, SHADES, strict=False):
+        for order, share, colour in zip(CASE.harmonics, numbers.shares, SHADES, strict=False):
             hundred = Series(share.x, 100.0 * share.y, share.plant_x, 100.0 * share.plant_y)
             line_and_exact(left, hundred, colour, f"{order:g}.")
         left.set(title="a) harmonics of the velocity", xlabel=r"$\gamma$", ylabel="over the fundamental [%]")

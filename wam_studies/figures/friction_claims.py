@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.series import Numbers, Series
 from wam_theory.describing_function import predicted_unstable_cycle, unstable_cycle
 from wam_theory.guidelines import kept_contact_ratio
@@ -17,19 +18,15 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, assess, simu
 from wam_theory.stiction import slip_overshoot, stiction_cycle_period
 from wam_theory.stiction_start import asymmetric_period_ratio, asymmetry_decay
 
-STIFFNESS, STATIC = 2.0, 1.3  # k_tr = k_c; F_static where there is stiction
-ZETAS = (0.02, 0.25, 0.6)
-ORDERS = (3.0, 5.0, 7.0)
-
 
 def node_of(zeta: float, static: float) -> FrictionNode:
     """The node with this damping and static friction."""
-    return FrictionNode(1.0, 4.0 * zeta, STIFFNESS, STIFFNESS, 1.0, static)
+    return FrictionNode(1.0, 4.0 * zeta, CASE.stiffness, CASE.stiffness, 1.0, static)
 
 
 def gain_of(gamma: float, zeta: float) -> float:
     """G_I of this gamma."""
-    return gamma * float(routh_gain(1.0, 4.0 * zeta, STIFFNESS, STIFFNESS))
+    return gamma * float(routh_gain(1.0, 4.0 * zeta, CASE.stiffness, CASE.stiffness))
 
 
 class AsymmetricStart(NamedTuple):
@@ -49,15 +46,15 @@ def asymmetric_start(number: float = 0.002, slips: int = 800) -> AsymmetricStart
     slips : of the response.
     """
     asymmetry, period = [], []
-    for zeta in ZETAS:
-        node, gain = node_of(zeta, STATIC), 2.0 * number
-        jump = 0.5 * (STATIC - 1.0) * float(slip_overshoot(zeta))
+    for zeta in CASE.zetas:
+        node, gain = node_of(zeta, CASE.static_friction), 2.0 * number
+        jump = 0.5 * (CASE.static_friction - 1.0) * float(slip_overshoot(zeta))
         times, errors = standstills(node, gain, 0.9 * jump, slips)
         keep = 1.0 - float(asymmetry_decay(number, zeta))
         measured = np.abs(errors[1:] + errors[:-1]) / 2.0 / jump
         n = np.arange(float(len(measured)))
         asymmetry.append(Series(n, measured[0] * keep**n, n[::25], measured[::25]))
-        symmetric = float(stiction_cycle_period(gain, STIFFNESS, STIFFNESS, STATIC, 1.0, zeta))
+        symmetric = float(stiction_cycle_period(gain, CASE.stiffness, CASE.stiffness, CASE.static_friction, 1.0, zeta))
         predicted = asymmetric_period_ratio(jump * (0.5 + measured[0] * keep**n), jump)[:-1]
         cycles = (times[2:] - times[:-2]) / symmetric
         period.append(Series(n[:-1] / 2.0, predicted, (n[:-1] / 2.0)[::25], cycles[::25]))
@@ -101,7 +98,7 @@ def harmonics_of_friction(zeta: float = 0.25) -> HarmonicsOfFriction:
     """Harmonics that the describing function neglects, and the cycles it has and has not."""
     gamma = 1.0 + np.geomspace(0.02, float(gamma_3(zeta)) - 1.001, 60)
     gain = np.array([gain_of(value, zeta) for value in gamma])
-    rest = (1.0, 4.0 * zeta, STIFFNESS, STIFFNESS)
+    rest = (1.0, 4.0 * zeta, CASE.stiffness, CASE.stiffness)
     predicted = predicted_unstable_cycle(gain, *rest, 1.0)
     some = np.arange(3, 60, 8)
     spectra = [_spectrum(gain[i], zeta, float(predicted.frequency[i])) for i in some]
@@ -112,7 +109,7 @@ def harmonics_of_friction(zeta: float = 0.25) -> HarmonicsOfFriction:
             gamma[some],
             np.array([spectrum[int(order)] / spectrum[1] for spectrum in spectra]),
         )
-        for order in ORDERS
+        for order in CASE.harmonics
     )
     stable_gamma = np.array([0.3, 0.5, 0.7, 0.9, 1.05, 1.2])
     small, large = (np.array([_settled(value, zeta, step) for value in stable_gamma]) for step in (0.01, 1.0))
@@ -122,7 +119,7 @@ def harmonics_of_friction(zeta: float = 0.25) -> HarmonicsOfFriction:
 
 def _settled(gamma: float, zeta: float, step: float) -> float:
     """Amplitude of F_c of the cycle after a step, NaN if it is none."""
-    found = assess(node_of(zeta, STATIC), IntegralLoop(gain_of(gamma, zeta)), step)
+    found = assess(node_of(zeta, CASE.static_friction), IntegralLoop(gain_of(gamma, zeta)), step)
     return 0.5 * found.peak_to_peak
 
 
@@ -131,7 +128,7 @@ def _spectrum(gain: float, zeta: float, frequency: float) -> Numbers:
 
     The periodic motion from the state matrices: x(T/2) = -x(0).
     """
-    state = np.array([[0.0, 1.0, 0.0], [-4.0, -4.0 * zeta, STIFFNESS], [-gain * STIFFNESS, 0.0, 0.0]])
+    state = np.array([[0.0, 1.0, 0.0], [-4.0, -4.0 * zeta, CASE.stiffness], [-gain * CASE.stiffness, 0.0, 0.0]])
     count = 2048
     values, vectors = np.linalg.eig(np.block([[state, np.array([[0.0], [-1.0], [0.0]])], [np.zeros((1, 4))]]))
     step = (vectors @ np.diag(np.exp(values * np.pi / frequency / count)) @ np.linalg.inv(vectors)).real
@@ -155,13 +152,13 @@ class KeptContact(NamedTuple):
 def kept_contact() -> KeptContact:
     """Closed form, and bisection on the exact response."""
     series = []
-    for zeta in ZETAS[1:]:
+    for zeta in CASE.zetas[1:]:
         last = float(gamma_3(zeta))
         gamma = np.linspace(0.75, 0.98 * last, 120)
         points = np.linspace(0.8, 0.95 * last, 7)
         found = np.array([_largest_step_down(value, zeta) for value in points])
         series.append(Series(gamma, kept_contact_ratio(gamma, zeta), points, found))
-    return KeptContact(ZETAS[1:], tuple(series))
+    return KeptContact(CASE.zetas[1:], tuple(series))
 
 
 def _largest_step_down(gamma: float, zeta: float) -> float:
@@ -169,7 +166,7 @@ def _largest_step_down(gamma: float, zeta: float) -> float:
     node, loop, desired = node_of(zeta, 1.0), IntegralLoop(gain_of(gamma, zeta)), 1e-3
 
     def lowest(ratio: float) -> float:
-        x = ratio * desired / STIFFNESS
+        x = ratio * desired / CASE.stiffness
         motion = simulate(node, loop, desired, 1e9, (x, 0.0, 2.0 * x), max_events=12)
         return min(event.contact_force for event in motion.events)
 

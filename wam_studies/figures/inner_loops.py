@@ -14,16 +14,12 @@ import numpy as np
 from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_driver.plant import Plant
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panels, ThesisPanel
 from wam_studies.figures.series import Numbers, Series
 from wam_studies.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
-
-PERIOD, SUBSTEPS = 1e-3, 500  # the plant gives a torque half a substep early, which counts near the largest gain
-CONTACT = 1464.28  # N m/rad
-HALF = 0.5  # of the largest stable gain
-TOP = 1e3  # scale at which the search of the largest gain begins
 
 
 class InnerLoop(NamedTuple):
@@ -66,7 +62,7 @@ def damped_testbed(stiffness: float = 1.0) -> Arm:
     )
 
 
-def period_map(arm: Arm, contact: float = CONTACT) -> tuple[Numbers, Numbers]:
+def period_map(arm: Arm, contact: float = CASE.contact) -> tuple[Numbers, Numbers]:
     """State after a period from the state, (4, 4), and from a held motor torque, (4, 1), by theory.
 
     Parameters
@@ -79,12 +75,12 @@ def period_map(arm: Arm, contact: float = CONTACT) -> tuple[Numbers, Numbers]:
     d = circuit.damping * np.outer(along, along)
     d += np.diag([arm.motors.viscous_friction[0], arm.joints.viscous_friction[0]])
     rate = np.block([[np.zeros((2, 2)), np.eye(2)], [-k / inertia[:, None], -d / inertia[:, None]]])
-    return zero_order_hold(rate, np.array([[0.0], [0.0], [1.0 / inertia[0]], [0.0]]), PERIOD)
+    return zero_order_hold(rate, np.array([[0.0], [0.0], [1.0 / inertia[0]], [0.0]]), CASE.period)
 
 
 def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
     """The same by stepping the plant from each unit state and under a unit torque."""
-    plant = released_plant(arm, against_spring(CONTACT), PERIOD / SUBSTEPS)
+    plant = released_plant(arm, against_spring(CASE.contact), CASE.period / CASE.substeps)
     small, torque = 1e-6 * np.eye(4), 1e-3
     columns = [_after(plant, state, 0.0) / 1e-6 for state in small]
     return np.array(columns).T, _after(plant, np.zeros(4), torque)[:, None] / torque
@@ -92,7 +88,7 @@ def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
 
 def _after(plant: Plant, state: Numbers, torque: float) -> Numbers:
     plant.data.qpos[:], plant.data.qvel[:] = state[:2], state[2:]
-    for _ in range(SUBSTEPS):
+    for _ in range(CASE.substeps):
         plant.step([torque])
     found: Numbers = np.concatenate([plant.data.qpos, plant.data.qvel])
     return found
@@ -101,15 +97,15 @@ def _after(plant: Plant, state: Numbers, torque: float) -> Numbers:
 def largest_gain(maps: tuple[Numbers, Numbers], gain: Numbers) -> float:
     """Largest scale of the gain at which the sampled loop is stable."""
     state, inlet = maps
-    return largest_scale(lambda scale: is_stable(state - scale * inlet * gain), TOP)
+    return largest_scale(lambda scale: is_stable(state - scale * inlet * gain), CASE.first_gain_scale)
 
 
 def left_of_disturbance(maps: tuple[Numbers, Numbers], gain: Numbers, frequency: Numbers) -> Numbers:
     """Amplitude of F_c over that of a torque at the motor, held over each period, frequency in Hz."""
     state, inlet = maps
     closed = state - inlet * gain
-    z = np.exp(2j * np.pi * frequency * PERIOD)
-    found: Numbers = CONTACT * np.abs([np.linalg.solve(v * np.eye(4) - closed, inlet[:, 0])[1] for v in z])
+    z = np.exp(2j * np.pi * frequency * CASE.period)
+    found: Numbers = CASE.contact * np.abs([np.linalg.solve(v * np.eye(4) - closed, inlet[:, 0])[1] for v in z])
     return found
 
 
@@ -124,7 +120,7 @@ def _attenuation() -> ThesisPanel:
     frequency, some = np.geomspace(0.3, 100.0, 400), np.array([0.5, 2.0, 5.0, 20.0, 50.0])
     gains = {"none": np.zeros(4)}
     for loop in LOOPS:
-        gains[loop.name] = HALF * largest_gain(theory, loop.gain(arm)) * loop.gain(arm)
+        gains[loop.name] = CASE.gain_share * largest_gain(theory, loop.gain(arm)) * loop.gain(arm)
     lines = [
         (
             name,

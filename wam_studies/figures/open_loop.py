@@ -14,18 +14,11 @@ from wam_description.transmission_map import TransmissionMap
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panels, ThesisPanel, line_only
 from wam_studies.figures.series import Numbers, Series
 from wam_studies.plant.ideal_testbed import EMPTY
 
-RIPPLE, FRICTION, DEADBAND = 0.02, 0.01, 0.005  # of the torque; of the continuous torque: 1.5 % together (2.1.1)
-CONTACT = 2000.0  # N/m at the tip, in every direction
-COGGING, CYCLES = 0.5, 24  # part of the motor's friction that is cogging, assumed; 8 poles, 3 phases
-KNOWN = 0.9  # of friction and cogging, that is fed forward
-SHARES = 1.0, 0.1  # of the largest steady force
-POSES, SEED = 60, 11
-STEP, RISE, REST = 5e-4, 0.6, 0.3  # s
-SINGULAR = 0.15  # m, least singular value of the tip's Jacobian of a pose that counts
 Pushes = list[tuple[tuple[float, ...], Numbers]]
 
 
@@ -44,19 +37,19 @@ class OpenLoopArm:
         arm, driver = configuration.shared.arm, configuration.node("driver", DriverParameters)
         continuous, none = np.array(arm.motors.continuous_torque), (0.0,) * len(arm.joints.names)
         measured = np.array(arm.motors.static_friction)
-        friction = FRICTION * continuous if quiet else (1.0 - COGGING) * measured
+        friction = CASE.friction_share * continuous if quiet else (1.0 - CASE.cogging) * measured
         level = tuple(friction.tolist())
         motors, joints = replace(arm.motors, static_friction=level, dynamic_friction=level), arm.joints
         if quiet:
             joints = replace(joints, static_friction=none, dynamic_friction=none)
         self.arm: Arm = replace(arm, motors=motors, joints=joints, gravity=(0.0, 0.0, 0.0))
-        self._cogging = np.zeros(len(none)) if quiet else COGGING * measured
+        self._cogging = np.zeros(len(none)) if quiet else CASE.cogging * measured
         self._fed_forward = fed_forward
-        amplitude, cycles = tuple(self._cogging.tolist()), (CYCLES,) * len(none)
+        amplitude, cycles = tuple(self._cogging.tolist()), (CASE.cogging_cycles,) * len(none)
         self._ripples = Ripples(arm.motors.names, (1.0,) * len(none), amplitude, cycles, none)
         constant = np.array(arm.motors.torque_constant)
-        currents = tuple((DEADBAND * continuous / constant).tolist())
-        ripples = (RIPPLE,) * len(currents)
+        currents = tuple((CASE.deadband * continuous / constant).tolist())
+        ripples = (CASE.ripple,) * len(currents)
         self._amplifier_parameters = replace(driver.amplifier, deadband=currents, torque_ripple=ripples)
         self._constant = constant
         self._to_motors = TransmissionMap.of(self.arm).joint_from_motor.T
@@ -72,23 +65,28 @@ class OpenLoopArm:
         """
         arm, n = self.arm, len(q)
         start = replace(arm, joints=replace(arm.joints, start=q))
-        plant = Plant(start, EMPTY, replace(no_effects(start), ripples=self._ripples), STEP)
+        plant = Plant(start, EMPTY, replace(no_effects(start), ripples=self._ripples), CASE.open_loop_step)
         plant.brake(False)
         amplifier = Amplifier(start.motors, self._amplifier_parameters, np.random.default_rng(0))
         jacobian = self._body.tool_jacobian(q)
-        stiffness = CONTACT * jacobian.T @ jacobian
-        damping = 2.0 * 0.3 * np.sqrt(CONTACT * 2.0) * jacobian.T @ jacobian
+        stiffness = CASE.contact_at_tip * jacobian.T @ jacobian
+        damping = 2.0 * 0.3 * np.sqrt(CASE.contact_at_tip * 2.0) * jacobian.T @ jacobian
         torque = self._to_motors @ jacobian.T @ force
         friction = self._fed_forward * np.sign(torque) * start.motors.static_friction
-        rising, at_rest = round(RISE / STEP), round(REST / STEP)
+        rising, at_rest = (
+            round(CASE.rise / CASE.open_loop_step),
+            round(CASE.rest / CASE.open_loop_step),
+        )
         for i in range(rising + at_rest):
             share = 0.5 - 0.5 * np.cos(np.pi * min(1.0, i / rising))
-            cogging = self._fed_forward * self._cogging * np.sin(CYCLES * np.array(plant.theta))
-            currents = amplifier.step(((share * torque + friction - cogging) / self._constant).tolist(), STEP)
+            cogging = self._fed_forward * self._cogging * np.sin(CASE.cogging_cycles * np.array(plant.theta))
+            currents = amplifier.step(
+                ((share * torque + friction - cogging) / self._constant).tolist(), CASE.open_loop_step
+            )
             away, speed = np.array(plant.q) - q, np.array(plant.qd)
             plant.data.qfrc_applied[n : 2 * n] = -stiffness @ away - damping @ speed
             plant.step(amplifier.torque(currents, plant.theta))
-        reached = CONTACT * jacobian @ (np.array(plant.q) - q)
+        reached = CASE.contact_at_tip * jacobian @ (np.array(plant.q) - q)
         unit = force / np.linalg.norm(force)
         return float(unit @ reached - np.linalg.norm(force))
 
@@ -102,21 +100,21 @@ class OpenLoopArm:
         weights = np.linalg.solve(jacobian @ jacobian.T, jacobian).T @ unit
         motors, joints = self.arm.motors, self.arm.joints
         torque = np.abs(self._to_motors @ jacobian.T @ force)
-        at_motor = RIPPLE * torque + motors.static_friction + self._cogging
-        at_motor += DEADBAND * np.array(motors.continuous_torque)
+        at_motor = CASE.ripple * torque + motors.static_friction + self._cogging
+        at_motor += CASE.deadband * np.array(motors.continuous_torque)
         through = np.linalg.inv(self._to_motors) * at_motor  # columns: joint torques that each motor lacks
         return float(np.abs(weights) @ joints.static_friction + np.abs(weights @ through).sum())
 
     def pushes(self) -> Pushes:
         """Random poses, and the force in a random direction that takes the continuous torque of one motor."""
-        random, joints = np.random.default_rng(SEED), self.arm.joints
+        random, joints = np.random.default_rng(CASE.open_loop_seed), self.arm.joints
         found: Pushes = []
-        while len(found) < POSES:
+        while len(found) < CASE.open_loop_poses:
             q = tuple(random.uniform(joints.lower, joints.upper).tolist())
             unit = random.normal(size=3)
             unit /= np.linalg.norm(unit)
             jacobian = self._body.tool_jacobian(q)
-            if np.linalg.svd(jacobian)[1][-1] > SINGULAR:
+            if np.linalg.svd(jacobian)[1][-1] > CASE.singular:
                 needed = np.abs(self._to_motors @ jacobian.T @ unit) / self.arm.motors.continuous_torque
                 found.append((q, unit / needed.max()))
         return found
@@ -128,17 +126,20 @@ def open_loop() -> Panels:
     panels = []
     for title, arm in (("a) motors of 2.1.1 alone", OpenLoopArm(True)), ("b) the arm of 7.2.2", OpenLoopArm(False))):
         lines = []
-        for share in SHARES:
+        for share in CASE.force_shares:
             bounds, errors = (_sorted(of, pushes, share) for of in (arm.bound, arm.error))
             lines.append((f"worst, {100 * share:g} % of that force", Series(bounds, _parts(), errors, _parts())))
         panels.append(_panel(title, lines))
-    plain, known = lines[-1][1].plant_x, _sorted(OpenLoopArm(False, KNOWN).error, pushes, SHARES[-1])
+    plain, known = (
+        lines[-1][1].plant_x,
+        _sorted(OpenLoopArm(False, CASE.fed_forward).error, pushes, CASE.force_shares[-1]),
+    )
     both = [("0 % fed forward", line_only(plain, _parts())), ("90 % fed forward", line_only(known, _parts()))]
     return (*panels, _panel("c) feed-forward, 10 % of that force", both))
 
 
 def _parts() -> Numbers:
-    parts: Numbers = (np.arange(POSES) + 0.5) / POSES
+    parts: Numbers = (np.arange(CASE.open_loop_poses) + 0.5) / CASE.open_loop_poses
     return parts
 
 

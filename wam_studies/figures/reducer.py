@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from wam_description.arm import Arm
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panels, ThesisPanel
 from wam_studies.figures.series import Numbers, Series
 from wam_studies.plant.force_response import loop_plant
@@ -21,8 +22,6 @@ from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import bandwidth_by_reducer_position, position_bandwidth, torque_amplification
 
 HZ = 0.5 / np.pi
-CONTACT = 1464.28  # N m/rad, 10 lb/in at the tip
-SPEED_CHANGE = 0.5  # s, in which the link comes to rest under its damping
 
 
 def line_of(ratio: float, share: float, rotor: float | None = IMMOVABLE, thinner: float = 1.0) -> Arm:
@@ -57,7 +56,7 @@ def static_stiffness(arm: Arm, torque: float = 5.0) -> float:
     arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
     plant = released_plant(arm)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
-    for _ in range(round(SPEED_CHANGE / STEP)):
+    for _ in range(round(CASE.speed_change / STEP)):
         plant.step([0.0])
     while abs(plant.qd[0]) > 1e-7:
         plant.step([0.0])
@@ -72,14 +71,14 @@ def link_frequency(arm: Arm) -> float:
 
 def force_amplitude(arm: Arm, frequencies: Numbers) -> Numbers:
     """Amplitude of F_c over that of the motor's torque, from the plant's steps out of rest; frequencies in rad/s."""
-    plant = loop_plant(arm, CONTACT)
+    plant = loop_plant(arm, CASE.contact)
     state = one_step_map(plant)
     plant.data.qpos[:], plant.data.qvel[:] = 0.0, 0.0
     plant.step([1e-3])
     inlet = np.concatenate([plant.data.qpos, plant.data.qvel]) / 1e-3
     z = np.exp(1j * frequencies * STEP)
     found = np.array([np.linalg.solve(value * np.eye(4) - state, inlet)[1] for value in z])
-    amplitude: Numbers = CONTACT * np.abs(found)
+    amplitude: Numbers = CASE.contact * np.abs(found)
     return amplitude
 
 
@@ -119,7 +118,7 @@ def _torque() -> ThesisPanel:
     lines = []
     for thinner, label in ((1.0, "cable of the testbed"), (0.1, "a tenth of its stiffness")):
         arm = line_of(RATIO, 1.0, None, thinner)
-        own = (arm.motors.inertia[0], link_inertia(arm), arm.circuits[0].stiffness, CONTACT, RATIO)
+        own = (arm.motors.inertia[0], link_inertia(arm), arm.circuits[0].stiffness, CASE.contact, RATIO)
         frequency = 2.0 * np.pi * np.linspace(0.5, 60.0, 400)
         line = torque_amplification(1j * frequency, *own)
         measured = RATIO / force_amplitude(arm, some)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.series import Numbers, Series
 from wam_studies.plant.force_response import PlantResponse, force_step
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
@@ -15,11 +16,6 @@ from wam_theory.friction_model import IntegralLoop
 from wam_theory.linear_loop import integral_time_constant, proportional_error, routh_gain, series_stiffness
 from wam_theory.regimes import gamma_3
 from wam_theory.stick_slip import Kind, Trajectory, inertialess_staircase, simulate
-
-CONTACT = 1464.28  # k_c, N m/rad
-DESIRED = 20.0  # F_des, N m
-STAIRS = 7.0  # F_des of figure 5.5, N m
-FRICTION = 18.5  # F_friction of figures 5.9 and 5.11, N m: above 0.88 F_des the node sticks after every half cycle
 
 
 class SimpleResponses(NamedTuple):
@@ -62,7 +58,7 @@ def _stiffness() -> tuple[float, float, float]:
     """J_l, k_tr and natural frequency of the node, at the joint."""
     arm = ideal_testbed()
     inertia, ktr = link_inertia(arm), RATIO**2 * arm.circuits[0].stiffness
-    return inertia, ktr, float(np.sqrt((ktr + CONTACT) / inertia))
+    return inertia, ktr, float(np.sqrt((ktr + CASE.contact) / inertia))
 
 
 def _points(values: Numbers, count: int) -> Numbers:
@@ -79,20 +75,20 @@ def _series(found: PlantResponse, plant: Numbers, exact: Trajectory, line: str, 
 def simple_responses() -> SimpleResponses:
     """Step responses without friction; heavy damping and slow gains make the node nearly inertialess."""
     inertia, ktr, natural = _stiffness()
-    stiffness, seconds = float(series_stiffness(ktr, CONTACT)), 1.5
+    stiffness, seconds = float(series_stiffness(ktr, CASE.contact)), 1.5
     critical = 2.0 * inertia * natural
     gains = 3.0 / stiffness, 5.0 / stiffness  # G_P K = 3; 1/tau = 5 1/s
     none = (0.0, 0.0)
-    jump = force_step(DESIRED, CONTACT, gains[0], critical, none, seconds, proportional=True)
-    slow = force_step(DESIRED, CONTACT, gains[1], 0.2 * critical, none, seconds)
-    error = float(proportional_error(DESIRED, gains[0], stiffness))
+    jump = force_step(CASE.desired, CASE.contact, gains[0], critical, none, seconds, proportional=True)
+    slow = force_step(CASE.desired, CASE.contact, gains[1], 0.2 * critical, none, seconds)
+    error = float(proportional_error(CASE.desired, gains[0], stiffness))
     tau = float(integral_time_constant(gains[1], stiffness))
     times = np.linspace(0.0, seconds, 400)
-    level = np.array([0.0, DESIRED - error, DESIRED - error])
+    level = np.array([0.0, CASE.desired - error, CASE.desired - error])
     after = jump.time > 0.1  # s, transient of the inertia
     return SimpleResponses(
         Series(np.array([0.0, 0.0, seconds]), level, _points(jump.time[after], 20), _points(jump.force[after], 20)),
-        Series(times, DESIRED * (1.0 - np.exp(-times / tau)), _points(slow.time, 24), _points(slow.force, 24)),
+        Series(times, CASE.desired * (1.0 - np.exp(-times / tau)), _points(slow.time, 24), _points(slow.force, 24)),
         error,
         tau,
     )
@@ -101,9 +97,9 @@ def simple_responses() -> SimpleResponses:
 def staircase() -> StaircaseResponse:
     """Step response with stiction, with a nearly inertialess node."""
     gain, seconds, friction = 2e-3, 12.0, (6.0, 3.0)
-    found = force_step(STAIRS, CONTACT, gain, 24.0, friction, seconds)
-    exact = simulate(found.node, IntegralLoop(gain), STAIRS, seconds)
-    steps = inertialess_staircase(found.node, gain, STAIRS, 60)
+    found = force_step(CASE.stairs, CASE.contact, gain, 24.0, friction, seconds)
+    exact = simulate(found.node, IntegralLoop(gain), CASE.stairs, seconds)
+    steps = inertialess_staircase(found.node, gain, CASE.stairs, 60)
     shown = steps.times <= seconds
     times, forces = steps.times[shown], steps.contact_forces[shown]
     corners = np.concatenate([[0.0], np.repeat(times, 2), [seconds]])
@@ -122,9 +118,17 @@ def coulomb_response() -> CoulombResponse:
     gamma, zeta, seconds = 1.5, 0.25, 2.0
     inertia, ktr, natural = _stiffness()
     damping = 2.0 * zeta * inertia * natural
-    gain = gamma * float(routh_gain(inertia, damping, ktr, CONTACT))
-    found = force_step(DESIRED, CONTACT, gain, damping, (FRICTION, FRICTION), seconds, step=5e-5)
-    exact = simulate(found.node, IntegralLoop(gain), DESIRED, seconds)
+    gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
+    found = force_step(
+        CASE.desired,
+        CASE.contact,
+        gain,
+        damping,
+        (CASE.friction, CASE.friction),
+        seconds,
+        step=5e-5,
+    )
+    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
     motion = exact.at(np.union1d(np.linspace(0.0, seconds, 4000), [event.time for event in exact.events]))
     shown = np.unique(np.geomspace(100.0, len(found.time) - 1.0, 110).astype(int))  # sticking times grow
     return CoulombResponse(
@@ -143,14 +147,17 @@ def lost_contact() -> LostContact:
     gamma = 1.15 * float(gamma_3(zeta))
     inertia, ktr, natural = _stiffness()
     damping = 2.0 * zeta * inertia * natural
-    gain = gamma * float(routh_gain(inertia, damping, ktr, CONTACT))
+    gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
     seconds, step = 6.0, 1e-4
-    found = force_step(DESIRED, CONTACT, gain, damping, (6.0, 6.0), seconds, unilateral=True, step=step)
-    exact = simulate(found.node, IntegralLoop(gain), DESIRED, seconds)
+    found = force_step(CASE.desired, CASE.contact, gain, damping, (6.0, 6.0), seconds, unilateral=True, step=step)
+    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
     contacts = [event.time for event in exact.events if event.kind is Kind.SWITCH and event.sign > 0]
     motion = exact.at(np.linspace(contacts[-2], contacts[-1], 3000))
     late = slice(-round((contacts[-1] - contacts[-2]) / step), None)
     cycle = Series(
-        CONTACT * motion.x, motion.v, _points(CONTACT * found.position[late], 60), _points(found.velocity[late], 60)
+        CASE.contact * motion.x,
+        motion.v,
+        _points(CASE.contact * found.position[late], 60),
+        _points(found.velocity[late], 60),
     )
     return LostContact(cycle, gamma, zeta)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.series import Numbers, Series
 from wam_studies.plant.force_response import force_step, loop_arm, loop_node, loop_plant
 from wam_studies.plant.ideal_testbed import RATIO
@@ -16,12 +17,6 @@ from wam_theory.friction_model import FrictionNode
 from wam_theory.linear_loop import routh_gain
 from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
-
-ZETA = 0.25  # J = b = K = 1 and k_tr = k_c, figure 5.7's "unity parameters"
-GAMMAS = (0.6, 1.5)  # of figure 5.7: linearly stable, linearly unstable
-STICTION = 1.3  # F_static/F_dynamic of the second bound of figure 5.8
-PLANT_GAMMAS = (1.2, 1.5, 1.75, 2.0, 2.1)
-FINE = 2e-5  # s, so that the plant's loop is continuous to 0.2 % of a radian
 
 
 class DescribingFunction(NamedTuple):
@@ -60,22 +55,22 @@ def _testbed(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> Frictio
 
 def describing_function() -> DescribingFunction:
     """Theory, and the plant's frequency response from its one-step map."""
-    node = _testbed(ZETA)
+    node = _testbed(CASE.unity_zeta)
     natural = float(np.sqrt(2.0 * node.contact_stiffness / node.inertia))
     omega, points = np.geomspace(0.05, 30.0, 4000), np.array([0.3, 0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0])
     curves = []
-    for gamma in GAMMAS:
+    for gamma in CASE.gammas:
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
         gain = gamma * float(routh_gain(node.inertia, node.damping, ktr, kc))
         line = node.damping * friction_to_velocity(1j * natural * omega, gain, node.inertia, node.damping, ktr, kc)
         plant = node.damping * _measured_response(node, gain, natural * points)
         curves.append(Series(line.real, line.imag, plant.real, plant.imag))
-    return DescribingFunction(GAMMAS, tuple(curves), -1.0 / (GAMMAS[1] - 1.0))
+    return DescribingFunction(CASE.gammas, tuple(curves), -1.0 / (CASE.gammas[1] - 1.0))
 
 
 def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
     """Velocity over a torque on the link with the loop closed, (frequencies,), from single steps of the plant."""
-    step, small = FINE, 1e-6
+    step, small = CASE.fine_step, 1e-6
     plant = loop_plant(loop_arm(node.damping, (0.0, 0.0)), node.contact_stiffness, step=step)
 
     def after(state: Numbers, torque: float) -> Numbers:
@@ -95,28 +90,28 @@ def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbe
 
 def stability_bound() -> StabilityBound:
     """The bound by exact events, and by bisection on the simulated plant."""
-    last = float(gamma_3(ZETA))
+    last = float(gamma_3(CASE.unity_zeta))
     gamma = 1.0 + np.geomspace(1e-3, last * (1.0 - 1e-6) - 1.0, 300)
     stiction_gamma = np.linspace(1.0005, last, 300)
-    steps = largest_stable_steps(stiction_gamma, ZETA, 1.0, STICTION)
+    steps = largest_stable_steps(stiction_gamma, CASE.unity_zeta, 1.0, CASE.stiction)
     held = steps > 0.0
-    plant = np.array([1.0 / plant_largest_step(value) for value in PLANT_GAMMAS])
+    plant = np.array([1.0 / plant_largest_step(value) for value in CASE.plant_gammas])
     others = []
     for zeta in (0.15, 0.5, 1.0):
         end = float(gamma_3(zeta))
         along = 1.0 + np.geomspace(1e-3, end * (1.0 - 1e-6) - 1.0, 200)
         others.append((zeta, along, 1.0 / largest_stable_steps(along, zeta)))
     return StabilityBound(
-        ZETA,
-        Series(gamma, 1.0 / largest_stable_steps(gamma, ZETA), np.array(PLANT_GAMMAS), plant),
+        CASE.unity_zeta,
+        Series(gamma, 1.0 / largest_stable_steps(gamma, CASE.unity_zeta), np.array(CASE.plant_gammas), plant),
         (stiction_gamma[held], 1.0 / steps[held]),
         last,
-        float(point_b(ZETA)),
+        float(point_b(CASE.unity_zeta)),
         tuple(others),
     )
 
 
-def plant_largest_step(gamma: float, zeta: float = ZETA, step: float = 6e-5) -> float:
+def plant_largest_step(gamma: float, zeta: float = CASE.unity_zeta, step: float = 6e-5) -> float:
     """F_error/F_friction of the largest step with a bounded response of the simulated plant; to 0.5 %.
 
     A response grows if its error in the third quarter of a second exceeds that in the second; at 13 Hz this

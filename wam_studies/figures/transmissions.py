@@ -16,6 +16,7 @@ from wam_description.world import World
 from wam_driver.driver import DriverParameters
 from wam_driver.friction import FrictionParameters
 from wam_driver.plant import Plant
+from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panels, ThesisPanel
 from wam_studies.figures.series import Series
 from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, against_spring, link_inertia, one_step_map
@@ -24,11 +25,6 @@ from wam_theory.resonance import force_resonances
 
 HZ = 0.5 / math.pi
 KINDS = {"cables": "", "shaft and gears": "shaft_and_gear", "direct drive": "direct_drive"}
-SHAFT = 79.3e9, 5.5682e-3, 0.920992366  # G, Pa; thickness and length, m
-MESHES, LOSS = 4, 0.015  # as set for the gears
-COUPLING = 163_300.0  # N m/rad, of the direct drive in the plant
-STEP, SHORT = 2.5e-4, 5e-5  # s
-SPEED = 0.3  # rad/s of the joint under load
 
 
 class Driven(NamedTuple):
@@ -92,7 +88,7 @@ def driven(kind: str) -> Driven:
         given = yaml.safe_load(packaged(f"experiments/sets/{KINDS[kind]}").read_text(encoding="utf-8"))
         configuration = configuration.with_values(given)
     driver = configuration.node("driver", DriverParameters)
-    step = SHORT if kind == "direct drive" else STEP
+    step = CASE.short_step if kind == "direct drive" else CASE.transmission_step
     return Driven(configuration.shared.arm, driver.effects, driver.friction, step)
 
 
@@ -119,8 +115,6 @@ ROWS = (
     ("mass of the motor, over that with cables", "{:.3g}"),
     ("heat at one torque, over that with cables", "{:.3g}"),
 )
-CONTACT = 1464.28  # N m/rad
-NEAR, FAR_OFF = 20.0, 40.0  # N m, two loads for stiffness and play
 
 
 def predicted(kind: str) -> TransmissionMeasures:
@@ -128,18 +122,18 @@ def predicted(kind: str) -> TransmissionMeasures:
     it = driven(kind)
     motors, joints, cables = it.arm.motors, it.arm.joints, it.arm.cables
     rotor = motors.inertia[0]
-    modulus, thickness, length = SHAFT
+    modulus, thickness, length = CASE.shaft
     rigid = {
         "cables": 14.0**2 * 2.0 * cables.stage_ea[0] / cables.stage_length[0] * cables.stage_radius[0] ** 2,
         "shaft and gears": 14.0**2 * modulus * math.pi * thickness**4 / 32.0 / length,
-        "direct drive": COUPLING,
+        "direct drive": CASE.coupling,
     }[kind]
-    lower = float(force_resonances(rotor, link_inertia(it.arm), rigid / it.ratio**2, CONTACT, it.ratio).lower)
+    lower = float(force_resonances(rotor, link_inertia(it.arm), rigid / it.ratio**2, CASE.contact, it.ratio).lower)
     losses = {
         "cables": stage_loss(
             motors.peak_torque[0], cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio
         ),
-        "shaft and gears": np.array([MESHES * LOSS]),
+        "shaft and gears": np.array([CASE.gear_meshes * CASE.mesh_loss]),
         "direct drive": np.zeros(1),
     }[kind]
     factor = it.friction.joint_load_factor[0]
@@ -159,12 +153,12 @@ def predicted(kind: str) -> TransmissionMeasures:
 def measured(kind: str) -> TransmissionMeasures:
     """On the plant; mass and heat of the motor are not measured."""
     it = driven(kind)
-    near, far = (_deflection(it, torque) for torque in (NEAR, FAR_OFF))
-    stiffness = (FAR_OFF - NEAR) / (far - near)
+    near, far = (_deflection(it, torque) for torque in (CASE.near_load, CASE.far_load))
+    stiffness = (CASE.far_load - CASE.near_load) / (far - near)
     return TransmissionMeasures(
         stiffness,
-        2.0 * (near - NEAR / stiffness),
-        HZ * bandwidth(it, CONTACT),
+        2.0 * (near - CASE.near_load / stiffness),
+        HZ * bandwidth(it, CASE.contact),
         _efficiency(it),
         _inertia(it),
         _breakaway(it),
@@ -200,7 +194,7 @@ def _efficiency(it: Driven) -> float:
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
     carried = load / (1.0 - it.friction.joint_load_factor[0])
     plant.data.qpos[1] = -(carried / it.stiffness + 0.5 * it.effects.play(0) / it.ratio)
-    plant.data.qvel[:] = (it.ratio * SPEED, SPEED)
+    plant.data.qvel[:] = (it.ratio * CASE.speed_under_load, CASE.speed_under_load)
     count = round(1.0 / it.step)
     for _ in range(count // 2):
         plant.step([0.0])

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -10,16 +12,25 @@ from wam_studies.thesis.recording import Forces, Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 
 NO_CLAIM = math.nan
-STEADY = 0.8  # s at the end of a step, taken as its steady state
-FORCE = 0.1  # of the commanded force
-SLIPPED = 0.15  # the same where friction along the link moves the estimated position
-STILL = 1e-3  # m, that a body moves at rest
-MOVING = 1e-3  # m/s above which a body slides
-MOVED = 0.05  # m, of a body that was swept along
-TOGETHER = 0.5  # of the angle before
-CLOSED_FORM = 0.03  # of the torque on the door
 
 Runs = Mapping[str, Recording]
+
+
+@dataclass(frozen=True)
+class TaskBounds:
+    """What the evaluations of the tasks allow, relative unless a unit is given."""
+
+    steady: float = 0.8  # s at the end of a step, taken as its steady state
+    force: float = 0.1  # of the commanded force
+    slipped: float = 0.15  # the same where friction along the link moves the estimated position
+    still: float = 1e-3  # m, that a body moves at rest
+    moving: float = 1e-3  # m/s above which a body slides
+    moved: float = 0.05  # m, of a body that was swept along
+    together: float = 0.5  # of the angle before
+    closed_form: float = 0.03  # of the torque on the door
+
+
+BOUNDS: Final = TaskBounds()
 
 
 def pushing(runs: Runs) -> Result:
@@ -28,13 +39,15 @@ def pushing(runs: Runs) -> Result:
     box, bodies = object_traces(run)["box"], world_of(run).bodies
     friction, weight = bodies.ground_friction[0], bodies.mass[0] * _gravity(run)
     press, push = run.step("press 4 N"), run.step("push the box")
-    pressed, pushed = box.late(press, STEADY), box.during(push.begin, push.end)
+    pressed, pushed = box.late(press, BOUNDS.steady), box.during(push.begin, push.end)
     slides = pushed.during(*_sliding(pushed))
     along, lift = float(slides.arm_force[:, 0].mean()), float(slides.arm_force[:, 2].mean())
     rows = [
-        Comparison("press 4 N, true force across", 4.0, _across(run, press), "N", SLIPPED, "commanded"),
-        Comparison("press 4 N, the box moves", 0.0, _moved(pressed), "m", STILL, "friction holds", True),
-        Comparison("horizontal force while it slides, mean", friction * (weight - lift), along, "N", FORCE, "mu N"),
+        Comparison("press 4 N, true force across", 4.0, _across(run, press), "N", BOUNDS.slipped, "commanded"),
+        Comparison("press 4 N, the box moves", 0.0, _moved(pressed), "m", BOUNDS.still, "friction holds", True),
+        Comparison(
+            "horizontal force while it slides, mean", friction * (weight - lift), along, "N", BOUNDS.force, "mu N"
+        ),
         Comparison("weight carried by the table", weight - lift, _mean_size(slides, 2), "N", 0.02, "m g - lift"),
         Comparison("distance pushed", NO_CLAIM, _moved(pushed), "m", NO_CLAIM),
         Comparison("aside of the push", 0.0, float(np.ptp(pushed.position[:, 1])), "m", 0.01, "straight", True),
@@ -49,12 +62,12 @@ def sweeping(runs: Runs) -> Result:
     objects, sweep, rest = object_traces(run), run.step("sweep"), run.step("rest")
     swept = {name: trace.during(sweep.begin, rest.end) for name, trace in objects.items()}
     before, after = (float(np.ptp(_angles(swept, at))) for at in (0, -1))
-    moved = sum(_moved(trace) > MOVED for trace in swept.values())
+    moved = sum(_moved(trace) > BOUNDS.moved for trace in swept.values())
     calm = max(float(np.linalg.norm(trace.velocity[-1])) for trace in swept.values())
     rows = [
         Comparison("objects that the link takes along", float(len(objects)), float(moved), "", 0.0, "all"),
         Comparison("angle about the base over all objects, before", NO_CLAIM, before, "rad", NO_CLAIM),
-        Comparison("the same, after, of that before", 0.0, after / before, "", TOGETHER, "together", True),
+        Comparison("the same, after, of that before", 0.0, after / before, "", BOUNDS.together, "together", True),
         Comparison("speed of the fastest, after", 0.0, calm, "m/s", 0.01, "at rest", True),
         Comparison("largest true force of the arm", NO_CLAIM, _largest(swept), "N", NO_CLAIM),
         *_estimate(run, sweep),
@@ -67,21 +80,23 @@ def holding(runs: Runs) -> Result:
     (run,) = runs.values()
     objects, bodies = object_traces(run), world_of(run).bodies
     press = run.step("press 15 N")
-    tube, shelf = objects["tube"], objects["shelf"].late(press, STEADY)
-    held = tube.late(press, STEADY)
+    tube, shelf = objects["tube"], objects["shelf"].late(press, BOUNDS.steady)
+    held = tube.late(press, BOUNDS.steady)
     weight = bodies.mass[0] * _gravity(run)
     squeeze, lift = -float(held.arm_force[:, 0].mean()), float(held.arm_force[:, 2].mean())
     carried = float((held.arm_force + held.other_force)[:, 2].mean())
     start, lowered = (objects[name].during(press.begin + 1.0, press.end) for name in ("tube", "shelf"))
     capacity = squeeze * (bodies.friction[0] + bodies.ground_friction[0])
     rows = [
-        Comparison("true force across the tube", 15.0, squeeze, "N", FORCE, "commanded"),
+        Comparison("true force across the tube", 15.0, squeeze, "N", BOUNDS.force, "commanded"),
         Comparison("weight carried by friction", weight, carried, "N", 0.02, "m g"),
         Comparison("of it by the link", NO_CLAIM, lift, "N", NO_CLAIM),
         Comparison("friction that is needed", NO_CLAIM, weight / capacity, "of what 15 N give", NO_CLAIM),
         Comparison("shelf lowered by", NO_CLAIM, float(np.ptp(objects["shelf"].position[:, 2])), "m", NO_CLAIM),
         Comparison("force of the shelf, after", 0.0, float(np.abs(shelf.other_force).max()), "N", 1e-6, "", True),
-        Comparison("the tube sinks", 0.0, float(np.ptp(start.position[:, 2])), "m", 2 * STILL, "friction holds", True),
+        Comparison(
+            "the tube sinks", 0.0, float(np.ptp(start.position[:, 2])), "m", 2 * BOUNDS.still, "friction holds", True
+        ),
         *_estimate(run, press),
     ]
     return Result(rows, [_forces(run, press.begin, press.end), _path({"tube": start, "shelf": lowered}, 2)])
@@ -96,16 +111,22 @@ def opening(runs: Runs) -> Result:
     turning = np.gradient(open_.angle, open_.time) > 0.02
     mean = float(predicted[turning].mean())
     error = float(np.sqrt(np.mean((torque - predicted)[turning] ** 2)))
-    held = door.late(hold, STEADY)
+    held = door.late(hold, BOUNDS.steady)
     rows = [
-        Comparison("torque on the hinge while it turns, mean", mean, float(torque[turning].mean()), "N m", CLOSED_FORM,
-                   "I a + d w + k phi + friction"),
+        Comparison(
+            "torque on the hinge while it turns, mean",
+            mean,
+            float(torque[turning].mean()),
+            "N m",
+            BOUNDS.closed_form,
+            "I a + d w + k phi + friction",
+        ),
         Comparison("the same, rms difference", 0.0, error, "N m", 0.05, "", True),
         Comparison("angle of the door, held", NO_CLAIM, float(held.angle.mean()), "rad", NO_CLAIM),
         Comparison("angle of the door, changes while held", 0.0, float(np.ptp(held.angle)), "rad", 0.01, "", True),
         Comparison("largest true force of the arm", NO_CLAIM, _largest({"door": open_}), "N", NO_CLAIM),
         *_estimate(run, step),
-    ]  # fmt: skip
+    ]
     curves = [
         Curve("measured", "true", open_.time, torque),
         Curve("predicted", "equation of motion", open_.time, predicted),
@@ -123,8 +144,8 @@ def following(runs: Runs) -> Result:
     force = _along(run.forces("sim/contact/wrench"), follow.begin + 1.0, follow.end)
     speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
     rows = [
-        Comparison("at rest, true force across", 10.0, _across(run, press), "N", FORCE, "commanded"),
-        Comparison("moving, mean", 10.0, float(force.mean()), "N", FORCE, "commanded"),
+        Comparison("at rest, true force across", 10.0, _across(run, press), "N", BOUNDS.force, "commanded"),
+        Comparison("moving, mean", 10.0, float(force.mean()), "N", BOUNDS.force, "commanded"),
         Comparison("moving, rms error", 0.0, float(np.sqrt(np.mean((force - 10.0) ** 2))), "N", 1.0, "", True),
         Comparison("moving, largest error", 0.0, float(np.abs(force - 10.0).max()), "N", 2.0, "", True),
         Comparison("time without contact", 0.0, float(np.mean(force == 0.0)), "of the time", 0.0, "never", True),
@@ -141,7 +162,7 @@ def _gravity(run: Recording) -> float:
 
 def _sliding(trace: ObjectTrace) -> tuple[float, float]:
     """The middle half of the time in which a body slides along x, s."""
-    moving = trace.time[np.abs(trace.velocity[:, 0]) > MOVING]
+    moving = trace.time[np.abs(trace.velocity[:, 0]) > BOUNDS.moving]
     if not len(moving):
         return math.nan, math.nan
     begin, end = float(moving[0]), float(moving[-1])
@@ -189,7 +210,7 @@ def _along(forces: Forces, begin: float, end: float) -> Numbers:
 
 
 def _across(run: Recording, step: Step) -> float:
-    return float(_along(run.forces("sim/contact/wrench"), step.end - STEADY, step.end).mean())
+    return float(_along(run.forces("sim/contact/wrench"), step.end - BOUNDS.steady, step.end).mean())
 
 
 def _estimate(run: Recording, step: Step) -> list[Comparison]:

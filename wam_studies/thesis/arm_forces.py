@@ -7,23 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_bag.bag import BagError, PointColumns
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Forces, Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 
-STEADY = 0.8  # s at the end of a press
-START = 0.5  # s of a slide before its evaluation
-FORCE = 0.05  # of the commanded force, at rest
-MOVING = 0.2  # of the commanded force, while sliding: friction reverses with the motion
-ESTIMATE = 0.05  # of the true force
-SMALLEST_ERROR = 0.4  # N of an estimate; a third of the standard deviation that the estimator states at 5 N
-POSITION = 0.04  # m
 NO_CONTACT = "base"  # frame of a contact wrench without contact
-LATENCY = 0.1  # s until a push is detected
-WRONG_LINK = 0.05  # of the time of a push, with another link or no detection
-PUSH = 0.15  # of the force of a push while the arm moves
-FORCE_ALONG = 0.1  # of the commanded force, at either end of the link
-CYCLE = 0.02  # of the force, peak to peak of a limit cycle
-SLIP = 0.2  # N; a joint that still slips once, by stiction, is no cycle
 
 
 class Along(NamedTuple):
@@ -42,23 +30,28 @@ def pressing(runs: Mapping[str, Recording]) -> Result:
     found = along(run)
     rows: list[Comparison] = []
     for step in _named(run, "press"):
-        late = (found.time > step.end - STEADY) & (found.time < step.end)
+        late = (found.time > step.end - BOUNDS.steady_press) & (found.time < step.end)
         force = float(found.commanded[late].mean())
         true = float(found.true[late].mean())
         estimated = float(found.estimated[late].mean())
         # the last half of that time: before it the joints may still stick and slip
-        rest = (found.time > step.end - 0.5 * STEADY) & (found.time < step.end)
+        rest = (found.time > step.end - 0.5 * BOUNDS.steady_press) & (found.time < step.end)
         rows += [
-            Comparison(f"{step.name}, true", force, true, "N", FORCE, "no error, 5.1.2"),
+            Comparison(f"{step.name}, true", force, true, "N", BOUNDS.force_at_rest, "no error, 5.1.2"),
             Comparison(
-                f"{step.name}, estimated", true, estimated, "N", max(ESTIMATE, SMALLEST_ERROR / force), "chapter 2"
+                f"{step.name}, estimated",
+                true,
+                estimated,
+                "N",
+                max(BOUNDS.estimate, BOUNDS.smallest_estimate_error / force),
+                "chapter 2",
             ),
             Comparison(
                 f"{step.name}, peak to peak",
                 0.0,
                 float(np.ptp(found.true[rest])),
                 "N",
-                max(CYCLE * force, SLIP),
+                max(BOUNDS.arm_cycle * force, BOUNDS.single_slip),
                 "no cycle",
                 True,
             ),
@@ -74,23 +67,25 @@ def sliding(runs: Mapping[str, Recording]) -> Result:
     steps = _named(run, "slide")
     rows: list[Comparison] = []
     for step in steps:
-        during = (found.time > step.begin + START) & (found.time < step.end)
+        during = (found.time > step.begin + BOUNDS.slide_start) & (found.time < step.end)
         force = float(found.commanded[during].mean())
         true = found.true[during]
         error = float(np.sqrt(np.mean((found.estimated[during] - true) ** 2)))
         rows += [
-            Comparison(f"{step.name}, true, mean", force, float(true.mean()), "N", FORCE, "no error, 5.1.2"),
+            Comparison(
+                f"{step.name}, true, mean", force, float(true.mean()), "N", BOUNDS.force_at_rest, "no error, 5.1.2"
+            ),
             Comparison(
                 f"{step.name}, largest error",
                 0.0,
                 float(np.abs(true - force).max()),
                 "N",
-                MOVING * force,
+                BOUNDS.force_sliding * force,
                 "",
                 True,
             ),
             Comparison(
-                f"{step.name}, error of the estimate, rms", 0.0, error, "N", ESTIMATE * force, "chapter 2", True
+                f"{step.name}, error of the estimate, rms", 0.0, error, "N", BOUNDS.estimate * force, "chapter 2", True
             ),
         ]
     rows.append(_position(run, steps))
@@ -105,12 +100,14 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
     for name, run in runs.items():
         found, place = along(run), float(run.parameters.node("force_loop")["contact_position"])
         for step in _named(run, "press"):
-            late = (found.time > step.end - STEADY) & (found.time < step.end)
+            late = (found.time > step.end - BOUNDS.steady_press) & (found.time < step.end)
             force, true = float(found.commanded[late].mean()), found.true[late]
             label = f"{name}, {step.name} at {place:.2f} m"
             rows += [
-                Comparison(f"{label}, true", force, float(true.mean()), "N", FORCE_ALONG, "7.3"),
-                Comparison(f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", FORCE_ALONG * force, "", True),
+                Comparison(f"{label}, true", force, float(true.mean()), "N", BOUNDS.force_along_link, "7.3"),
+                Comparison(
+                    f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", BOUNDS.force_along_link * force, "", True
+                ),
             ]
         panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
     return Result(rows, panels)
@@ -149,10 +146,10 @@ def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
     for step in steps:
         means = []
         for time, position in (true, estimated):
-            late = (time > step.end - STEADY) & (time < step.end)
+            late = (time > step.end - BOUNDS.steady_press) & (time < step.end)
             means.append(float(np.nanmean(position[late])))
         errors.append(abs(means[1] - means[0]))
-    return Comparison("position error, worst step", 0.0, max(errors), "m", POSITION, "chapter 2", True)
+    return Comparison("position error, worst step", 0.0, max(errors), "m", BOUNDS.position, "chapter 2", True)
 
 
 def _positions(run: Recording, topic: str) -> tuple[Numbers, Numbers]:
@@ -187,30 +184,34 @@ def pushed(runs: Mapping[str, Recording]) -> Result:
     begin, end = float(pushing[0]), float(pushing[-1])
     right = np.array([frame == link for frame in estimate.frames])
     first = estimate.time[right & (estimate.time >= begin)]
-    during = (estimate.time > begin + LATENCY) & (estimate.time <= end)
+    during = (estimate.time > begin + BOUNDS.latency) & (estimate.time <= end)
     correct = float(np.mean(right[during]))
     true = float(np.linalg.norm(truth.force[in_contact], axis=1).mean())
     estimated = float(np.linalg.norm(estimate.force[during & right], axis=1).mean())
     positions = [
-        float(np.nanmedian(position[(time > begin + LATENCY) & (time <= end)]))
+        float(np.nanmedian(position[(time > begin + BOUNDS.latency) & (time <= end)]))
         for time, position in (_positions(run, "sim/contact/point"), _positions(run, "contact/point"))
     ]
     quiet = estimate.time < begin
     before = float(np.mean([bool(frame) and frame != NO_CONTACT for frame in np.array(estimate.frames)[quiet]]))
     rows = [
-        Comparison("detections before the push, fraction of the time", 0.0, before, "", WRONG_LINK, "chapter 2", True),
+        Comparison(
+            "detections before the push, fraction of the time", 0.0, before, "", BOUNDS.wrong_link, "chapter 2", True
+        ),
         Comparison(
             "detection latency",
             0.0,
             float(first[0]) - begin if len(first) else math.nan,
             "s",
-            LATENCY,
+            BOUNDS.latency,
             "chapter 2",
             True,
         ),
-        Comparison(f"detection on {link}, fraction of the time after that", 1.0, correct, "", WRONG_LINK, "chapter 2"),
-        Comparison("force, mean", true, estimated, "N", PUSH, "chapter 2"),
-        Comparison("position, median", positions[0], positions[1], "m", POSITION, "chapter 2", True),
+        Comparison(
+            f"detection on {link}, fraction of the time after that", 1.0, correct, "", BOUNDS.wrong_link, "chapter 2"
+        ),
+        Comparison("force, mean", true, estimated, "N", BOUNDS.push_in_motion, "chapter 2"),
+        Comparison("position, median", positions[0], positions[1], "m", BOUNDS.position, "chapter 2", True),
     ]
     force = [np.linalg.norm(each.force, axis=1) for each in (truth, estimate)]
     curves = [

@@ -6,15 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_description.arm import Arm
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 from wam_theory import cable
-
-WITHIN = 0.02
-ROUNDING = 1e-6  # s
-LEFT = 0.05  # of the creep, that is left of it: friction and acceleration of the rotor count as load
-OWN_TORQUE = 0.02  # of the creep, its deviation from (6.19)
-REST = 0.1  # s before the motor turns, to average a small oscillation of the link
 
 
 def efficiency(runs: Mapping[str, Recording]) -> Result:
@@ -30,7 +25,12 @@ def efficiency(runs: Mapping[str, Recording]) -> Result:
         measured = 1.0 - output_work / input_work
         rows.append(
             Comparison(
-                f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * measured, "%", WITHIN, "(6.15)"
+                f"power lost, {torque:.2f} N m at the motor",
+                100 * predicted,
+                100 * measured,
+                "%",
+                BOUNDS.within,
+                "(6.15)",
             )
         )
         torques.append(torque)
@@ -52,7 +52,7 @@ def work(run: Recording, lift: Step, after: Step) -> tuple[float, float, float]:
     load = load_torque(run, lift)
     ratio = run.shared.arm.joint_from_motor[0]
     motors, sensors, truth = run.joints("motor_states"), run.joints("joint_sensors"), run.joints("sim/joint_states")
-    begin, end = (int(np.searchsorted(motors.time, time)) for time in (lift.begin, after.end - ROUNDING))
+    begin, end = (int(np.searchsorted(motors.time, time)) for time in (lift.begin, after.end - BOUNDS.rounding))
     theta = motors.position[begin:end, 0]
     pull = ratio * np.interp(motors.time[begin:end], truth.time, truth.effort[:, 0])
     input_work = float(np.sum(0.5 * (pull[1:] + pull[:-1]) * np.diff(theta)))
@@ -63,7 +63,7 @@ def work(run: Recording, lift: Step, after: Step) -> tuple[float, float, float]:
 def load_torque(run: Recording, step: Step) -> float:
     """Torque of the push in a step at the joint, N m, positive against it."""
     push = run.forces("sim/disturbance")
-    during = (push.time >= step.begin) & (push.time < step.end - ROUNDING)
+    during = (push.time >= step.begin) & (push.time < step.end - BOUNDS.rounding)
     return -float(np.median(push.torque[during, 2]))
 
 
@@ -76,7 +76,7 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
     first = int(np.searchsorted(motors.time, start))
     theta, angle = motors.position[first:, 0], sensors.position[first:, 0]
     time = motors.time[first:]
-    before = slice(int(np.searchsorted(motors.time, start - REST)), first + 1)
+    before = slice(int(np.searchsorted(motors.time, start - BOUNDS.rest_before)), first + 1)
     creep = -(angle - theta * arm.joint_from_motor[0])
     creep += float(np.mean(sensors.position[before, 0] - motors.position[before, 0] * arm.joint_from_motor[0]))
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(theta)))])
@@ -85,9 +85,11 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
     rows = []
     for step in run.steps:
         if step.name.startswith("rest"):
-            at = int(np.searchsorted(time, step.end - ROUNDING)) - 1
+            at = int(np.searchsorted(time, step.end - BOUNDS.rounding)) - 1
             label = f"creep after {travel[at]:.1f} rad of the motor, {step.name.removeprefix('rest ')}"
-            rows.append(Comparison(label, float(1e3 * predicted[at]), float(1e3 * creep[at]), "mrad", WITHIN, "(6.19)"))
+            rows.append(
+                Comparison(label, float(1e3 * predicted[at]), float(1e3 * creep[at]), "mrad", BOUNDS.within, "(6.19)")
+            )
     curves = [Curve("measured", "measured", travel, 1e3 * creep), Curve("predicted", "(6.19)", travel, 1e3 * predicted)]
     remark = "with the printed signed differential, (6.19) would be zero after each return"
     return Result(
@@ -102,12 +104,14 @@ def corrected(runs: Mapping[str, Recording]) -> Result:
         joints, sensors, motors = run.joints("joint_states"), run.joints("joint_sensors"), run.joints("motor_states")
         begin = run.step("out").begin
         error = joints.position[:, 0] - np.interp(joints.time, sensors.time, sensors.position[:, 0])
-        error -= float(np.mean(error[(joints.time > begin - REST) & (joints.time < begin)]))  # elastic stretch
+        error -= float(
+            np.mean(error[(joints.time > begin - BOUNDS.rest_before) & (joints.time < begin)])
+        )  # elastic stretch
         theta = motors.position[motors.time > begin, 0]
         creep = float(crept(run.shared.arm, np.abs(np.diff(theta)).sum(), load_torque(run, run.step("out"))))
-        last = 1e3 * float(np.mean(error[joints.time > run.steps[-1].end - REST]))
+        last = 1e3 * float(np.mean(error[joints.time > run.steps[-1].end - BOUNDS.rest_before]))
         label, left = name.replace("_", " "), 0.0 if run.parameters.node("transform")["creep_correction"] else creep
-        within = LEFT if not left else OWN_TORQUE
+        within = BOUNDS.creep_left if not left else BOUNDS.creep_of_torque
         rows.append(
             Comparison(
                 f"error of the joint angle, {label}", 1e3 * left, last, "mrad", within * 1e3 * creep, "(6.19)", True

@@ -5,15 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link, response, set_until
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 from wam_theory.stiction import play
-
-WITHIN = 0.02
-LATE = 0.5  # s at the end of a step, over which a settled force is averaged
-RAMP = 0.05  # N; what a ramp of 3 N/s is carried further by the link's inertia
-LEAST = 0.02  # N; the force from which contact counts
 
 
 def accuracy(runs: Mapping[str, Recording]) -> Result:
@@ -25,7 +21,9 @@ def accuracy(runs: Mapping[str, Recording]) -> Result:
             link = one_link(run)
             shown = response(run, link)
             rows.append(
-                _calibration(name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - LATE])
+                _calibration(
+                    name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - BOUNDS.settled_force]
+                )
             )
             curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
     return Result(rows, [panel, Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)])
@@ -37,15 +35,19 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     friction = link.node.dynamic_friction / link.lever
     desired, force = _fed_forward(run, link)
     expected = play(desired, friction)
-    begin = float(desired[np.argmax(force > LEAST)])
-    rows = [Comparison("deadband, F_des at which F_c begins", friction, begin - LEAST, "N", WITHIN, "5.2")]
+    begin = float(desired[np.argmax(force > BOUNDS.least_contact)])
+    rows = [
+        Comparison(
+            "deadband, F_des at which F_c begins", friction, begin - BOUNDS.least_contact, "N", BOUNDS.within, "5.2"
+        )
+    ]
     times = run.joints("joint_sensors").time
     for step in run.steps:
         last = int(np.searchsorted(times, step.end)) - 1
         label = f"F_c at {desired[last]:.0f} N, {step.name}"
-        rows.append(Comparison(label, float(expected[last]), float(force[last]), "N", WITHIN, "5.2"))
+        rows.append(Comparison(label, float(expected[last]), float(force[last]), "N", BOUNDS.within, "5.2"))
     worst = float(np.abs(force - expected).max() / expected.max())
-    rows.append(Comparison("largest difference", 0.0, worst, "of F_c", WITHIN, "5.2", True))
+    rows.append(Comparison("largest difference", 0.0, worst, "of F_c", BOUNDS.within, "5.2", True))
     each = slice(None, None, 40)
     curves = [Curve("measured", "measured", desired[each], force[each]), Curve("predicted", "", desired, expected)]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
@@ -76,8 +78,18 @@ def active_pretension(runs: Mapping[str, Recording]) -> Result:
         shown = response(run, link)
         stretch = link.ratio * (shown.motor[last] - force[last] * link.lever / link.node.contact_stiffness)
         rows += [
-            Comparison(f"{label}, deadband", friction, desired[light] - force[light], "N", RAMP, "c (T1 + T2)", True),
-            Comparison(f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", WITHIN, "slack strand"),
+            Comparison(
+                f"{label}, deadband",
+                friction,
+                desired[light] - force[light],
+                "N",
+                BOUNDS.ramp_inertia,
+                "c (T1 + T2)",
+                True,
+            ),
+            Comparison(
+                f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", BOUNDS.within, "slack strand"
+            ),
         ]
         curves.append(Curve("measured", label, desired[::20], force[::20]))
     return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
@@ -100,4 +112,4 @@ def _calibration(name: str, run: Recording, link: OneLink, force: Numbers) -> Co
     """Settled force of a loop that knows another stiffness of its spring: F_des k/k_known."""
     known = run.node("force_loop", ForceLoopParameters).spring_stiffness[0]
     expected = desired_force(run, run.steps[0].begin) * link.node.contact_stiffness / known
-    return Comparison(f"settled force, {name}", expected, float(force.mean()), "N", WITHIN, "2.2")
+    return Comparison(f"settled force, {name}", expected, float(force.mean()), "N", BOUNDS.within, "2.2")

@@ -7,11 +7,9 @@ import numpy as np
 from wam_bag.bag import BagError, PointColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.world import World
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
-
-KNOWN_AFTER = 0.05  # s after a contact was detected, when its position is known better
-HEIGHT, ACROSS, ALONG = 0.01, 0.02, 0.03  # m; the position along the link is the least certain
 
 
 def groping(runs: Mapping[str, Recording]) -> Result:
@@ -20,19 +18,19 @@ def groping(runs: Mapping[str, Recording]) -> Result:
     obstacles = run.part("driver", "world", World).obstacles
     centre, half = np.array(obstacles.positions[:3]), np.array(obstacles.sizes[:3])
     low, high = centre - half, centre + half
-    until = float(run.joints("joint_states").time[-1]) - KNOWN_AFTER
+    until = float(run.joints("joint_states").time[-1]) - BOUNDS.position_known_after
     steps = [step for step in run.steps if step.name.startswith("touch") and step.end <= until]
     points = {step.name.removeprefix("touch the "): touched(run, step) for step in steps}
     rows = [
-        Comparison(f"{side}, height", high[2], float(point[2]), "m", HEIGHT, "true position", True)
+        Comparison(f"{side}, height", high[2], float(point[2]), "m", BOUNDS.surface_height, "true position", True)
         for side, point in points.items()
     ]
     for side, edge in (("left edge", high[1]), ("right edge", low[1])):
         if side in points:
             x, y, _ = points[side].tolist()
             rows += [
-                Comparison(f"{side}, y", edge, y, "m", ACROSS, "", True),
-                Comparison(f"{side}, x of the near corner", low[0], x, "m", ALONG, "", True),
+                Comparison(f"{side}, y", edge, y, "m", BOUNDS.surface_across, "", True),
+                Comparison(f"{side}, x of the near corner", low[0], x, "m", BOUNDS.surface_along, "", True),
             ]
     corners = np.array([low, [high[0], low[1], 0.0], high, [low[0], high[1], 0.0], low])
     found = np.array(list(points.values()))
@@ -51,7 +49,7 @@ def touched(run: Recording, step: Step) -> Numbers:
     BagError
         if no contact is estimated there.
     """
-    arm, time = run.shared.arm, step.end + KNOWN_AFTER
+    arm, time = run.shared.arm, step.end + BOUNDS.position_known_after
     joints, wrench = run.joints("joint_states"), run.forces("contact/wrench")
     points = run.bag.topics.get(f"{run.namespace}/contact/point")
     if not isinstance(points, PointColumns):
@@ -61,7 +59,7 @@ def touched(run: Recording, step: Step) -> Numbers:
     at = _last(wrench.time, time)
     cover, push = wrench.frames[at], wrench.force[at]
     if cover not in arm.covers.names or np.isnan(place):
-        raise BagError(f"{run.bag.path}: no contact is estimated {KNOWN_AFTER} s after '{step.name}'")
+        raise BagError(f"{run.bag.path}: no contact is estimated {BOUNDS.position_known_after} s after '{step.name}'")
     i = arm.covers.names.index(cover)
     inwards = np.array([0.0, push[1], push[2]]) / np.hypot(push[1], push[2])
     axis = np.array([place, *arm.covers.aside(cover, place)])

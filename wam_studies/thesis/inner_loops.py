@@ -7,12 +7,11 @@ import numpy as np
 
 from wam_control.velocity.torque_loop import TorqueLoopParameters
 from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque, period_map
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, growth, joint_stiffness, one_link, response
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 
-WITHIN = 0.02
-TRANSIENT = 0.1  # s of a response until one mode is left
 FRICTION = ("torque_fed_forward", "torque_loop", "position_loop")  # runs with friction at the motor
 
 Runs = Mapping[str, Recording]
@@ -47,8 +46,10 @@ def friction_left(runs: Runs) -> Result:
         falling = np.interp(middle, command[again][::-1], shown.force[again][::-1], math.nan, math.nan)
         expected = friction * _part_left(run, link)
         rows.append(
-            Comparison(f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", WITHIN, "2.1.2")
-        )  # fmt: skip
+            Comparison(
+                f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", BOUNDS.within, "2.1.2"
+            )
+        )
         curves.append(Curve("measured", label, command[::20], shown.force[::20]))
     panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
     return Result(rows, [panel])
@@ -94,7 +95,7 @@ def _largest(label: str, below: Recording, above: Recording) -> Comparison:
     (first, gain), (second, other) = ((_growth(run), _gain(run)) for run in (below, above))
     measured = gain + (other - gain) * first / (first - second) if first < second else math.nan
     unit = "" if _has(below, "torque_loop") else "N m/rad"
-    return Comparison(label, _expected(below), measured, unit, WITHIN, "sampled loop")
+    return Comparison(label, _expected(below), measured, unit, BOUNDS.within, "sampled loop")
 
 
 def _expected(run: Recording) -> float:
@@ -119,5 +120,5 @@ def _gain(run: Recording) -> float:
 def _growth(run: Recording) -> float:
     """Rate at which the jerk of the motor grows, 1/s; slow motions are without effect on it."""
     motors = run.joints("motor_states")
-    late = motors.time > TRANSIENT
+    late = motors.time > BOUNDS.one_mode_after
     return growth(motors.time[late][2:], np.diff(motors.velocity[late, 0], 2)).rate

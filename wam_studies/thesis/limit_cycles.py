@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from wam_analysis.measures.limit_cycle import CycleExtent, last_cycle
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import (
-    STUCK,
     MeasuredResponse,
     OneLink,
     desired_force,
@@ -21,9 +21,6 @@ from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cy
 from wam_theory.stick_slip import assess, simulate
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, stiction_cycle_period
 
-WITHIN = 0.02
-CLOSED_FORM = 1.0  # allowed deviation of (5.8) and (5.9) over the left side of (5.11), which they neglect
-
 
 def stiction(runs: Mapping[str, Recording]) -> Result:
     """The experiment `stiction-limit-cycle`."""
@@ -35,8 +32,8 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
     force = float(rows[0].predicted)
     exact, curve = _exact(run, link, shown)
     rows += [
-        Comparison("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", WITHIN, "integrator"),
-        Comparison("period, exact", exact.period, found.period, "s", WITHIN, "integrator"),
+        Comparison("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", BOUNDS.within, "integrator"),
+        Comparison("period, exact", exact.period, found.period, "s", BOUNDS.within, "integrator"),
     ]
     curves = [Curve("measured", "without deadband", shown.time, shown.force), curve]
     rows += _with_deadband(runs["with_deadband"], force)
@@ -65,8 +62,8 @@ def _closed_form(link: OneLink, found: CycleExtent) -> tuple[list[Comparison], s
     force = float(stiction_cycle_force(*stiffness, *friction, link.zeta)) / link.lever
     period = float(stiction_cycle_period(gain, *stiffness, *friction, link.zeta))
     rows = [
-        Comparison("F_c peak to peak", force, found.peak_to_peak, "N", CLOSED_FORM * number, "(5.8)"),
-        Comparison("period", period, found.period, "s", CLOSED_FORM * number, "(5.9)"),
+        Comparison("F_c peak to peak", force, found.peak_to_peak, "N", BOUNDS.neglected * number, "(5.8)"),
+        Comparison("period", period, found.period, "s", BOUNDS.neglected * number, "(5.9)"),
     ]
     return rows, f"(5.8) and (5.9) hold for (5.11) far below 1; here it is {number:.3f}"
 
@@ -79,8 +76,10 @@ def _with_deadband(run: Recording, force: float) -> list[Comparison]:
     deadband = link.loop.deadband / link.lever
     rest = abs(desired_force(run, shown.time[0]) - float(late[-1]))
     return [
-        Comparison("deadband that removes it", 0.5 * force, deadband, "N", WITHIN, "(5.7), (5.8)"),
-        Comparison("remaining peak to peak with it", 0.0, float(np.ptp(late)), "N", WITHIN * force, "(5.7)", True),
+        Comparison("deadband that removes it", 0.5 * force, deadband, "N", BOUNDS.within, "(5.7), (5.8)"),
+        Comparison(
+            "remaining peak to peak with it", 0.0, float(np.ptp(late)), "N", BOUNDS.within * force, "(5.7)", True
+        ),
         Comparison("remaining error with it", 0.0, rest, "N", deadband, "(5.7)", True),
     ]
 
@@ -118,13 +117,13 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
     swing = float(actuator_cycle(node.dynamic_friction, node.transmission_stiffness, link.gamma, link.zeta))
     work, power, error, half = half_cycle_work(run, link, shown)
     rows = [
-        Comparison("motor at the joint, peak to peak", swing, found.peak_to_peak, "rad", WITHIN, "(5.20)"),
+        Comparison("motor at the joint, peak to peak", swing, found.peak_to_peak, "rad", BOUNDS.within, "(5.20)"),
         Comparison(
             "work of a half cycle",
             float(actuator_cycle_work(node.dynamic_friction, node.transmission_stiffness)),
             work,
             "N m",
-            WITHIN,
+            BOUNDS.within,
             "(5.21)",
         ),
         Comparison(
@@ -140,7 +139,7 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
             0.0,
             float(np.abs(shown.force[-1] - desired_force(run, shown.time[0]))),
             "N",
-            WITHIN * desired_force(run, shown.time[0]),
+            BOUNDS.within * desired_force(run, shown.time[0]),
             absolute=True,
         ),
     ]
@@ -185,7 +184,7 @@ def half_cycle_work(run: Recording, link: OneLink, shown: MeasuredResponse) -> t
     speed = np.gradient(shown.motor, shown.time)
     turns = np.flatnonzero(np.diff(speed > 0.0))
     begin, end = turns[-2] + 1, turns[-1] + 1
-    sticks = np.abs(shown.speed[begin:end]) < STUCK
+    sticks = np.abs(shown.speed[begin:end]) < BOUNDS.stuck_speed
     given = np.where(sticks, np.clip(pull[begin:end] * speed[begin:end], 0.0, None), 0.0)
     length = float(shown.time[end] - shown.time[begin])
     work = float(_integral(given, shown.time[begin:end]))

@@ -12,6 +12,7 @@ from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop_parameters import AXES
 from wam_description.arm import Arm, seconds
 from wam_description.world import Springs
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Outcome, Verdict, assess
@@ -19,9 +20,6 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop, Outcome, Verdict, 
 Numbers = NDArray[np.float64]
 LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
 ACROSS = 1  # y of the link's frame, along which the testbed presses
-SETTLED = 0.02  # of the step, remaining span of a settled response
-STUCK = 1e-5  # rad/s of the joint, below which it sticks: far below any motion, far above the noise of a stuck one
-STEADY = 0.1  # relative change of the span between two windows, below which a cycle is steady
 
 
 class OneLink(NamedTuple):
@@ -164,9 +162,9 @@ def measured_verdict(recording: Recording, step: Step, shown: MeasuredResponse) 
     quarter = len(shown.force) // 4
     before, late = (float(np.ptp(part)) for part in (shown.force[-2 * quarter : -quarter], shown.force[-quarter:]))
     size = max(float(np.ptp(shown.force)), 1e-9)
-    if late < SETTLED * size or late < (1.0 - STEADY) * before:
+    if late < BOUNDS.settled_span * size or late < (1.0 - BOUNDS.steady_span) * before:
         return str(Verdict.SETTLED)
-    return str(Verdict.DIVERGED if late > (1.0 + STEADY) * before else Verdict.LIMIT_CYCLE)
+    return str(Verdict.DIVERGED if late > (1.0 + BOUNDS.steady_span) * before else Verdict.LIMIT_CYCLE)
 
 
 def predicted_outcome(link: OneLink, shown: MeasuredResponse, force: float) -> Outcome:

@@ -7,15 +7,11 @@ import numpy as np
 
 from wam_analysis.measures.limit_cycle import last_cycle
 from wam_driver.driver import DriverParameters
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
-
-WITHIN = 0.02
-DELAYS = 0.05  # allowed of the period: the slip and two samples are neglected
-LATE = 1.5  # s at the end of a run without friction
-HARMONICS = 0.15  # of the describing function, which neglects them
 
 Runs = Mapping[str, Recording]
 
@@ -25,19 +21,27 @@ def quantised(runs: Runs) -> Result:
     run = runs["no_friction"]
     link, level = one_link(run), _level(run)
     time, force, _ = _true(run, link)
-    desired, late = desired_force(run, time[0]), time > time[-1] - LATE
+    desired, late = desired_force(run, time[0]), time > time[-1] - BOUNDS.frictionless_end
     middle = float(threshold(desired, level))
     swing = last_cycle(time[late], force[late])
     node = link.node
     natural = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     rows = [
-        Comparison("no friction, F_c", middle, float(force[late].mean()), "N", WITHIN, "between two steps"),
+        Comparison("no friction, F_c", middle, float(force[late].mean()), "N", BOUNDS.within, "between two steps"),
         Comparison("no friction, error of F_c", 0.0, float(force[late].mean()) - desired, "N", 0.5 * level, "", True),
-        Comparison("no friction, peak to peak", float(hunting(level, link.gamma, desired)), swing.peak_to_peak, "N",
-                   HARMONICS, "relay, (5.15)"),
-        Comparison("no friction, period", 2.0 * math.pi / natural, swing.period, "s", HARMONICS, "relay"),
+        Comparison(
+            "no friction, peak to peak",
+            float(hunting(level, link.gamma, desired)),
+            swing.peak_to_peak,
+            "N",
+            BOUNDS.neglected_harmonics,
+            "relay, (5.15)",
+        ),
+        Comparison(
+            "no friction, period", 2.0 * math.pi / natural, swing.period, "s", BOUNDS.neglected_harmonics, "relay"
+        ),
         *sampled({"friction": runs["friction"]}).rows,
-    ]  # fmt: skip
+    ]
     with_deadband = runs["with_deadband"]
     time, force, motor = _true(with_deadband, link)
     late = time > time[-1] - 1.0
@@ -69,10 +73,19 @@ def sampled(runs: Runs) -> Result:
     friction, k_tr = link.node.dynamic_friction, link.node.transmission_stiffness
     period = quantised_cycle_period(link.loop.gain, k_tr, friction, desired * link.lever, level * link.lever)
     rows = [
-        Comparison("friction, cycle of the motor", 2.0 * friction / k_tr, cycle.peak_to_peak, "rad", DELAYS, "(5.20)"),
-        Comparison("friction, its period, which stays", float(period), cycle.period, "s", DELAYS, "(5.3)"),
+        Comparison(
+            "friction, cycle of the motor",
+            2.0 * friction / k_tr,
+            cycle.peak_to_peak,
+            "rad",
+            BOUNDS.neglected_delays,
+            "(5.20)",
+        ),
+        Comparison(
+            "friction, its period, which stays", float(period), cycle.period, "s", BOUNDS.neglected_delays, "(5.3)"
+        ),
         Comparison("friction, error of F_c", 0.0, float(force[there].mean()) - desired, "N", level, "a step", True),
-    ]  # fmt: skip
+    ]
     return Result(rows, [Panel("motor", "time [s]", "motor at the joint [rad]", [Curve("measured", "", time, motor)])])
 
 

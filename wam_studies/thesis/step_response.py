@@ -6,19 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from wam_studies.thesis.one_link import STUCK, MeasuredResponse, OneLink, desired_force, one_link, response
+from wam_studies.thesis.bounds import BOUNDS
+from wam_studies.thesis.one_link import MeasuredResponse, OneLink, desired_force, one_link, response
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
 from wam_theory.regimes import gamma_a, gamma_b, psi
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import breakaway_delay
-
-WITHIN = 0.02
-HOLD = 0.15  # effect of the sample and hold on (5.18), which is for the continuous loop
-DELAY_ERROR = 2e-3  # s; motor and sample lag by parts of a period, and a slip starts slowly
-UNTIL = 2.0  # s, enough for two standstills
-SHORTEST = 0.005  # s, of a standstill
 
 
 def responses(runs: Mapping[str, Recording]) -> Result:
@@ -35,7 +30,7 @@ def responses(runs: Mapping[str, Recording]) -> Result:
         largest = float(np.abs(shown.force - predicted).max()) / force
         rows.append(
             Comparison(
-                f"{label}, largest difference from the exact response", 0.0, largest, "of step", WITHIN, "", True
+                f"{label}, largest difference from the exact response", 0.0, largest, "of step", BOUNDS.within, "", True
             )
         )
         curves = [
@@ -68,23 +63,25 @@ def _first(label: str, link: OneLink, shown: MeasuredResponse, force: float) -> 
     stiffness = node.transmission_stiffness, node.contact_stiffness
     if not node.static_friction:
         constant = float(integral_time_constant(gain, series_stiffness(*stiffness)))
-        return [Comparison(f"{label}, time constant", constant, time_constant(shown, force), "s", WITHIN, "(5.2)")]
+        return [
+            Comparison(f"{label}, time constant", constant, time_constant(shown, force), "s", BOUNDS.within, "(5.2)")
+        ]
     delay = float(breakaway_delay(gain, node.transmission_stiffness, node.static_friction, force * link.lever))
-    moves = shown.time[np.flatnonzero(np.abs(shown.speed) > STUCK)[0]] - shown.time[0]
-    rows = [Comparison(f"{label}, delay", delay, float(moves), "s", DELAY_ERROR, "(5.3)", True)]
+    moves = shown.time[np.flatnonzero(np.abs(shown.speed) > BOUNDS.stuck_speed)[0]] - shown.time[0]
+    rows = [Comparison(f"{label}, delay", delay, float(moves), "s", BOUNDS.slip_delay, "(5.3)", True)]
     errors = errors_at_rest(shown, force)
     if link.gamma > float(gamma_a(link.zeta)) and len(errors) > 1:
         ratio = float(-psi(link.gamma, link.zeta))
         exact = exact_ratio(link, force)
         quantity = f"{label}, error at the second rest over the first"
-        rows.append(Comparison(quantity, ratio, errors[1] / errors[0], "", HOLD, "(5.18)"))
-        rows.append(Comparison(f"{quantity}, sampled", exact, errors[1] / errors[0], "", WITHIN, "integrator"))
+        rows.append(Comparison(quantity, ratio, errors[1] / errors[0], "", BOUNDS.sample_and_hold, "(5.18)"))
+        rows.append(Comparison(f"{quantity}, sampled", exact, errors[1] / errors[0], "", BOUNDS.within, "integrator"))
     return rows
 
 
 def exact_ratio(link: OneLink, force: float) -> float:
     """Error at the second rest over that at the first, of the exact response of the sampled loop."""
-    trajectory = simulate(link.node, link.loop, force * link.lever, UNTIL)
+    trajectory = simulate(link.node, link.loop, force * link.lever, BOUNDS.standstills_until)
     rests = [force * link.lever - event.contact_force for event in trajectory.events if event.kind is Kind.STICK]
     return rests[1] / rests[0]
 
@@ -100,11 +97,11 @@ def time_constant(shown: MeasuredResponse, force: float) -> float:
 
 def errors_at_rest(shown: MeasuredResponse, force: float) -> Numbers:
     """Error, N, in each standstill after the first slip."""
-    resting = np.abs(shown.speed) < STUCK
+    resting = np.abs(shown.speed) < BOUNDS.stuck_speed
     edges = np.flatnonzero(np.diff(resting.astype(int)))
     bounds = [0, *(edges + 1).tolist(), len(resting)]
     found = []
     for begin, end in pairwise(bounds):
-        if resting[begin] and begin > 0 and shown.time[end - 1] - shown.time[begin] > SHORTEST:
+        if resting[begin] and begin > 0 and shown.time[end - 1] - shown.time[begin] > BOUNDS.shortest_standstill:
             found.append(force - float(np.median(shown.force[begin:end])))
     return np.array(found)

@@ -10,6 +10,7 @@ from wam_analysis.measures.limit_cycle import last_cycle
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_description.arm import Servo
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import (
     ACROSS,
     Growth,
@@ -26,13 +27,6 @@ from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Curve, Panel, Result
 from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
 from wam_theory.stick_slip import Verdict, simulate
-
-TRANSIENT = 0.4  # s after a step, before the growing mode dominates
-WITHIN = 0.02
-SMALL = 0.3  # N, a step at the margin with the rod
-CYCLE = 0.05  # of a cycle with a long transient
-PLAIN = 2  # steps of a run, up to which the last one is drawn with its prediction
-ROUNDING = 1e-9  # s
 
 
 def section_5_6(runs: Mapping[str, Recording]) -> Result:
@@ -58,12 +52,17 @@ def as_described(runs: Mapping[str, Recording]) -> Result:
     below, above = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
     link, gains = below[0], [one.loop.gain for one, _ in (below, above)]
     gain = gains[0] + (gains[1] - gains[0]) * (1.0 - below[1]) / (above[1] - below[1])
-    expected = friction_margin(link, SMALL)
+    expected = friction_margin(link, BOUNDS.small_step)
     rows += [
         Comparison(
-            "marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", WITHIN, "integrator"
+            "marginal gain with the rod",
+            link.tip_gain(expected),
+            link.tip_gain(gain),
+            "m/s/N",
+            BOUNDS.within,
+            "integrator",
         ),
-        Comparison("over that without", expected / link.margin.gain, gain / link.margin.gain, "", WITHIN, "5.6"),
+        Comparison("over that without", expected / link.margin.gain, gain / link.margin.gain, "", BOUNDS.within, "5.6"),
     ]
     panels = [_panel(runs, (name,), name.replace("_", " ")) for name in runs]
     return Result(rows, panels)
@@ -163,8 +162,8 @@ def margin(below: Recording, above: Recording, how: str) -> list[Comparison]:
     frequency = first.frequency + fraction * (second.frequency - first.frequency)
     of, law = f"marginal gain, {how}", "(5.15) sampled"
     rows = [
-        Comparison(of, link.tip_gain(predicted.gain), link.tip_gain(gain), "m/s/N", WITHIN, law),
-        Comparison(f"frequency at the margin, {how}", predicted.frequency, frequency, "rad/s", WITHIN, law),
+        Comparison(of, link.tip_gain(predicted.gain), link.tip_gain(gain), "m/s/N", BOUNDS.within, law),
+        Comparison(f"frequency at the margin, {how}", predicted.frequency, frequency, "rad/s", BOUNDS.within, law),
     ]
     for one, oscillation in ((link, first), (other, second)):
         rows.append(_growth_row(one.loop.gain / one.margin.gain, oscillation, how, law))
@@ -175,7 +174,7 @@ def _oscillation(run: Recording) -> tuple[OneLink, Growth]:
     """The loop in the last step, and the growth of its oscillation after the transient."""
     link = one_link(run, set_until(run, run.steps[-1]))
     shown = response(run, link, run.steps[-1])
-    late = shown.time > shown.time[0] + TRANSIENT
+    late = shown.time > shown.time[0] + BOUNDS.mode_transient
     return link, growth(shown.time[late], shown.force[late])
 
 
@@ -193,15 +192,21 @@ def verdicts(run: Recording, name: str) -> list[Comparison]:
         if outcome.verdict is Verdict.LIMIT_CYCLE:
             found = last_cycle(shown.time, shown.force)
             rows.append(
-                Comparison(f"{label}, peak to peak", outcome.peak_to_peak / link.lever, found.peak_to_peak, "N", CYCLE)
+                Comparison(
+                    f"{label}, peak to peak",
+                    outcome.peak_to_peak / link.lever,
+                    found.peak_to_peak,
+                    "N",
+                    BOUNDS.long_cycle,
+                )
             )
-            rows.append(Comparison(f"{label}, period", outcome.period, found.period, "s", CYCLE))
+            rows.append(Comparison(f"{label}, period", outcome.period, found.period, "s", BOUNDS.long_cycle))
     return rows
 
 
 def _is_pushed(run: Recording, step: Step) -> bool:
     push = run.forces("sim/disturbance")
-    during = (push.time >= step.begin) & (push.time < step.end - ROUNDING)
+    during = (push.time >= step.begin) & (push.time < step.end - BOUNDS.rounding)
     return bool(push.force[during].any())
 
 
@@ -212,7 +217,7 @@ def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> P
         run = runs[name]
         step = run.steps[-1]
         link = one_link(run, set_until(run, step))
-        is_plain = len(run.steps) <= PLAIN
+        is_plain = len(run.steps) <= BOUNDS.plain_steps
         last = response(run, link, step)
         shown = last if is_plain else response(run, link)
         curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))

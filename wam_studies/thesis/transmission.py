@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
@@ -13,10 +14,6 @@ from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
 
 Complex = NDArray[np.complex128]
-WITHIN = 0.02
-SMOOTH = 5  # neighbouring frequencies over which spectra are averaged
-NEAR = 0.06  # relative to a frequency, range of the linear fit around it
-ROUNDING = 1e-6  # s
 HZ = 1.0 / (2.0 * np.pi)
 
 
@@ -43,7 +40,7 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
             float(np.median(predicted[lowest])),
             float(np.median(gain[lowest])),
             "rad/(N m)",
-            WITHIN,
+            BOUNDS.within,
             "(4.3)",
         ),
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
@@ -57,7 +54,8 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
         Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy"),
         Panel("coherence", "frequency [Hz]", "", coherence, "x"),
     ]
-    remark = f"low coherence: the response changes within the {SMOOTH} averaged neighbouring frequencies"
+    count = BOUNDS.averaged_frequencies
+    remark = f"low coherence: the response changes within the {count} averaged neighbouring frequencies"
     return Result(rows, panels, (remark,))
 
 
@@ -75,7 +73,8 @@ def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
     theory = resonances(run)
     expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
     return [
-        Comparison(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()
+        Comparison(name, at, zero_of(found, at, _lead(run)), "Hz", BOUNDS.within, "(4.4)")
+        for name, at in expected.items()
     ]
 
 
@@ -121,7 +120,7 @@ def allocation_sample(runs: Mapping[str, Recording]) -> Result:
 
 def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
     at = float(resonances(run).lower) * HZ
-    return Comparison(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)")
+    return Comparison(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", BOUNDS.within, "(4.4)")
 
 
 def stiffness_gain(run: Recording) -> float:
@@ -160,7 +159,7 @@ def swept(run: Recording) -> tuple[float, float]:
     """Lowest and highest frequency of the chirp, Hz, from the crossings of its force with the steady force."""
     command, sweep = run.forces("force_command"), run.step("sweep")
     during = (command.time >= sweep.begin) & (command.time < sweep.end)
-    after = command.force[int(np.searchsorted(command.time, sweep.end + ROUNDING))]
+    after = command.force[int(np.searchsorted(command.time, sweep.end + BOUNDS.rounding))]
     force = np.linalg.norm(command.force[during], axis=1) - np.linalg.norm(after)
     crossings = command.time[during][np.flatnonzero(force[:-1] * force[1:] < 0.0)]
     lengths = np.diff(crossings)
@@ -175,7 +174,7 @@ def transfer(run: Recording) -> Transfer:
     """
     motors, sensors = run.joints("motor_states"), run.joints("joint_sensors")
     begin, end = run.step("sweep").begin, run.step("ring down").end
-    part = slice(*np.searchsorted(motors.time, [begin - ROUNDING, end - ROUNDING]).tolist())
+    part = slice(*np.searchsorted(motors.time, [begin - BOUNDS.rounding, end - BOUNDS.rounding]).tolist())
     period = float(motors.time[1] - motors.time[0])
     torque, angle = motors.effort[part, 0], sensors.position[part, 0]
     frequency: Numbers = np.fft.rfftfreq(len(torque), period).astype(np.float64)
@@ -187,7 +186,7 @@ def transfer(run: Recording) -> Transfer:
 
 def spectra(frequency: Numbers, u: Complex, y: Complex) -> Transfer:
     """Inverse response and coherence of an input and an output spectrum, averaged over neighbouring frequencies."""
-    window = np.ones(SMOOTH) / SMOOTH
+    window = np.ones(BOUNDS.averaged_frequencies) / BOUNDS.averaged_frequencies
 
     def mean(values: Complex) -> Complex:
         found: Complex = np.convolve(values, window, mode="same")
@@ -205,7 +204,7 @@ def zero_of(found: Transfer, near: float, lead: float) -> float:
     near : expected frequency, Hz.
     lead : damping over stiffness of the cable, s; its zero in the response is removed first.
     """
-    chosen = np.abs(found.frequency / near - 1.0) < NEAR
+    chosen = np.abs(found.frequency / near - 1.0) < BOUNDS.resonance_fit
     zero = 1.0 + 2j * np.pi * found.frequency[chosen] * lead
     slope, offset = np.polyfit(found.frequency[chosen] ** 2, (found.inverse[chosen] * zero).real, 1)
     return float(np.sqrt(-offset / slope))

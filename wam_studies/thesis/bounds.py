@@ -1,0 +1,79 @@
+"""What the evaluations of the experiments allow, and over which times and ranges they measure."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True)
+class ThesisBounds:
+    """Allowed deviations, relative unless a unit is given, and what is measured of a recording."""
+
+    # every evaluation
+    within: float = 0.02  # of a prediction: rounding of the recording, steps of the plant
+    rounding: float = 1e-6  # s
+
+    # thesis.transmission
+    averaged_frequencies: int = 5  # neighbouring frequencies over which spectra are averaged
+    resonance_fit: float = 0.06  # relative to a frequency, range of the linear fit around it
+
+    # thesis.groping
+    position_known_after: float = 0.05  # s after a contact was detected, when its position is known better
+    surface_height: float = 0.01  # m; the position along the link is the least certain
+    surface_across: float = 0.02  # m; the position along the link is the least certain
+    surface_along: float = 0.03  # m; the position along the link is the least certain
+
+    # thesis.force_accuracy
+    settled_force: float = 0.5  # s at the end of a step, over which a settled force is averaged
+    ramp_inertia: float = 0.05  # N; what a ramp of 3 N/s is carried further by the link's inertia
+    least_contact: float = 0.02  # N; the force from which contact counts
+
+    # thesis.limit_cycles
+    neglected: float = 1.0  # allowed deviation of (5.8) and (5.9) over the left side of (5.11), which they neglect
+
+    # thesis.step_response
+    sample_and_hold: float = 0.15  # effect of the sample and hold on (5.18), which is for the continuous loop
+    slip_delay: float = 2e-3  # s; motor and sample lag by parts of a period, and a slip starts slowly
+    standstills_until: float = 2.0  # s, enough for two standstills
+    shortest_standstill: float = 0.005  # s, of a standstill
+
+    # thesis.one_link
+    settled_span: float = 0.02  # of the step, remaining span of a settled response
+    stuck_speed: float = 1e-5  # rad/s of the joint; far below any motion, far above the noise of a stuck one
+    steady_span: float = 0.1  # relative change of the span between two windows, below which a cycle is steady
+
+    # thesis.quantised
+    neglected_delays: float = 0.05  # allowed of the period: the slip and two samples are neglected
+    frictionless_end: float = 1.5  # s at the end of a run without friction
+    neglected_harmonics: float = 0.15  # of the describing function, which neglects them
+
+    # thesis.cables
+    creep_left: float = 0.05  # of the creep, that is left of it: friction and acceleration of the rotor count as load
+    creep_of_torque: float = 0.02  # of the creep, its deviation from (6.19)
+    rest_before: float = 0.1  # s before the motor turns, to average a small oscillation of the link
+
+    # thesis.testbed
+    mode_transient: float = 0.4  # s after a step, before the growing mode dominates
+    small_step: float = 0.3  # N, a step at the margin with the rod
+    long_cycle: float = 0.05  # of a cycle with a long transient
+    plain_steps: int = 2  # steps of a run, up to which the last one is drawn with its prediction
+
+    # thesis.inner_loops
+    one_mode_after: float = 0.1  # s of a response until one mode is left
+
+    # thesis.arm_forces
+    steady_press: float = 0.8  # s at the end of a press
+    slide_start: float = 0.5  # s of a slide before its evaluation
+    force_at_rest: float = 0.05  # of the commanded force, at rest
+    force_sliding: float = 0.2  # of the commanded force, while sliding: friction reverses with the motion
+    estimate: float = 0.05  # of the true force
+    smallest_estimate_error: float = 0.4  # N; a third of the standard deviation that is stated at 5 N
+    position: float = 0.04  # m
+    latency: float = 0.1  # s until a push is detected
+    wrong_link: float = 0.05  # of the time of a push, with another link or no detection
+    push_in_motion: float = 0.15  # of the force of a push while the arm moves
+    force_along_link: float = 0.1  # of the commanded force, at either end of the link
+    arm_cycle: float = 0.02  # of the force, peak to peak of a limit cycle
+    single_slip: float = 0.2  # N; a joint that still slips once, by stiction, is no cycle
+
+
+BOUNDS: Final = ThesisBounds()
