@@ -1,6 +1,6 @@
 """Runs the benchmarks; each measures its subject and a reference in turns and prints their ratio.
 
-    python benchmarks/bench.py                 # all but those that take an hour
+    python benchmarks/bench.py                 # all
     python benchmarks/bench.py speed plant --rounds 3
 
 Speeds differ between computers, and on one computer from hour to hour; the ratio of two quantities measured in turns
@@ -126,22 +126,15 @@ def run(name: str, benchmark: Benchmark, rounds: int, quick: bool) -> None:
 BENCHMARKS = {
     "speed": "stack:SPEED",
     "round_trip": "stack:ROUND_TRIP",
-    "recording": "stack:RECORDING",
     "real_time": "stack:REAL_TIME",
-    "under_load": "stack:UNDER_LOAD",
-    "live_page": "stack:LIVE_PAGE",
     "plant": "simulation:PLANT",
     "compiled": "simulation:COMPILED",
-    "parts": "simulation:PARTS",
-    "contact": "simulation:CONTACT",
-    "stability_map": "simulation:STABILITY_MAP",
     "bag_reading": "bags:BAG_READING",
-    "long_bag": "bags:LONG_BAG",
+    "analysis": "bags:ANALYSIS",
 }
 
 
-PLAIN = ("plant", "parts")  # of the tree in plain Python: clocks cannot be put into compiled classes
-LONG = ("under_load",)  # run only where they are named
+PLAIN = ("plant",)  # of the tree, in plain Python
 
 
 def load(name: str) -> Benchmark:
@@ -159,7 +152,7 @@ def main() -> None:
     given = parser.parse_args()
     if unknown := [name for name in given.names if name not in BENCHMARKS]:
         parser.error(f"there is no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    names = given.names or [name for name in BENCHMARKS if name not in LONG]
+    names = given.names or list(BENCHMARKS)
     for name in names:
         if len(names) > 1 or (name in PLAIN and not os.environ.get("PYTHONPATH")):  # each in a process of its own
             words = [name, *["--quick"] * given.quick, *(["--rounds", str(given.rounds)] if given.rounds else [])]

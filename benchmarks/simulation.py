@@ -1,18 +1,15 @@
-"""The run without ROS and what is within it: plant, compiled inner loop, parts of a period, contact, stability map."""
+"""The run without ROS and what is within it: the plant, and the inner loop as C."""
 
 import filecmp
 import hashlib
 import json
-import math
 import os
 import subprocess
 import sys
 import sysconfig
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
-from functools import cache, wraps
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,22 +19,15 @@ import numpy as np
 import yaml
 from bench import Benchmark, Measured, Row
 
-from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
-from wam_control.contact.contact_inference import ContactInference
-from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.task.scenario import ScenarioStep, load
-from wam_description.arm import Arm, Shared
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.interface import declared
 from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_sim.simulation import Simulation
-from wam_theory.stability_map import largest_stable_steps
-from wam_theory.stick_slip import FrictionNode, IntegralLoop, largest_stable_step
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -248,176 +238,6 @@ COMPILED = Benchmark(
     ),
     rounds=10,
 )
-
-
-# parts of a period
-
-NODES = ("contact_estimator", "force_loop", "velocity_loop", "transform", "gravity", "scenario")
-TRUTH, REST = "true state, published", "bus, synchronisers, scheduling"
-WITHIN = {  # methods of an object of the simulation, by part
-    "driver: substeps": ("driver.plant", "step"),
-    "driver: measuring": ("driver", "_measure"),
-    "driver: limits": ("driver", "_watch_limits"),
-    "driver: amplifier": ("driver.amplifier", "step"),
-    "contact_estimator: observe": ("nodes.contact_estimator._estimator", "observe"),
-    "contact_estimator: estimate": ("nodes.contact_estimator._estimator", "estimate"),
-}
-Spent = Counter[str]
-
-
-def timed(spent: Spent, part: str, work: Callable[..., Any]) -> Callable[..., Any]:
-    """A function whose time counts for a part, s."""
-
-    @wraps(work)
-    def call(*given: Any) -> Any:
-        begin = time.perf_counter()
-        result = work(*given)
-        spent[part] += time.perf_counter() - begin
-        return result
-
-    return call
-
-
-def timed_node(spent: Spent, name: str) -> Any:
-    """A node of the stack whose steps are timed."""
-    kind = declared(name).node
-    steps = {step: value for step in dir(kind) if hasattr(value := getattr(kind, step), "reaction")}
-    body = {step: timed(spent, name, value) for step, value in steps.items()}
-    return type(kind.__qualname__, (kind,), {**body, "__module__": kind.__module__})
-
-
-def spent_in(configuration: Configuration, steps: list[ScenarioStep], which: str) -> Spent:
-    """Microseconds per period of the parts: '' the whole, 'nodes' the nodes and the driver, 'within' parts of these."""
-    spent: Spent = Counter()
-    classes = {name: timed_node(spent, name) for name in NODES} if which == "nodes" else {}
-    run = Simulation(configuration, steps, classes)
-    places = {"driver": ("driver", "advance"), TRUTH: ("", "_publish_truth")}
-    for part, (path, name) in {"": {}, "nodes": places, "within": WITHIN}[which].items():
-        place: Any = run
-        for step in filter(None, path.split(".")):
-            place = place[step] if isinstance(place, dict) else getattr(place, step)
-        setattr(place, name, timed(spent, part, getattr(place, name)))
-    wall, own = time.perf_counter(), time.process_time()
-    if failure := run.play():
-        raise SystemExit(failure)
-    wall, own = time.perf_counter() - wall, time.process_time() - own
-    if not which:
-        spent["whole"] = wall
-    periods = run.driver.stamp / configuration.shared.timing.period_ns
-    # what others ran meanwhile is taken off every part alike: to read the processor time costs more than some parts
-    return Counter({part: 1e6 * own / wall * taken / periods for part, taken in spent.items()})
-
-
-def parts(quick: bool) -> Measured:
-    """The whole, measured without clocks in it, its parts and what they consist of."""
-    configuration = Configuration.load(packaged("wam"))
-    steps = scenario_steps(1.0 if quick else 5.0, configuration.shared)
-    while True:
-        whole, nodes, within = (spent_in(configuration, steps, which) for which in ("", "nodes", "within"))
-        nodes[REST] = max(whole["whole"] - sum(nodes.values()), 1e-9)
-        yield {**whole, **nodes, **within}
-
-
-NAMES = [name for part in ("driver", *NODES) for name in (part, *(one for one in WITHIN if one.startswith(f"{part}:")))]
-PARTS = Benchmark(parts, "a period of the direct run [us]", tuple(map(Row, ("whole", *NAMES, TRUTH, REST))), rounds=15)
-
-
-# the contact estimator
-
-POSE = (0.1, -1.05, 0.3, 0.5)  # rad
-SPEED = (1.0, -1.2, 2.0, 1.5)  # rad/s of the motors
-POSITION, FORCE = 0.28, (0.0, 8.0, 6.0)  # m, N, of a push on the outer link, in the base frame
-PERIOD = 1e-3
-
-
-def pushed_observer(arm: Arm, parameters: ContactEstimatorParameters) -> tuple[MomentumObserver, State]:
-    """An observer of the moving arm under a push, and its input."""
-    transmission = TransmissionMap.of(arm)
-    observer = MomentumObserver(arm, parameters.observer, use_joint_sensors=False)
-    body = RigidBody(arm, parameters.observer.mass_scale)
-    levers = body.point_jacobian(POSE, arm.covers.names[-1], (POSITION, 0.0, 0.0))
-    torque = body.gravity_torque(POSE) - levers.T @ np.array(FORCE)
-    state = State(transmission.motor_positions(POSE), list(SPEED), transmission.motor_torques(torque.tolist()))
-    for _ in range(200):
-        observer.observe(state, PERIOD)
-    return observer, state
-
-
-def fixed_workload(body: RigidBody) -> None:
-    """Work of the same kind: rigid-body algorithms, small matrices, scalar Python."""
-    inertia = body.mass_matrix(POSE) + np.diag((1.0, 2.0, 3.0, 4.0))
-    solved = np.linalg.solve(inertia, body.gravity_torque(POSE)).tolist()
-    sum([a * b for a in solved for b in solved])
-
-
-@cache
-def contact_works() -> dict[str, Callable[[], object]]:
-    """What is measured, of an arm that is pushed."""
-    configuration = Configuration.load(packaged("wam")).with_values({"contact_estimator:use_joint_sensors": False})
-    arm, timing = configuration.shared.arm, configuration.shared.timing
-    parameters = configuration.node("contact_estimator", ContactEstimatorParameters)
-    observer, state = pushed_observer(arm, parameters)
-    estimator = ContactEstimator(arm, timing, parameters)
-    for _ in range(200):
-        estimator.observe(state, None, PERIOD)
-    if not estimator.estimate().in_contact:
-        raise SystemExit("the push is not detected: the benchmark would measure free motion")
-    torques, covariance = observer.torques()
-    precision = np.linalg.inv(covariance)
-    body, inference = RigidBody(arm), ContactInference(arm, RigidBody(arm), parameters.inference)
-    return {
-        "fixed workload": lambda: fixed_workload(body),
-        "observe": lambda: observer.observe(state, PERIOD),
-        "infer": lambda: inference.infer(POSE, torques, precision),
-        "estimate": estimator.estimate,
-    }
-
-
-def contact(quick: bool) -> Measured:
-    """The contact estimator during contact; the shortest of five tries, to exclude other load."""
-    works, many = contact_works(), 20 if quick else 300
-    while True:
-        found = {
-            name: 1e6 / many * min(seconds(lambda work=work: [work() for _ in range(many)]) for _ in range(5))
-            for name, work in works.items()
-        }
-        yield {**found, "update": found["observe"] + found["estimate"]}
-
-
-CONTACT = Benchmark(
-    contact,
-    "contact estimator [us]",
-    tuple(Row(name, "fixed workload") for name in ("observe", "infer", "estimate", "update")),
-    rounds=7,
-)
-
-
-# the stability map
-
-GAMMA, ZETA = np.meshgrid(np.linspace(1.02, 3.0, 100), np.geomspace(0.05, 1.0, 100))
-
-
-def scalar(gamma: float, zeta: float) -> float:
-    """The exact integrator, one response after the other, of a node with J, k_tr, k_c and its friction 1."""
-    damping = 2.0 * zeta * math.sqrt(2.0)
-    node = FrictionNode(1.0, damping, 1.0, 1.0, 1.0, 1.0)
-    return largest_stable_step(node, IntegralLoop(2.0 * gamma * damping), rtol=1e-4)
-
-
-def stability_map(quick: bool) -> Measured:
-    """A point of the map, and some of its points by bisection; both have the same largest stable steps."""
-    many, chance = 4 if quick else 250, np.random.default_rng(58)
-    while True:
-        steps: list[Any] = []
-        whole = seconds(lambda found=steps: found.append(largest_stable_steps(GAMMA, ZETA)))
-        chosen = chance.choice(GAMMA.size, many, replace=False)
-        points = list(zip(GAMMA.ravel()[chosen].tolist(), ZETA.ravel()[chosen].tolist(), strict=True))
-        bisected = seconds(lambda found=steps, at=points: found.append([scalar(*point) for point in at]))
-        np.testing.assert_allclose(steps[0].ravel()[chosen], steps[1], rtol=5e-3)
-        yield {"by bisection": 1e6 * bisected / many, "map": 1e6 * whole / GAMMA.size}
-
-
-STABILITY_MAP = Benchmark(stability_map, "per point [us]", (Row("by bisection", "map"),), rounds=4)
 
 
 if __name__ == "__main__":

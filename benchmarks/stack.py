@@ -1,15 +1,11 @@
-"""The stack over topics: speed, latency, recording, real time, the demonstration under load, the live page."""
+"""The stack over topics: speed, latency, real time."""
 
-import hashlib
-import io
 import os
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -21,37 +17,30 @@ import numpy as np
 import yaml
 from bench import Benchmark, Measured, Row, quartiles
 from diagnostic_msgs.msg import DiagnosticArray
-from mcap.writer import Writer
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from simulation import scenario, scenario_steps, seconds
 
 from wam_analysis.demo_summary import summarize
-from wam_bag.bag import raw, read
+from wam_bag.bag import read
 from wam_bag.columns import JointColumns
-from wam_bag.contents import contents
-from wam_bag.mcap_writer import McapWriter
-from wam_cli.commands.live import PageProcess
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import mjcf
 from wam_description.nodes import EACH, GROUPED
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.status import WALL_CLOCK
-from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TOPICS, WRENCH
+from wam_description.topics import BY_NAME
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
-from wam_live.page import HOST, port_is_free
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state
 from wam_ros.run import Connection, spin
-from wam_ros.topics import NAMESPACE, qos, stamp_of
+from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import stamp_of as stamp_in
 from wam_sim.simulation import Simulation
 
@@ -354,106 +343,9 @@ ROUND_TRIP = Benchmark(
 )
 
 
-# recording
-
-MESSAGES = 20_000  # written in one measurement
-Messages = Sequence[tuple[int, bytes]]
-
-
-def published(configuration: Configuration) -> Counter[str]:
-    """Play a scenario with recorder; returns how often each topic was published."""
-    counts: Counter[str] = Counter()
-    publish = Publisher.publish
-
-    def counting(self: Any, message: Any) -> None:
-        counts[self.topic_name] += 1
-        publish(self, message)
-
-    Publisher.publish = counting
-    try:
-        with Composition(configuration) as composition:
-            player: Any = composition.nodes["scenario"]
-            composition.spin(lambda: player.done)
-            if player.failure:
-                raise SystemExit(player.failure)
-    finally:
-        Publisher.publish = publish
-    names = {topic.name if topic.name.startswith("/") else f"/{NAMESPACE}/{topic.name}" for topic in TOPICS}
-    return Counter({name: count for name, count in counts.items() if name in names})
-
-
-def library(messages: Messages, path: Path) -> None:
-    """Write messages with the writer of the mcap library."""
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=2**20)
-        writer.start(profile="ros2")
-        channel = writer.register_channel("/t", "cdr", writer.register_schema("a", "ros2msg", b""))
-        for i, (log_time, data) in enumerate(messages):
-            writer.add_message(channel, log_time, data, log_time, i)
-        writer.finish()
-
-
-def ours(messages: Messages, path: Path) -> None:
-    """Write messages with the recorder's writer."""
-    with io.FileIO(path, "w") as stream:
-        writer = McapWriter(stream, "benchmark", 2**20)
-        channel = writer.channel("/t", "cdr", writer.schema("a", "ros2msg", b""), {})
-        for i, (log_time, data) in enumerate(messages):
-            writer.add(channel, log_time, log_time, i, data)
-        writer.finish()
-
-
-def recording(quick: bool) -> Measured:
-    """Whether every published message of a minute in real time is in the bag; and the cost of writing one.
-
-    Stack and recorder share one process and one executor, and every call of publish is counted.
-    """
-    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
-        script, bag = Path(folder) / "script.yaml", Path(folder) / "bag"
-        step = {"name": "rest", "seconds": 2.0 if quick else 60.0}  # braked: a slow computer causes no fault
-        script.write_text(yaml.safe_dump({"steps": [step]}), encoding="utf-8")
-        base = Configuration.load(packaged("wam"))
-        values = {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep" if quick else "realtime",
-            "timing.real_time_factor": 0.0,
-            "scenario:script": str(script),
-            "recorder:directory": folder,
-            "recorder:name": bag.name,
-        }
-        sent = published(base.with_values(values))
-        recorded = contents(bag)
-        for key, value in recorded.metadata.get("recording", {}).items():
-            if key.endswith(" missed"):  # published before the recorder was there
-                sent[key.split(" ")[0]] -= int(value)
-        found = {name: topic.messages for name, topic in recorded.topics.items()}
-        if lost := {name: number - found.get(name, 0) for name, number in sent.items() if number != found.get(name, 0)}:
-            raise SystemExit(f"published and not in the bag: {lost}")
-        states = raw(bag, ["motor_states"])["/wam/motor_states"]
-        messages = list(zip(states.log_time_ns.tolist(), states.data, strict=True))
-        messages = (messages * (MESSAGES // len(messages) + 1))[:MESSAGES]
-        while True:
-            one = {"messages in the bag": float(sum(found.values())), "published": float(sent.total())}
-            for name, write in (("mcap's writer, us a message", library), (OURS, ours)):
-                begin = time.process_time()
-                write(messages, Path(folder) / "written.mcap")
-                one[name] = (time.process_time() - begin) / MESSAGES * 1e6
-            yield one
-
-
-OURS = "the recorder's"
-RECORDING = Benchmark(
-    recording,
-    "recording",
-    (Row("messages in the bag", "published"), Row("mcap's writer, us a message", OURS)),
-    rounds=7,
-)
-
-
 # real time
 
 LONGEST = 1200.0  # s, for one demonstration
-WITHOUT_PADDING = (JOINT_STATE, WRENCH, POINT)  # the stack writes their bytes itself: wam_ros.wire
 SHORT = [
     {"name": "release", "seconds": 0.5, "request": "enable"},
     {"name": "move", "seconds": 1.5, "posture": [0.0, -0.8, 0.0, 0.3]},
@@ -511,52 +403,6 @@ def short_form(folder: Path) -> list[str]:
     return ["--config", "quick.yaml"]
 
 
-def digest(bag: Path) -> str:
-    """Hash of all messages by topic, without what depends on how fast time passed on the wall clock."""
-    found = hashlib.sha256()
-    for topic, series in sorted(raw(bag).items()):
-        found.update(topic.encode())
-        if series.type in WITHOUT_PADDING:
-            found.update(b"".join(series.data))
-        else:
-            found.update("\n".join(sorted(map(written_out, map(series.decode, series.data)))).encode())
-    return found.hexdigest()
-
-
-def written_out(message: Any) -> str:
-    """A message as text; those of several nodes on a topic come in no order among each other."""
-    if not (statuses := getattr(message, "status", [message] if hasattr(message, "hardware_id") else [])):
-        return repr(message)
-    facts = [[pair for pair in status.values if pair.key not in WALL_CLOCK] for status in statuses]
-    return repr([(*status[:-1], *rest) for status, rest in zip(statuses, facts, strict=True)])
-
-
-def under_load(quick: bool) -> Measured:
-    """`wam demo` as a user starts it next to busy loops: real-time factor; fails where one fails or its bits differ."""
-    digests: set[str] = set()
-    with tempfile.TemporaryDirectory(prefix="wam_bench_") as name:
-        folder = Path(name)
-        options = short_form(folder) if quick else []
-        while True:
-            found = {}
-            for count in LOOPS:
-                with busy_loops(count if not quick else min(count, 2)):
-                    run = demonstration(folder, f"{count}_{time.monotonic_ns()}", options)
-                if not run.passed:
-                    raise SystemExit(f"the demonstration failed next to {count} busy loops")
-                digests.add(digest(run.bag))
-                found[f"{count} busy loops"] = run.factor
-            if len(digests) != 1:
-                raise SystemExit(f"{len(digests)} different results, 1 is expected")
-            yield found
-
-
-LOOPS = (0, 4, 8, 16)
-UNDER_LOAD = Benchmark(
-    under_load, "real-time factor of wam demo", tuple(Row(f"{count} busy loops") for count in LOOPS), rounds=10
-)
-
-
 MOVED = 1e-3  # rad, of a joint since the first message
 
 
@@ -607,100 +453,6 @@ REAL_TIME = Benchmark(
     "in real time",
     (Row(KEPT, "", 99.0, 99.7), Row(KEPT_LOADED, "", 98.0, 99.7), Row(BRAKED), Row(START, "", 2.0, 1.5)),
     rounds=5,
-)
-
-
-# the live page
-
-FIRST_PORT = 8190
-LONGEST_START, SETTLING = 300.0, 3.0  # s
-CLIENT = """
-import sys, time
-from websockets.sync.client import connect
-import viser
-with connect(sys.argv[1], max_size=None, subprotocols=[f"viser-v{viser.__version__}"]) as page:
-    while True:
-        page.recv()
-"""
-
-
-def resident(pid: int) -> float:
-    """Memory of a process, MB."""
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
-
-
-def is_listening(port: int) -> bool:
-    """Whether the server of a page takes connections."""
-    with socket.socket() as probe:
-        return probe.connect_ex((HOST, port)) == 0
-
-
-def factor(stack: Composition, length: float) -> float:
-    """Arm's seconds per second of the wall clock, over so many of them."""
-    driver: Any = stack.nodes["driver"]
-    begin, stamp = time.perf_counter(), driver.driver.stamp
-    stack.spin(lambda: time.perf_counter() - begin > length)
-    return (driver.driver.stamp - stamp) / 1e9 / (time.perf_counter() - begin)
-
-
-class Watched:
-    """A page and its client; leaving the context ends both."""
-
-    def __init__(self, stack: Composition, port: int) -> None:
-        self._stack, self._port = stack, port
-
-    def __enter__(self) -> int:
-        self._page = PageProcess(self._port, NAMESPACE)
-        end = time.monotonic() + LONGEST_START
-        while not is_listening(self._port) and time.monotonic() < end:
-            time.sleep(0.1)  # meanwhile the arm rests: next to it the page would start as slowly as it draws
-        self._client = subprocess.Popen([sys.executable, "-c", CLIENT, f"ws://{HOST}:{self._port}"])
-        factor(self._stack, SETTLING)
-        if self._client.poll() is not None:
-            raise SystemExit("the client could not connect to the page")
-        return self._page._process.pid
-
-    def __exit__(self, *_: object) -> None:
-        self._client.kill()
-        self._client.wait()
-        self._page.close()
-
-
-def live_page(quick: bool) -> Measured:
-    """Real-time factor with a page and without; memory of the page after a minute.
-
-    The page has a client that takes everything, as a browser does, and draws nothing; a browser that draws without a
-    graphics card would cost more than the page.
-    """
-    length, minutes = (1.0, 0.05) if quick else (5.0, 1.0)
-    ports = (port for port in range(FIRST_PORT, FIRST_PORT + 1000) if port_is_free(port))
-    while True:
-        found = {}
-        for name, pace in (("paced", 1.0), ("as fast as it can", 0.0)):
-            values = {"timing.mode": "lockstep", "timing.real_time_factor": pace, "timing.timeout": LONGEST_START}
-            with Composition(Configuration.load(packaged("wam")).with_values(values)) as stack:
-                factor(stack, 2.0)
-                before = factor(stack, length)
-                with Watched(stack, next(ports)) as pid:
-                    found[name] = factor(stack, length)
-                    if not pace:
-                        found["memory at first [MB]"] = resident(pid)
-                        factor(stack, 60.0 * minutes)
-                        found["memory of the page [MB]"] = resident(pid)
-                found[f"{name}, no page"] = 0.5 * (before + factor(stack, length))
-        yield found
-
-
-LIVE_PAGE = Benchmark(
-    live_page,
-    "real-time factor with the live page",
-    (
-        Row("paced", "paced, no page"),
-        Row("as fast as it can", "as fast as it can, no page"),
-        Row("memory of the page [MB]", "memory at first [MB]"),
-    ),
-    rounds=4,
 )
 
 
