@@ -4,7 +4,6 @@ About 10 s in all.
 """
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from wam_theory.many_slips import modes, slip
 from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, largest_stable_step
-
 
 CLOSE = 5e-3  # of a boundary
 
