@@ -1,4 +1,4 @@
-"""The topics of a simulation: a message goes at once to every reaction that takes it, and its numbers are kept."""
+"""Topics without ROS, of a simulation or a replay: each message goes at once to every reaction that takes it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -64,10 +64,11 @@ class Bus:
         inlet = _inlet if is_packaged(declaration) else _masked_inlet
         for topic, found in feeds.items():
             reactions = [(inlet(feed, topic), feed.work) for feed in found]
+            takers = self._routes.setdefault(topic, _Route()).takers
             if len(reactions) > 1:
-                self._routes[topic].takers.append((_together(reactions), _outputs, outlets))
+                takers.append((_together(reactions), _outputs, outlets))
             else:
-                self._routes[topic].takers.extend((*reaction, outlets) for reaction in reactions)
+                takers.extend((*reaction, outlets) for reaction in reactions)
 
     def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
         """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
@@ -217,9 +218,16 @@ def _checked(publish: _Outlet, check: Check | None) -> _Outlet:
 
 
 def _together(reactions: Sequence[tuple[Inlet, Work]]) -> Callable[[int, Any], list[_Done]]:
-    return lambda stamp, value: [
-        _Done(inputs.stamp, work(inputs)) for inlet, work in reactions for inputs in inlet(stamp, value)
-    ]
+    def take(stamp: int, value: Any) -> list[_Done]:
+        done: list[_Done] = []
+        try:
+            for inlet, work in reactions:
+                done += [_Done(inputs.stamp, work(inputs)) for inputs in inlet(stamp, value)]
+        except OutOfTime:  # the reactions before have worked all the same, as over topics
+            pass
+        return done
+
+    return take
 
 
 def _outputs(done: _Done) -> Outputs:

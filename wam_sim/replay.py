@@ -9,7 +9,7 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 
 import math
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -26,10 +26,10 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
 from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
-from wam_description.synchroniser import OutOfTime
+from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
-from wam_description.wiring import Declaration, mask
-from wam_sim.bus import TopicValue, flat
+from wam_description.wiring import Declaration, Outputs
+from wam_sim.bus import Bus, TopicValue, flat
 from wam_sim.recording import RecordedRun, recorded_run
 
 _AXES = ("x", "y", "z")
@@ -275,28 +275,26 @@ def _run(
     for item in (item for reaction in declaration.reactions for item in reaction.inputs):
         if item.age == "command" and f"{namespace}/{item.topic}" not in bag.topics:
             interface.topics.pop(item.topic, None)  # the scenario that was recorded did not have this command
+
+    def changing(work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
+        def step(inputs: Inputs) -> Outputs:
+            while changes and changes[0].after < inputs.stamp:
+                change = changes.pop(0)
+                getattr(node, change.method)(change.parameters)
+            return work(inputs)
+
+        return step
+
     feeds = {
-        topic: [(feed.synchroniser.put, mask(feed.arrays), feed.work) for feed in found]
+        topic: [feed._replace(work=changing(feed.work)) for feed in found]
         for topic, found in interface.feeds(declaration, node).items()
     }
-    published: dict[str, list[TopicValue]] = {}
-    checks = interface.checks(declaration)
-    rows = [interface.topics[topic] for topic in feeds]
-    for topic, stamp, value in _messages(bag, namespace, rows, shared):
-        for put, taken, work in feeds[topic]:
-            try:
-                complete = put(topic, stamp, taken(value) if taken else value)
-            except OutOfTime:  # as the node did, which went on
-                continue
-            for inputs in complete:
-                while changes and changes[0].after < inputs.stamp:
-                    change = changes.pop(0)
-                    getattr(node, change.method)(change.parameters)
-                for name, output in work(inputs).items():
-                    if name in interface.topics and interface.topics[name].is_numbers:
-                        answer = checks[name](output) if name in checks else output
-                        published.setdefault(name, []).append(flat(interface.topics[name], inputs.stamp, answer))
-    return published
+    bus = Bus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
+    bus.connect(declaration, feeds, interface.checks(declaration))
+    recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
+    for topic, stamp, value in _messages(bag, namespace, recorded, shared):
+        bus.publish(topic, stamp, value)
+    return bus.rows
 
 
 def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared) -> Iterator[tuple[str, int, Any]]:
