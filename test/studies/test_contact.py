@@ -10,7 +10,6 @@ import pytest
 from contact_truth import torques as torques_by_hand
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
-from wam_control.task.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_LOAD, Load
@@ -18,7 +17,6 @@ from wam_sim.batch import processes
 from wam_sim.simulation import Simulation
 from wam_studies.contact.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
 from wam_studies.contact.free_motion import ContactFreeTime, contact_free_time, torque_errors
-from wam_studies.contact.over_topics import play_over_topics, script
 from wam_studies.contact.picture import figure
 from wam_studies.contact.rows import ScenarioScore
 from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
@@ -365,43 +363,6 @@ def test_dither_is_asked_for_only_where_the_velocity_loop_has_it() -> None:
     assert dither_values(CONFIGURATION._replace(sections=sections)) == {"timing.dither_cycle": 40}
 
 
-def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
-    domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import yaml
-
-    scenario = pick("sphere")
-    file = tmp_path / "scenario.yaml"
-    file.write_text(yaml.safe_dump(script(scenario)))
-    assert tuple(load_script(file, CONFIGURATION.shared)) == scenario.steps
-    short = scenario._replace(steps=scenario.steps[:3])
-    direct = play(CONFIGURATION, short)
-    over = play_over_topics(CONFIGURATION, short, domain_id)
-    assert over.failure == direct.failure == ""
-    assert len(over.records) == len(direct.records)
-    for one, other in zip(direct.records, over.records, strict=True):
-        exact = (
-            one.stamp,
-            one.q,
-            one.qd,
-            one.thetad,
-            one.external,
-            one.external_sd,
-            one.in_contact,
-            one.load.force,
-            one.load.moment,
-        )
-        assert exact == (
-            other.stamp, other.q, other.qd, other.thetad, other.external, other.external_sd, other.in_contact,
-            other.load.force, other.load.moment,
-        )  # fmt: skip
-    (mine,), (theirs,) = (score(played, ARM).contacts for played in (direct, over))
-    for name, value in mine._asdict().items():
-        got = getattr(theirs, name)
-        assert got == (pytest.approx(value, rel=1e-4, abs=1e-4, nan_ok=True) if isinstance(value, float) else value)
-
-
-@pytest.mark.slow
 def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a_shorter_one() -> None:
     barrett = Configuration.load(packaged("barrett-wam7"))
     steps = tuple(ScenarioGenerator(barrett, 1).free(1)[0].steps[:1])

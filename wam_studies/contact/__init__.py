@@ -2,7 +2,7 @@
 
 scenarios      what is simulated on the arm as stated: poses, moves, contacts, a true arm drawn from a seed
 moves, foam    random moves within the limits of the arm; a fixed foam post that it runs into
-simulation     play a scenario without ROS: records of truth and estimate; over_topics: the same from nodes and a bag
+simulation     play a scenario without ROS: records of truth and estimate
 contacts       true contacts, each with its estimate; free_motion: errors of the torques, false alarms
 degradations   how the true arm and its signals differ from what the estimator states
 touches        contacts drawn wider than the estimator's prior, as exact forces; masses that are picked up

@@ -1,12 +1,12 @@
 """Play a scenario without ROS: the simulator's truth and the estimate in every outer period."""
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from wam_control.contact.contact_inference import Hypothesis
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -96,18 +96,8 @@ class LoadTorques:
         return tuple(result[self._n :].tolist())
 
 
-def hypothesis(cover: str, facts: Mapping[str, Any]) -> EstimatedHypothesis:
-    """A hypothesis from its values by name; `low` and `high` are missing if the estimator reports no 90 % set."""
-    return EstimatedHypothesis(
-        cover=cover,
-        probability=facts["probability"],
-        position=facts["position"],
-        position_sd=facts["position_sd"],
-        low=facts.get("low", math.nan),
-        high=facts.get("high", math.nan),
-        force=facts["force"],
-        moment=facts["moment"],
-    )
+def _estimated(found: Hypothesis) -> EstimatedHypothesis:
+    return EstimatedHypothesis(*(getattr(found, name) for name in EstimatedHypothesis._fields))
 
 
 def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
@@ -140,7 +130,7 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
                 external=estimate.external_torques,
                 external_sd=estimate.torque_sd,
                 in_contact=estimate.in_contact,
-                hypotheses=tuple(hypothesis(h.cover, h._asdict()) for h in estimate.hypotheses),
+                hypotheses=tuple(map(_estimated, estimate.hypotheses)),
             )
         )
         if run.driver.safety.mode is Mode.FAULT:

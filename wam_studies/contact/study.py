@@ -43,7 +43,6 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
     resting: int = option(30, "contacts at rest per seed", 0)
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
-    over_topics: bool = option(False, "play the scenarios on nodes over topics, one at a time with --jobs 1")
     degradations: tuple[str, ...] = option(
         (), f"of arm and signals: {ALL}, or of {', '.join(NAMES)}".replace("%", "%%")
     )
@@ -65,7 +64,7 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
     def cases(self, seed: int) -> list[ContactCase]:
         """The scenarios of a seed, then its drives."""
         chosen: list[BenchmarkScenario | Drive] = [*self.scenarios(seed), *self.drives(seed)]
-        return [ContactCase(self.configuration, one, self.over_topics) for one in chosen]
+        return [ContactCase(self.configuration, one) for one in chosen]
 
     run = staticmethod(play_case)
 

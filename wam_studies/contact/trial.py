@@ -15,11 +15,10 @@ from wam_studies.contact.simulation import Played, play
 
 
 class ContactCase(NamedTuple):
-    """What is played on the arm of a configuration, and whether over topics."""
+    """What is played on the arm of a configuration."""
 
     configuration: Configuration
     given: BenchmarkScenario | Drive
-    over_topics: bool = False
 
     def __str__(self) -> str:
         given = self.given
@@ -32,10 +31,6 @@ def play_case(case: ContactCase) -> ScenarioScore | DriveScore:
     if isinstance(given, Drive):
         found = replay(given.configuration, given.degradation, record(given), given.seed)
         return DriveScore(given.seed, given.contacts, given.is_identified, found)
-    if case.over_topics:
-        from wam_studies.contact.over_topics import play_over_topics  # needs ROS
-
-        return score(play_over_topics(case.configuration, given), case.configuration.shared.arm)
     return score(play(case.configuration, given), case.configuration.shared.arm)
 
 
