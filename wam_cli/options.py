@@ -7,7 +7,7 @@ import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -302,22 +302,12 @@ class BatchOptions(NamedTuple):
     report: Progress
 
 
-def take_executor(parser: argparse.ArgumentParser) -> None:
-    """Give a command the options of where it computes."""
+def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
+    """Give a command of this name the options of a long computation."""
     parser.add_argument("--jobs", type=_JOBS, help="processes; default: one for each core")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
     )
-
-
-def executor_of(given: argparse.Namespace, pieces: int) -> AbstractContextManager[Executor]:
-    """What the options of `take_executor` name, with no more processes than pieces."""
-    return executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask)
-
-
-def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
-    """Give a command of this name the options of a long computation."""
-    take_executor(parser)
     kept = parser.add_mutually_exclusive_group()
     kept.add_argument(
         "--results",
@@ -334,7 +324,7 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
     """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
     if not given.fresh and (reason := unwritable(given.results.parent)):
         raise ValueError(f"{reason}; give another directory as --results")
-    with executor_of(given, pieces) as found:
+    with executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask) as found:
         progress = Progress(getattr(given, "part", given.command), sys.stderr)
         yield BatchOptions(found, None if given.fresh else given.results, progress)
 
