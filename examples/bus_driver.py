@@ -13,8 +13,9 @@ from fake_bus import FakeBus
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
+from wam_description.event import Level
 from wam_description.interface import Interface, declared
-from wam_description.signals import Answer, Level, NodeStatus, State
+from wam_description.signals import Answer, NodeStatus, State
 from wam_description.urdf import urdf
 from wam_driver.safety import Mode, Safety
 from wam_ros.messages import Refused

@@ -20,8 +20,7 @@ from wam_analysis.table import bounded, plain
 from wam_analysis.thresholds import HOLD, LAYOUT, TOUCH
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
-from wam_control.force.reaction_status import REFUSAL
-from wam_description.status import DONE
+from wam_description.event import Code
 from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
 from wam_sim.recording import RecordedRun, recorded_run
 
@@ -102,7 +101,7 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
 def _failure(run: RecordedRun) -> str:
     """Why a run failed, '' where it did not or the recording ends before the scenario does, without a fault."""
     if run.outcome:
-        return "" if run.outcome == DONE else run.outcome
+        return "" if run.outcome == Code.DONE else run.outcome
     return run.faults[-1].reason if run.faults else ""
 
 
@@ -189,7 +188,7 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     for step in summary.steps:
         found = {one.outcome for one in unmet(summary.reactions, step)}
         if steady_begin(step) in forces:
-            found -= {REFUSAL}  # that of a force has its own answer
+            found -= {OUTCOMES[0]}  # that of a force has its own answer
         outcomes.update(found)
     counts = [f"{outcomes[one]} {one}" for one in OUTCOMES if outcomes[one]]
     brief = unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_times)
@@ -256,7 +255,7 @@ def _played(summary: DemoSummary) -> str:
     if not summary.steps:
         return summary.outcome
     seconds = (summary.steps[-1].end - summary.steps[0].begin) / 1e9
-    ended = DONE if summary.outcome == DONE else f"FAILED: {summary.outcome}"
+    ended = Code.DONE if summary.outcome == Code.DONE else f"FAILED: {summary.outcome}"
     steps = f"{len(summary.steps)} step{'s' * (len(summary.steps) != 1)}"
     mode = summary.loop.mode if summary.loop.mode != "unknown" else "mode not known"
     return f"{steps}, {seconds:.1f} s, {mode}, {ended}"

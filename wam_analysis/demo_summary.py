@@ -23,8 +23,8 @@ from wam_analysis.task_forces import TaskForce, measured_force, task_forces, tas
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
-from wam_control.force.force_hold import ForceReaction
 from wam_control.task.scenario import FORCE_LOOP
+from wam_description.event import Code
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.reactions import SETTLING_TIME, STEADY, RecordedReaction, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
@@ -254,7 +254,7 @@ def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction
     rows = np.flatnonzero(traces.during(reaction.begin, reaction.end))
     sizes = {name: signal.size for name, signal in (("true", traces.true), ("estimated", traces.estimated))}
     known = {name: size for name, size in sizes.items() if np.any(size[rows] > 0.0)}
-    if reaction.name != ForceReaction.CONTACT_FORCE.name.lower() or not known:
+    if reaction.name is not Code.CONTACT_FORCE or not known:
         return reaction
     hardest = {name: rows[np.nanargmax(size[rows])] for name, size in known.items()}
     largest = [
@@ -262,8 +262,8 @@ def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction
         for name, row in hardest.items()
     ]
     left = [f"{size[rows[-1]]:.3g} N ({name})" for name, size in known.items() if size[rows[-1]] > 0.0]
-    reason = f"{reaction.reason}; the largest force until its end: {', '.join(largest)}"
-    return reaction._replace(reason=f"{reason}; at its end: {', '.join(left) or 'none'}")
+    remark = f"; the largest force until its end: {', '.join(largest)}; at its end: {', '.join(left) or 'none'}"
+    return reaction._replace(remark=remark)
 
 
 def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:

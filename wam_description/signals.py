@@ -1,8 +1,9 @@
 """The values that nodes exchange, without time stamps: the same on topics, in the simulation and in a replay."""
 
 from collections.abc import Mapping
-from enum import IntEnum
 from typing import NamedTuple
+
+from wam_description.event import Event, Level
 
 BASE = "base"  # frame of the arm's base, and of a contact that is none
 Triple = tuple[float, float, float]
@@ -149,22 +150,13 @@ class ContactView(NamedTuple):
     likely: tuple[LikelyRange, ...]
 
 
-class Level(IntEnum):
-    """How serious a status is, numbered as in diagnostic_msgs."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3  # nothing new is known
-
-
 class NodeStatus(NamedTuple):
     """What a node reports about itself; `wam_description.status` writes and reads it as key-value pairs.
 
     Attributes
     ----------
     level : how serious it is.
-    message : one line for people.
+    message : one line for people; no program reads it.
     node : name of the node; filled in by the adapter where it is empty.
     connected : whether all publishers and subscribers that the node expects are there.
     mode : of the driver: braked, enabled or fault; '' for other nodes.
@@ -174,6 +166,7 @@ class NodeStatus(NamedTuple):
     since : of the driver, the time from which commands count, ns: the brakes were switched then.
     stamp : time of the arm that the status belongs to, ns, 0 where it has none.
     facts : further values for people, by name; a number is written as text.
+    events : what happened, the most serious first.
     """
 
     level: Level
@@ -187,6 +180,7 @@ class NodeStatus(NamedTuple):
     since: int = 0
     stamp: int = 0
     facts: Mapping[str, str] = {}
+    events: tuple[Event, ...] = ()
 
 
 class Answer(NamedTuple):

@@ -1,17 +1,18 @@
 """The status of a node as key-value pairs and back: the one place that knows the keys."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 
-from wam_description.signals import Level, NodeStatus
+from wam_description.event import Code, Event, Level, Value, refused
+from wam_description.signals import NodeStatus
 
 REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
 AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
-REACTION = "reaction"  # fact: the most serious one; where the message is more or less than its reason, each is a fact
-REFUSED = "refused"  # fact: topics whose present message a node does not take, separated by ', '
 ENABLED = "enabled"  # mode of the driver in which no brake holds
-DONE = "done"  # message of the scenario that was played to its end
+REFUSED = "refused"  # fact: topics whose present message a node does not take, separated by ', '
+EVENT = "event"  # beginning of the keys of an event: event.1, event.1.severity, event.1.values of its own
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")
@@ -23,20 +24,46 @@ def pairs(status: NodeStatus) -> list[tuple[str, str]]:
     found = [(key, value) for key, value in own.items() if value]
     numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
     found += [(key, str(value)) for key, value in numbers.items() if value]
-    return [*found, *((key, str(value)) for key, value in status.facts.items())]
+    found += [(key, str(value)) for key, value in status.facts.items()]
+    for number, event in enumerate(status.events, start=1):
+        found += [(f"{EVENT}.{number}", event.code), (f"{EVENT}.{number}.severity", event.severity.name)]
+        found += [(f"{EVENT}.{number}.{name}", json.dumps(value)) for name, value in event.values.items()]
+    return found
 
 
-def with_refused(status: NodeStatus, refused: Mapping[str, str]) -> NodeStatus:
+def _events(facts: dict[str, str]) -> tuple[Event, ...]:
+    """Take the events out of the pairs of a status, those of codes that are known."""
+    found: list[Event] = []
+    number = 1
+    while (code := facts.pop(f"{EVENT}.{number}", None)) is not None:
+        start = f"{EVENT}.{number}."
+        own = {key.removeprefix(start): facts.pop(key) for key in [*facts] if key.startswith(start)}
+        severity = own.pop("severity", "")
+        if code in Code._value2member_map_ and severity in Level.__members__:
+            found.append(Event(Code(code), Level[severity], {name: _value(text) for name, text in own.items()}))
+        number += 1
+    return tuple(found)
+
+
+def _value(text: str) -> Value:
+    """A value of an event; what is neither a number nor a name in JSON stays as it is written."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return text
+    return value if isinstance(value, str | float | int) else text
+
+
+def with_refused(status: NodeStatus, refusals: Mapping[str, str]) -> NodeStatus:
     """A status with messages that are refused before the node has them: why, by topic; none leaves it as it is."""
-    if not refused:
+    if not refusals:
         return status
-    reasons = "; ".join(dict.fromkeys(refused.values()))
+    reasons = "; ".join(dict.fromkeys(refusals.values()))
     message = reasons if status.level is Level.OK else f"{status.message}; {reasons}"
     before = [topic for topic in status.facts.get(REFUSED, "").split(", ") if topic]
-    facts = {**status.facts, REFUSED: ", ".join(dict.fromkeys([*before, *refused]))}
-    if REACTION in facts and status.level is not Level.OK:
-        facts.setdefault(facts[REACTION], status.message)
-    return status._replace(level=max(status.level, Level.WARN), message=message, facts=facts)
+    facts = {**status.facts, REFUSED: ", ".join(dict.fromkeys([*before, *refusals]))}
+    events = (*status.events, *(refused(topic, reason) for topic, reason in refusals.items()))
+    return status._replace(level=max(status.level, Level.WARN), message=message, facts=facts, events=events)
 
 
 def diagnosed_name(namespace: str, node: str) -> str:
@@ -82,6 +109,7 @@ def _call(namespace: str, service: str, request: str) -> str:
 def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:
     """The status that these pairs describe; unknown keys become facts, an unknown level the highest."""
     facts = dict(given)
+    events = _events(facts)
     session, since, stamp = (_number(facts.pop(key, "")) for key in ("session", "since", "stamp"))
     return NodeStatus(
         level=Level(level) if level in Level._value2member_map_ else Level.ERROR,
@@ -95,6 +123,7 @@ def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]])
         since=since,
         stamp=stamp,
         facts=facts,
+        events=events,
     )
 
 

@@ -57,7 +57,7 @@ FRICTION_COLUMNS: Final = (
 )
 
 FORCE_AXIS_COLUMNS: Final = (
-    "reaction",  # number of `wam_control.force.force_hold.ForceReaction`: 0 where the command is obeyed
+    "reaction",  # number of `wam_description.event.Code`: 0 where the command is obeyed
     "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
     "force_sd_limit",  # N, above which the arm holds its position
     "lever",  # m, size of the joint torques per force

@@ -24,7 +24,7 @@ take_status(status) : called with the `NodeStatus` that any other node reports; 
 services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
 requests : list of `Call` and `SetParameters`, filled by steps; made in order before the step's outputs are published.
 refused(message) : outputs in place of the step's where one of them is refused; none without it.
-refusals : by topic, why the present input is not used; reported once for each message.
+refusals : by topic, why the present input is not used, as an `Event` or in words; reported once for each message.
 needs : of the inputs with absent='brake' those that the node relies on as it is tuned now; all where it has none.
 diagnostics() : further values for /diagnostics, by name, as text or numbers.
 done, failure : the node has finished, and why it failed ('' where it did not).

@@ -9,8 +9,9 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
+from wam_description.event import Level
 from wam_description.interface import Interface, declared
-from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, State, Wrench
+from wam_description.signals import BASE, Answer, NodeStatus, Point, State, Wrench
 from wam_description.status import PAUSED
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters

@@ -12,10 +12,10 @@ import viser
 from viser import uplot
 
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
-from wam_control.force.reaction_status import NONE, NOT_FOLLOWED
 from wam_description.arm import Arm
-from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
-from wam_description.status import PAUSED, REACTION
+from wam_description.event import Code, Level
+from wam_description.signals import BASE, Contact, NodeStatus, Triple
+from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
 from wam_live.thresholds import LIVE
@@ -322,7 +322,7 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
 def press_text(snapshot: Snapshot, pressing: float) -> str:
     """What becomes of a commanded force, N, as HTML: the force loop may not do it."""
     loop = snapshot.statuses.get("force_loop")
-    if loop is not None and loop.facts.get(REACTION, NONE) not in (NONE, NOT_FOLLOWED):
+    if loop is not None and any(event.code is not Code.NOT_FOLLOWED for event in loop.events):
         text = f"commanded {pressing:.1f} N, not done: {html.escape(loop.message)}"
         return paragraph(text, DOTS[Level.ERROR])
     if not snapshot.measured:

@@ -15,8 +15,9 @@ from std_srvs.srv import SetBool, Trigger
 from wam_description.agreement import DIGESTS
 from wam_description.arm import Shared
 from wam_description.driver_contract import REPLY, SERVICES
+from wam_description.event import Level
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Level, NodeStatus, State
+from wam_description.signals import NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_description.transmission_map import TransmissionMap
 from wam_ros.limits import CONFORMANCE_LIMITS

@@ -20,9 +20,11 @@ from std_srvs.srv import Trigger
 
 from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
+from wam_description.event import Event, Level
+from wam_description.event_text import sentence
 from wam_description.interface import Feed, Interface, declared, is_packaged
 from wam_description.parameters import ParameterError
-from wam_description.signals import Level, NodeStatus
+from wam_description.signals import NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
@@ -273,11 +275,11 @@ class AdaptedNode(TolerantNode):
 
     def _report_refusals(self, inputs: Inputs) -> None:
         """Report each refused message once."""
-        refusals: dict[str, str] = getattr(self.node, "refusals", {})
-        for topic, reason in refusals.items():
+        refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
+        for topic, why in refusals.items():
             stamp = inputs.stamp_of(topic)
             if self._refused.get(topic) != stamp:
-                self._ports.refusals.add(topic, reason)
+                self._ports.refusals.add(topic, why if isinstance(why, str) else sentence(why))
             self._refused[topic] = stamp
 
     # requests to other nodes

@@ -11,10 +11,11 @@ from rclpy.subscription import Subscription
 
 from wam_description.agreement import DIGESTS, digests, disagreement
 from wam_description.arm import Shared
+from wam_description.event import Level
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.parameters import listed
-from wam_description.signals import Level, NodeStatus
+from wam_description.signals import NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration

@@ -13,9 +13,10 @@ from rclpy.serialization import deserialize_message
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.agreement import DIGESTS, difference
 from wam_description.arm import Shared
+from wam_description.event import Level
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, fields, values
-from wam_description.signals import Level, NodeStatus
+from wam_description.signals import NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text

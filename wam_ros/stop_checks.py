@@ -6,7 +6,7 @@ Each returns what is wrong, '' where nothing is.
 from collections.abc import Callable
 
 from wam_description.driver_contract import REPLY, STOP
-from wam_description.signals import Level
+from wam_description.event import Level
 from wam_ros.driver_bench import DriverBench, Untested
 from wam_ros.limits import CONFORMANCE_LIMITS
 

@@ -1,18 +1,17 @@
 """What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
 
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from wam_control.force.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, watched_axes
 from wam_control.task.scenario import ScenarioStep
+from wam_description.event import Code, Event
+from wam_description.event_text import sentence
 
-FAULT = "fault"
 SETTLING_TIME = "limits.settling_time"
-NUMBERS = re.compile(r"[-+\d.]+")
 TOO_MUCH, UNREACHED = "with too much force", "not reached"
+REFUSAL = str(Code.REFUSED)
 OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
 STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
@@ -24,26 +23,36 @@ class RecordedReaction(NamedTuple):
     Attributes
     ----------
     begin, end : ns.
-    name : of a `ForceReaction`, or FAULT of the driver, or REFUSAL of a command beyond a limit.
-    reason : in words, as it was reported when it began.
+    event : what was reported, with the values of its start.
+    remark : what else is known of it, in words.
     """
 
     begin: int
     end: int
-    name: str
-    reason: str
+    event: Event
+    remark: str = ""
+
+    @property
+    def name(self) -> Code:
+        """What it is."""
+        return self.event.code
+
+    @property
+    def reason(self) -> str:
+        """In words."""
+        return sentence(self.event) + self.remark
 
     @property
     def holds(self) -> bool:
         """Whether the force was not controlled meanwhile."""
-        return self.name in HOLDING or self.name == FAULT
+        return self.name.holds or self.name in (Code.REFUSED, Code.FAULT)
 
     @property
     def outcome(self) -> str:
         """What became of a command that is not met because of it, one of `OUTCOMES`."""
         if self.holds:
             return REFUSAL
-        return TOO_MUCH if self.name == CONTACT_FORCE else UNREACHED
+        return TOO_MUCH if self.name is Code.CONTACT_FORCE else UNREACHED
 
 
 class StepSpan(Protocol):
@@ -96,11 +105,11 @@ def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Recorde
     """
     steady = steady_begin(step)
     found = within(reactions, steady, step.end)
-    refused = [one for one in found if one.holds and one.name != FAULT]
+    refused = [one for one in found if one.holds and one.name is not Code.FAULT]
     at_end = [one for one in found if one.end >= step.end - BRIEF]
-    hard = [one for one in at_end if one.name == CONTACT_FORCE and one.begin <= steady]
-    missed = [one for one in at_end if one.name == NOT_REACHED]
-    late = [one for one in within(reactions, step.begin, step.end) if one.name == NOT_FOLLOWED]
+    hard = [one for one in at_end if one.name is Code.CONTACT_FORCE and one.begin <= steady]
+    missed = [one for one in at_end if one.name is Code.NOT_REACHED]
+    late = [one for one in within(reactions, step.begin, step.end) if one.name is Code.NOT_FOLLOWED]
     return [*refused[:1], *hard[:1], *missed[:1], *late[:1]]
 
 
@@ -199,34 +208,30 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
     """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why."""
     lines = []
     for kind in dict.fromkeys(one.name for one in reactions):
-        first, *others = [one for one in reactions if one.name == kind]
-        verb = kind if kind == REFUSAL else f"{REFUSAL if first.holds else 'reported'} ({kind})"
+        first, *others = [one for one in reactions if one.name is kind]
+        verb = REFUSAL if kind is Code.REFUSED else f"{REFUSAL if first.holds else 'reported'} ({kind})"
         again = f" and {len(others)} times more" if others else ""
         begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
     return lines
 
 
-def lasting(found: Iterable[tuple[int, Mapping[str, str]]], end: int) -> list[RecordedReaction]:
-    """Reactions from their reasons by name each time they change, ns; one that only changes its numbers goes on.
+def lasting(found: Iterable[tuple[int, Sequence[Event]]], end: int) -> list[RecordedReaction]:
+    """Reactions from the events each time they change, ns; one of which only the numbers change goes on.
 
-    What holds the arm for another reason is another one.
+    What holds the arm for another cause is another one.
     """
     over: list[RecordedReaction] = []
-    present: dict[str, RecordedReaction] = {}
-    for stamp, reasons in found:
+    present: dict[Code, RecordedReaction] = {}
+    for stamp, events in found:
+        first = {event.code: event for event in reversed(events)}
         over += [
-            present.pop(name)._replace(end=stamp)
-            for name, one in [*present.items()]
-            if name not in reasons or (one.holds and _words(one.reason) != _words(reasons[name]))
+            present.pop(code)._replace(end=stamp)
+            for code, one in [*present.items()]
+            if code not in first or (one.holds and one.event.subject != first[code].subject)
         ]
-        for name, reason in reasons.items():
-            one = present.setdefault(name, RecordedReaction(stamp, end, name, reason))
-            if reason.startswith(one.reason):
-                present[name] = one._replace(reason=reason)  # with what would help, which is found later
+        for code, event in first.items():
+            one = present.setdefault(code, RecordedReaction(stamp, end, event))
+            if one.event.values.items() <= event.values.items():
+                present[code] = one._replace(event=event)  # with what would help, which is found later
     return [one for one in (*over, *present.values()) if one.end > one.begin]
-
-
-def _words(reason: str) -> str:
-    """What a reason is about, without numbers and advice."""
-    return NUMBERS.sub("", reason.partition(";")[0].partition(":")[0])

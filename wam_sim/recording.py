@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
-from wam_control.force.reaction_status import CONTACT_FORCE, stated
 from wam_control.task.scenario import FORCE_LOOP
+from wam_description.event import Code, Event, Level
 from wam_description.signals import NodeStatus
 from wam_description.status import CHANGES, ENABLED, parse
 from wam_description.topics import TOPICS
-from wam_sim.reactions import FAULT, RecordedReaction, lasting
+from wam_sim.reactions import RecordedReaction, lasting
 from wam_sim.recorded_commands import RefusedCommands, several_runs, taken_commands
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
 
@@ -55,7 +55,7 @@ class RecordedRun(NamedTuple):
     statuses : in the order of the bag.
     steps : those that were played to their end.
     unfinished : the step in which the recording ended, None if the scenario came to an end.
-    outcome : DONE, why the scenario failed, or '' if the recording ended before.
+    outcome : `Code.DONE`, why the scenario failed, or '' if the recording ended before.
     faults : of the driver, each once.
     mode : 'lockstep', 'realtime' or 'unknown'.
     refused : commands that are left out of the bag.
@@ -139,16 +139,18 @@ class RecordedRun(NamedTuple):
         A push that begins under the brakes is none: they stop the arm with a force that looks like one.
         """
         found = self.stamped_statuses()
-        loop = [(stamp, stated(status)) for stamp, status in found if status.node == FORCE_LOOP]
+        loop = [(stamp, status.events) for stamp, status in found if status.node == FORCE_LOOP]
         driver = [(stamp, status.fault) for stamp, status in found if status.node == "driver"]
-        faults = [(stamp, {FAULT: fault} if fault else {}) for stamp, fault in driver]
+        faults = [
+            (stamp, [Event(Code.FAULT, Level.ERROR, {"reason": fault})] if fault else []) for stamp, fault in driver
+        ]
         modes = sorted((stamp, status.mode) for stamp, status in found if status.node == "driver" and status.mode)
 
         def is_braked(stamp: int) -> bool:
             return next((mode for since, mode in reversed(modes) if since <= stamp), ENABLED) != ENABLED
 
-        pushed = [one for one in lasting(loop, end) if one.name != CONTACT_FORCE or not is_braked(one.begin)]
-        return tuple(sorted((*pushed, *lasting(faults, end))))
+        pushed = [one for one in lasting(loop, end) if one.name is not Code.CONTACT_FORCE or not is_braked(one.begin)]
+        return tuple(sorted((*pushed, *lasting(faults, end)), key=lambda one: (one.begin, one.end, one.name)))
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
@@ -250,7 +252,7 @@ def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedSte
         if status.node != "scenario" or not status.stamp:
             continue
         if not status.step:
-            return tuple(_ended(begun, status.stamp)), None, status.message
+            return tuple(_ended(begun, status.stamp)), None, status.message if status.level else Code.DONE.value
         if begun and begun[-1][:2] == (status.step, status.stamp):  # published again with what it has set
             begun[-1] = begun[-1]._replace(settings={**begun[-1].settings, **_settings(status)})
         else:

@@ -10,13 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from wam_control.contact.contact_estimator import ContactEstimate
-from wam_control.force.reaction_status import stated
 from wam_control.task.scenario import FORCE_LOOP, Scenario, ScenarioStep
 from wam_control.task.scenario_settings import require_settings
 from wam_description.configuration import Configuration
+from wam_description.event import Event, Level
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
-from wam_description.signals import BASE, Level, NodeStatus, Point, State, Wrench
+from wam_description.signals import BASE, NodeStatus, Point, State, Wrench
 from wam_description.synchroniser import Inputs, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
@@ -80,7 +80,7 @@ class Simulation:
         self._reported: tuple[Mode, str] | None = None
         self._steps = steps
         self._begins: list[int] = []  # of the steps, ns
-        self._reasons: list[tuple[int, dict[str, str]]] = []  # why the force loop does not obey, each time this changes
+        self._events: list[tuple[int, tuple[Event, ...]]] = []  # of the force loop, each time these change
         self.nodes: dict[str, Any] = {}
         self._synchronisers: dict[str, set[Synchroniser]] = {}
         require_sections(configuration.sections, shared.nodes)
@@ -92,7 +92,7 @@ class Simulation:
         has_sensors = "joint_sensors" in self._interface.topics
         self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
         if FORCE_LOOP in self.nodes:
-            self.listen(STATUS, lambda stamp, status: self._reasons.append((stamp, stated(status))), FORCE_LOOP)
+            self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
     def _scenario(self, configuration: Configuration, controllers: Mapping[str, Any]) -> Scenario:
@@ -135,7 +135,7 @@ class Simulation:
     @property
     def reactions(self) -> list[RecordedReaction]:
         """What the force loop did so far instead of what was commanded."""
-        return lasting(self._reasons, self.driver.stamp)
+        return lasting(self._events, self.driver.stamp)
 
     @property
     def played(self) -> list[PlayedStep]:

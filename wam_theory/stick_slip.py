@@ -24,13 +24,13 @@ from wam_theory.thresholds import SEARCH
 from wam_theory.verdicts import Outcome, Verdict, assess, largest_stable_step
 
 __all__ = [
-    "Event",
     "FrictionNode",
     "HalfCycle",
     "IntegralLoop",
     "Kind",
     "Motion",
     "Outcome",
+    "PhaseEvent",
     "Staircase",
     "Trajectory",
     "Verdict",
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 
-class Event(NamedTuple):
+class PhaseEvent(NamedTuple):
     """State at the start of a phase.
 
     `sign` is the direction of motion in the phase, 0 while stuck; `contact_force` is F_c, N m.
@@ -76,10 +76,10 @@ class Trajectory:
     _phases: tuple[Phase, ...] = field(repr=False)
 
     @property
-    def events(self) -> list[Event]:
+    def events(self) -> list[PhaseEvent]:
         """Events in order of time; the first is the start."""
         return [
-            Event(t, kind, sign, x, v, m, self._model.contact_force(x))
+            PhaseEvent(t, kind, sign, x, v, m, self._model.contact_force(x))
             for t, kind, sign, _, _, x, v, m, _ in self._phases
         ]
 

@@ -38,9 +38,10 @@ from wam_control.force.force_axis import ForceAxes, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Code, Event
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
-from wam_description.status import CHANGES, DONE
+from wam_description.status import CHANGES
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
 from wam_sim.reactions import RecordedReaction, sentences
 from wam_sim.recorded_parameters import recorded_parameters
@@ -169,8 +170,12 @@ def status(name: str, message: str, level: int = 0, **values: str) -> Any:
 
 def said(message: str, stamp: int, level: int) -> Any:
     """A status of the scenario: of a step, or of its end."""
-    step = {} if level or message == DONE else {"step": message}
+    step = {} if level or message == "done" else {"step": message}
     return status("scenario", message, level, stamp=str(stamp), **step)
+
+
+def event(code: str, reason: str = "why") -> dict[str, str]:
+    return {"event.1": code, "event.1.severity": "WARN", "event.1.reason": reason}
 
 
 def array(stamp: int, *statuses: Any) -> Any:
@@ -433,7 +438,9 @@ def with_limits(recording: Recording) -> Bag:
     sections = Configuration.load(packaged("wam")).sections
     content = yaml.safe_dump({"/wam/force_loop": {"ros__parameters": {**sections["/**"], **sections["force_loop"]}}})
     bag = recording.bag()
-    reacts = status("force_loop", "at least 81 N", stamp=str(START + 9300 * MS), reaction="contact_force")
+    reacts = status(
+        "force_loop", "at least 81 N", stamp=str(START + 9300 * MS), **event("contact_force", "at least 81 N")
+    )
     stated = messages([*itertools.starmap(said, recording.statuses), reacts])
     topics = {**bag.topics, "/wam/status": stated, "/wam/task_command": NO_TASK}
     return bag._replace(topics=topics, attachments={"parameters.yaml": content.encode()})
@@ -895,7 +902,9 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
     first, *_ = listed_contacts(traces, certainty_of(run, traces), ())
     assert (first.begin, first.end) == pytest.approx((0.52, 1.545))
     assert (summary.traces.zero, traces.zero) == (0, START + clock)
-    reaction = RecordedReaction(clock + START + 5000 * MS, clock + START + 7000 * MS, "not_sensed", "why")
+    reaction = RecordedReaction(
+        clock + START + 5000 * MS, clock + START + 7000 * MS, Event(Code.NOT_SENSED, values={"reason": "why"})
+    )
     assert sentences("press", [reaction], traces.zero) == ["press: refused (not_sensed) from 5.00 to 7.00 s: why"]
 
 
@@ -1219,7 +1228,7 @@ def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was
     """Latched topics are kept from before the part; no joint state is."""
     recording, kept = Recording(), slice(1200, 2000)  # from 6.0 s
     bag = recording.bag()
-    holds = status("force_loop", "not sensed", reaction="not_sensed")
+    holds = status("force_loop", "not sensed", **event("not_sensed"))
     logged = [*(at for _, at, _ in recording.statuses[:4]), START + 5002 * MS, recording.statuses[4][1]]
     stated = [*itertools.starmap(said, recording.statuses[:4]), holds, said(*recording.statuses[4])]
     states = JointColumns(*(column[kept] for column in joints()[:3]), joints().names, *(c[kept] for c in joints()[4:]))
@@ -1236,8 +1245,8 @@ def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
     recording.statuses = [(name, at, 0) for name, at in (("move", START), ("move", START + 4000 * MS))]
     bag = recording.bag()
     reacts = [
-        status("force_loop", message, stamp=str(START + at * MS), reaction=reaction)
-        for at, reaction, message in ((1000, "joint_end", "joint1 is at its end"), (1500, "none", ""))
+        status("force_loop", "", stamp=str(START + at * MS), **events)
+        for at, events in ((1000, event("joint_end")), (1500, {}))
     ]
     stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
     found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/status": stated}), lambda doing: None)
@@ -1394,7 +1403,7 @@ def with_outcome(folder, *statuses: tuple[str, str, int]):
         connection = writer.add_connection("/wam/status", kind, typestore=store)
         for stamp, (node, text, level) in enumerate(statuses, 1):
             facts = {"stamp": str(stamp * 10**9), **({"fault": text} if level and node == "driver" else {})}
-            facts |= {"step": text} if node == "scenario" and not level and text != DONE else {}
+            facts |= {"step": text} if node == "scenario" and text != "done" and not level else {}
             values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
             message = kinds["DiagnosticStatus"](level, node, text, "", values)
             writer.write(connection, stamp, store.serialize_cdr(message, kind))
@@ -1426,7 +1435,7 @@ def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections = [writer.add_connection(f"/wam/{name}", kind, typestore=store) for name in ("status", "other")]
         for stamp, said in ((1, "release the brakes"), (2, "done")):
-            facts = {"stamp": str(stamp * 10**9)} | ({} if said == DONE else {"step": said})
+            facts = {"stamp": str(stamp * 10**9), **({} if said == "done" else {"step": said})}
             values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
             message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
             for connection in connections:

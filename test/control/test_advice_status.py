@@ -4,7 +4,9 @@ import pytest
 
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
-from wam_description.signals import BASE, ForceCommand, NodeStatus
+from wam_description.event import CAUSE, Code, Event
+from wam_description.event_text import sentence
+from wam_description.signals import BASE, ForceCommand
 from wam_sim.simulation import Simulation
 
 
@@ -15,12 +17,12 @@ def test_the_status_of_a_refused_force_states_what_would_help() -> None:
         ScenarioStep("press", 1.0, force=ForceCommand(BASE, (0.2, 0.0, 0.0))),
     ]
     run = Simulation(Configuration.load(packaged("wam")), steps)
-    seen: list[NodeStatus] = []
-    run.listen("status", lambda _, status: seen.append(status), "force_loop")
+    seen: list[Event] = []
+    run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    refused = [status.message for status in seen if status.facts.get("reaction") == "not_sensed"]
-    assert refused[0].endswith("the arm holds its position")  # at once
-    assert refused[-1].startswith(f"{refused[0]}: turn joint")
+    refused = [event for event in seen if event.code is Code.NOT_SENSED]
+    assert "ways" not in refused[0].values, "at once"
+    assert str(refused[-1].values["ways"]).startswith("turn joint")
 
 
 def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
@@ -29,10 +31,10 @@ def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
 
     steps = [ScenarioStep("release", 0.05, request="enable"), pressing(70.0), pressing(90.0)]
     run = Simulation(Configuration.load(packaged("wam")), steps)
-    seen: list[str] = []
-    run.listen("status", lambda _, status: seen.append(status.message), "force_loop")
+    seen: list[Event] = []
+    run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    refusals = [message.partition(";")[0] for message in seen if "force_limit" in message]
+    refusals = [sentence(event).partition(";")[0] for event in seen if event.code is Code.REFUSED]
     assert refusals == [f"{newtons} N is commanded" for newtons in (70, 90)]
 
 
@@ -45,12 +47,9 @@ def test_a_force_that_began_while_the_arm_moved_has_the_reason_of_the_arm_at_res
         ScenarioStep("press", 1.5, force=ForceCommand("outer_link", (0.0, -8.0, 0.0))),
     ]
     run = Simulation(heavy.with_values({"force_loop:joint_speed_limit": 2.0}), steps)
-    seen: list[str] = []
-    run.listen("status", lambda _, status: seen.append(status.message), "force_loop")
+    seen: list[Event] = []
+    run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    fast, loaded = (
-        [k for k, message in enumerate(seen) if text in message]
-        for text in ("the arm moved faster than 0.3 rad/s as the force began", "the arm at rest already measures")
-    )
-    assert fast[0] < loaded[0]
+    causes = [event.values[CAUSE] for event in seen]
+    assert causes.index("moved_fast") < causes.index("loaded")
     assert run.unmet.startswith("press refused: the arm at rest already measures")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from test_force_loop import ARM, BODY, DOWN, DRIVEN, DT, GIVEN, POSE, STILL, down, force_loop, lever
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
+from wam_description.event import Code
 from wam_description.signals import NO_CONTACT, Contact, State
 
 OWN = replace(
@@ -76,10 +76,10 @@ def on_the_inner_link() -> Iterator[Period]:
 @pytest.mark.parametrize(
     ("parameters", "before", "after", "reaction"),
     [
-        (OWN, sliding, pressed_on, ForceReaction.NONE),
-        (OWN, moved_between, pressed_on, ForceReaction.NONE),
-        (WEAK, sliding, pressed_on, ForceReaction.NOT_SENSED),
-        (replace(OWN, contact_source="estimated"), elsewhere, on_the_inner_link, ForceReaction.OTHER_LINK),
+        (OWN, sliding, pressed_on, Code.NONE),
+        (OWN, moved_between, pressed_on, Code.NONE),
+        (WEAK, sliding, pressed_on, Code.NOT_SENSED),
+        (replace(OWN, contact_source="estimated"), elsewhere, on_the_inner_link, Code.OTHER_LINK),
     ],
 )
 def test_a_force_in_another_frame_begins_as_in_a_new_loop(
@@ -88,7 +88,7 @@ def test_a_force_in_another_frame_begins_as_in_a_new_loop(
     used, new = force_loop(ARM, parameters), force_loop(ARM, parameters)  # type: ignore[arg-type]
     played(used, before(), "base")
     found, expected = (played(loop, after(), "outer_link") for loop in (used, new))
-    assert used.reaction is new.reaction is reaction
+    assert used.reaction.code is new.reaction.code is reaction
     for one, other in zip(found, expected, strict=True):
         assert one.point == other.point
         assert one.velocity == pytest.approx(other.velocity, abs=1e-12)

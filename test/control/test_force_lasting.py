@@ -8,9 +8,9 @@ import pytest
 from arms import CONFIGURATION, WAM
 from test_force_plant import MOTORS
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, unit
 from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
@@ -33,7 +33,7 @@ POSE = (0.0, -1.8, 0.0, 1.45)  # of the demonstration
 DIRECTION = triple(-BODY.cover_pose(POSE, OUTER).rotation[:, 1])
 
 
-def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.ndarray, list[ForceReaction]]:
+def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.ndarray, list[Code]]:
     """True force on a rod across the outer link, N, and reaction in each inner period of the steps."""
     surface = Surface(OUTER, PLACE, DIRECTION, stiffness, 0.3, is_plane=False)
     given = {
@@ -57,7 +57,7 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
                 mujoco.mj_contactForce(model, data, i, wrench)
                 total += abs(float(np.array(DIRECTION) @ data.contact.frame[i].reshape(3, 3).T @ wrench[:3]))
         forces.append(total)
-        reactions.append(run.nodes["force_loop"].force_reaction)
+        reactions.append(run.nodes["force_loop"].reaction.code)
     begin = round(1e3 * RANGES.release)
     return np.array(forces[begin:]), reactions[begin:]
 
@@ -75,7 +75,7 @@ def test_a_small_force_from_the_motors_does_not_creep_while_it_is_held() -> None
     It is known to 26 %, so that it is refused where nobody allows that.
     """
     forces, reactions = pressed(1500.0, press(1.0, 1.0), **MOTORS)
-    assert reactions[-1] is ForceReaction.NOT_SENSED
+    assert reactions[-1] is Code.NOT_SENSED
     assert not forces.any()
     forces, _ = pressed(1500.0, press(1.0, 8.0), **{**MOTORS, "force_loop:sensing.stated_fraction": 0.3})
     assert abs(forces[-480:].mean() - 1.0) < 0.1
@@ -92,9 +92,9 @@ def test_an_arm_that_holds_presses_no_harder_than_commanded(as_task: bool) -> No
         press(3.0, 1.5, as_task, push=hand._replace(end=1.5)),
     ]
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": "estimated"})
-    second = [reaction is ForceReaction.SECOND_CONTACT for reaction in reactions]
+    second = [reaction is Code.SECOND_CONTACT for reaction in reactions]
     assert all(second[1600:2400])
-    assert set(reactions[2400:]) <= {ForceReaction.SECOND_CONTACT, ForceReaction.OTHER_LINK}  # told apart after a while
+    assert set(reactions[2400:]) <= {Code.SECOND_CONTACT, Code.OTHER_LINK}  # told apart after a while
     assert forces[1400:1600].mean() > 11.0
     assert forces[2400:][second[2400:]].mean() < 3.5
     assert forces[-200:].mean() < 3.5
@@ -107,9 +107,9 @@ def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float
     local = BODY.cover_pose(POSE, OUTER).rotation.T @ (newtons * np.array(DIRECTION))
     steps = [press(8.0, 1.8), press(8.0, 0.8, push=Push(OUTER, place, triple(local), 0.0, 0.8))]
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": source})
-    assert reactions[1799] is ForceReaction.NONE
+    assert reactions[1799] is Code.NONE
     assert abs(forces[-100:].mean() - 8.0) > 0.8
-    assert reactions[-1] in (ForceReaction.NOT_EXPLAINED, ForceReaction.CONTACT_FORCE)
+    assert reactions[-1] in (Code.NOT_EXPLAINED, Code.CONTACT_FORCE)
 
 
 @pytest.mark.parametrize(("degrees", "friction", "as_task"), [(73.0, 0.3, False), (73.0, 0.3, True), (0.0, 0.8, False)])
@@ -125,7 +125,7 @@ def test_the_force_in_all_stays_below_a_multiple_of_the_commanded_one(
         step = ScenarioStep("press", 1.5, task=TaskCommand("base", (axis,)))
     forces, reactions = pressed(4000.0, step, **{"driver:world.obstacles.friction": [friction]})
     assert forces.max() < 1.6 * 20.0
-    assert (ForceReaction.CONTACT_FORCE in reactions) is (degrees > 0.0)
+    assert (Code.CONTACT_FORCE in reactions) is (degrees > 0.0)
 
 
 def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:

@@ -10,6 +10,8 @@ from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World
 
 from wam_control.force.force_law import BumplessTransfer, ForceLaw
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
+from wam_description.event import refused
+from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, State
 from wam_theory.stick_slip import IntegralLoop
@@ -245,7 +247,7 @@ def test_a_force_above_the_limit_is_refused_and_the_last_good_one_remains_in_for
         assert -out.error[2] == pytest.approx(force)
     remains = "the last good command remains in force for inf s"  # the age of a command is not limited here
     reason = f"31 N is commanded; allowed: up to force_limit, 30 N; {remains}"
-    assert loop.refusals == {"force_command": reason}
+    assert loop.refusals == {"force_command": refused("force_command", reason)}
     assert (loop.refused, free.refused, free.refusals) == (1, 0, {})
     ask(loop, World(400.0), down(29.0))
     assert loop.refusals == {}
@@ -264,6 +266,6 @@ def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_fo
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
         out = ask(loop, World(1e-9), None, torque=torque)
     assert out.effort == [1.0, 2.0, 0.0, 0.0]
-    assert "4.5 N m is commanded; allowed: up to torque_limit, 4 N m" in loop.refusals["joint_torque_command"]
+    assert "4.5 N m is commanded; allowed: up to torque_limit, 4 N m" in sentence(loop.refusals["joint_torque_command"])
     loop.tune(replace(loop.parameters, torque_limit=5.0))
     assert ask(loop, World(1e-9), None, torque=torque).effort == torque

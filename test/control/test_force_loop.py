@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.torque_watch import TorqueWatch
 from wam_control.task.motion import GoalMotion
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError, build, values
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
@@ -279,14 +280,14 @@ def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
         assert out.effort == STILL, "nothing is fed forward: on a free arm it would be a throw"
         world.move(out.velocity)
     assert stiffness * np.subtract(world.q, POSE) == pytest.approx(commanded, rel=1e-3)
-    assert loop.reaction is ForceReaction.NONE
+    assert loop.reaction.code is Code.NONE
 
 
 LATE = 200  # periods of the settling time
 WATCHING = replace(OWN, mode="joint_torque", limits=replace(OWN.limits, settling_time=LATE * DT))
 
 
-def reactions(torques: list[float], taken: list[float], sd: float = 0.0) -> list[ForceReaction]:
+def reactions(torques: list[float], taken: list[float], sd: float = 0.0) -> list[Code]:
     """Of a joint in each period, while its commanded and measured torque, N m, are these."""
     watch, sensing = TorqueWatch("joint2"), replace(OWN.sensing, reported_fraction=0.1)
     own = replace(WATCHING, sensing=sensing)
@@ -300,9 +301,11 @@ def test_a_joint_torque_that_is_not_reached_is_reported_in_time(taken: float) ->
     sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - external).tolist())
     for period in range(LATE + 3):
         loop.step(World(1e-9).joints, sensors, NO_CONTACT, None, None, None, [0.0, -1.0, 0.0, 0.0], DT)
-        assert period > LATE - 2 or loop.reaction is ForceReaction.NONE
-    assert loop.reaction is ForceReaction.NOT_REACHED
-    assert f"joint2: {-taken + 0.0:.2g} N m are measured and -1 N m commanded; the torque has been off" in loop.reason
+        assert period > LATE - 2 or loop.reaction.code is Code.NONE
+    assert loop.reaction.code is Code.NOT_REACHED
+    assert f"joint2: {-taken + 0.0:.2g} N m are measured and -1 N m commanded; the torque has been off" in sentence(
+        loop.reaction
+    )
 
 
 def test_a_joint_torque_that_is_not_reached_is_reported_next_to_one_that_is_uncertain_and_a_joint_at_its_end() -> None:
@@ -314,12 +317,13 @@ def test_a_joint_torque_that_is_not_reached_is_reported_next_to_one_that_is_unce
     for _ in range(LATE + 3):
         loop.step(State(pose, STILL, DRIVEN), sensors, NO_CONTACT, None, None, None, [0.0, 0.0, 0.3, 2.0], DT)
     assert list(loop.reactions) == [
-        ForceReaction.NOT_REACHED,
-        ForceReaction.UNCERTAIN,
-        ForceReaction.JOINT_END,
+        Code.NOT_REACHED,
+        Code.UNCERTAIN,
+        Code.JOINT_END,
     ]
-    assert (loop.reaction, loop.reason) == next(iter(loop.reactions.items()))
-    assert [why.partition(":")[0].split(" ")[0] for why in loop.reactions.values()] == ["joint4", "joint3", "joint4"]
+    assert loop.reaction == next(iter(loop.reactions.values()))
+    who = [event.values.get("joint", event.values.get("axis")) for event in loop.reactions.values()]
+    assert who == ["joint4", "joint3", "joint4"]
 
 
 TIME = np.arange(0.0, 12.0, DT)
@@ -341,23 +345,23 @@ def test_a_joint_torque_that_is_not_taken_is_reported_whatever_the_command_does(
     torques: np.ndarray, taken: np.ndarray
 ) -> None:
     found = reactions(torques.tolist(), taken.tolist(), 0.02)
-    assert ForceReaction.NOT_REACHED not in found[: LATE - 2]
-    assert found[3 * LATE :] == [ForceReaction.NOT_REACHED] * (len(found) - 3 * LATE)
+    assert Code.NOT_REACHED not in found[: LATE - 2]
+    assert found[3 * LATE :] == [Code.NOT_REACHED] * (len(found) - 3 * LATE)
 
 
 def test_a_joint_torque_that_is_right_is_not_reported_and_no_more_once_it_is() -> None:
     varying = 2.0 + 0.5 * np.sin(2.0 * math.pi * 0.5 * TIME)
     noisy = varying + 0.1 * np.random.default_rng(2).normal(size=len(TIME))
-    assert set(reactions(varying.tolist(), noisy.tolist(), 0.05)) == {ForceReaction.NONE}
+    assert set(reactions(varying.tolist(), noisy.tolist(), 0.05)) == {Code.NONE}
     later = np.where(np.arange(len(TIME)) < 2 * LATE, 0.0, 2.0)
     found = reactions([2.0] * len(TIME), later.tolist(), 0.02)
     back = 2 * LATE + LATE // 4
-    assert found[2 * LATE] is ForceReaction.NOT_REACHED
-    assert set(found[back:]) == {ForceReaction.NONE}
+    assert found[2 * LATE] is Code.NOT_REACHED
+    assert set(found[back:]) == {Code.NONE}
 
 
 def test_a_joint_torque_that_is_not_known_well_enough_is_reported() -> None:
-    for torque, reaction in ((12.0, ForceReaction.NONE), (6.0, ForceReaction.UNCERTAIN)):
+    for torque, reaction in ((12.0, Code.NONE), (6.0, Code.UNCERTAIN)):
         assert reactions([torque] * LATE, [torque] * LATE, 1.0)[-1] is reaction
 
 
@@ -369,8 +373,8 @@ def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() ->
     for torque in (None, [0.0, 0.0, 0.0, 2.0]):
         for _ in range(LATE):
             out = loop.step(World(1e-9).joints, sensors, NO_CONTACT, None, None, None, torque, DT)
-    assert loop.reaction is ForceReaction.NOT_SENSED
-    assert "as with 0.5 kg at the tool" in loop.reason
+    assert loop.reaction.code is Code.NOT_SENSED
+    assert "as with 0.5 kg at the tool" in sentence(loop.reaction)
     assert out.velocity == STILL
 
 
@@ -391,7 +395,7 @@ def test_a_command_that_has_no_effect_in_a_mode_is_refused() -> None:
     hybrid = force_loop(ARM, OWN)
     ask(hybrid, World(400.0), None, torque=[1.0, 0.0, 0.0, 0.0], posture=moved)
     why = "joint_torque_command has no effect in the mode hybrid; set force_loop:mode to joint_torque, or end the"
-    assert hybrid.refusals["joint_torque_command"].startswith(why)
+    assert sentence(hybrid.refusals["joint_torque_command"]).startswith(why)
 
 
 MOVED = [angle + 0.05 for angle in POSE]
@@ -405,7 +409,8 @@ def test_a_posture_in_a_mode_that_follows_none_is_refused_if_the_arm_would_have_
         for posture in (first, MOVED):
             out = ask(loop, World(400.0), None, posture=posture)
             assert not any(out.velocity)
-            refusal = loop.refusals.get("joint_posture_command", "")
+            refusals = {topic: sentence(event) for topic, event in loop.refusals.items()}
+            refusal = refusals.get("joint_posture_command", "")
             why = f"joint_posture_command has no effect in the mode {mode}; set force_loop:mode to hybrid, or end"
             assert refusal.startswith(why) if posture is MOVED else not refusal
 
@@ -434,7 +439,7 @@ def test_with_a_task_other_commands_are_refused_as_far_as_it_leaves_nothing_for_
             )
         assert set(loop.refusals) == refused
         text = f"force_command has no effect with a task of {count} axes on 4 joints; end one of them"
-        assert loop.refusals["force_command"] == text
+        assert sentence(loop.refusals["force_command"]) == text
 
 
 @pytest.mark.parametrize(("speed", "is_late"), [(1.0, False), (1.2, False), (1.3, True)])
@@ -444,9 +449,9 @@ def test_a_posture_that_moves_faster_than_the_arm_follows_is_reported(speed: flo
     for k in range(200):
         posture = [POSE[0] + 0.5 * speed * DT * k, *POSE[1:]]
         world.move(ask(loop, world, None, posture=posture).velocity)
-        found.append(loop.reaction)
-    assert set(found) == {ForceReaction.NONE, *([ForceReaction.NOT_FOLLOWED] if is_late else [])}
-    assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in loop.reason) is is_late
+        found.append(loop.reaction.code)
+    assert set(found) == {Code.NONE, *([Code.NOT_FOLLOWED] if is_late else [])}
+    assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in sentence(loop.reaction)) is is_late
 
 
 @pytest.mark.slow
@@ -457,17 +462,17 @@ def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported() -> Non
     for _ in range(round(4.0 / DT)):
         world.move(ask(loop, world, down(4.0)).velocity)
         found.append(loop.reactions)
-    late = [ForceReaction.NOT_REACHED in one for one in found]
+    late = [Code.NOT_REACHED in one for one in found]
     assert late.index(True) == pytest.approx(0.5 / DT, abs=2)
-    assert found[late.index(True)][ForceReaction.NOT_REACHED].startswith(way.format("1")[2:])
+    assert sentence(found[late.index(True)][Code.NOT_REACHED]).startswith(way.format("1")[2:])
     assert not any(late[round(2.0 / DT) :]), "the set point is the command"
     loop.step(world.joints, world.sensors, NO_CONTACT, None, ForceCommand("base", down(60.0)), None, None, DT)
-    assert all("on its way to the command, 60 N" in why for why in loop.reactions.values())
+    assert all("on its way to the command, 60 N" in sentence(event) for event in loop.reactions.values())
     turning = replace(OWN, mode="joint_torque", limits=limits, torque_rate_limit=1.0)
     loop = force_loop(ARM, turning)
     for _ in range(round(0.6 / DT)):
         loop.step(world.joints, world.sensors, NO_CONTACT, None, None, None, [0.0, -2.0, 0.0, 0.0], DT)
-    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in loop.reactions[ForceReaction.NOT_REACHED]
+    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in loop.reactions[Code.NOT_REACHED]
 
 
 @pytest.mark.parametrize(
@@ -482,13 +487,15 @@ def test_a_posture_that_is_not_reached_is_reported(gain: float, way: float, is_f
         velocity = ask(loop, world, None, posture=motion.at(k * DT).position).velocity
         if is_free:
             world.move(velocity)
-    assert (loop.reaction is ForceReaction.NOT_REACHED) is is_short
+    assert (loop.reaction.code is Code.NOT_REACHED) is is_short
     if is_short:
         name, advice = ARM.joints.names[1], f"raise force_loop:posture_gain, {gain:g} 1/s"
-        assert re.match(rf"{name} is \S+ rad away from the commanded posture; allowed: \S+ rad, 0.05 rad", loop.reason)
-        assert advice in loop.reason
+        assert re.match(
+            rf"{name} is \S+ rad away from the commanded posture; allowed: \S+ rad, 0.05 rad", sentence(loop.reaction)
+        )
+        assert advice in sentence(loop.reaction)
     ask(loop, world, down(6.0), posture=motion.at(2.0).position)
-    assert "posture" not in loop.reason, "a force moves the arm away from it"
+    assert "posture" not in sentence(loop.reaction), "a force moves the arm away from it"
 
 
 def test_under_the_brakes_neither_a_posture_nor_a_force_is_late() -> None:
@@ -498,17 +505,17 @@ def test_under_the_brakes_neither_a_posture_nor_a_force_is_late() -> None:
     braked = world.joints._replace(effort=[0.0] * 4)
     for _ in range(round(0.5 / DT)):
         loop.step(braked, world.sensors, NO_CONTACT, None, ForceCommand("base", down(6.0)), goal, None, DT)
-        assert ForceReaction.NOT_REACHED not in loop.reactions
+        assert Code.NOT_REACHED not in loop.reactions
     for _ in range(5):
         ask(loop, world, None, posture=goal)
-        assert loop.reaction is ForceReaction.NONE
+        assert loop.reaction.code is Code.NONE
 
 
 def test_a_posture_that_is_set_at_once_is_reached_as_fast_as_the_arm_may_go() -> None:
     loop, world, goal = force_loop(ARM, OWN), World(1e-9), [POSE[0], POSE[1] + 1.2, *POSE[2:]]
     for _ in range(round(2.0 / DT)):
         world.move(ask(loop, world, None, posture=goal).velocity)
-        assert loop.reaction is ForceReaction.NONE
+        assert loop.reaction.code is Code.NONE
     assert world.q == pytest.approx(goal, abs=1e-3)
 
 

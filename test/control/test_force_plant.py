@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_control.force.task import AxisKind, TaskCommand, joint_axes
 from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
@@ -86,7 +86,7 @@ def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
     speeds, loop = [], run.nodes["force_loop"]
     while not run.step():
         speeds.append(run.driver.plant.qd)
-        assert loop.force_reaction not in (ForceReaction.CYCLE, ForceReaction.CONTACT_FORCE)
+        assert loop.reaction.code not in (Code.CYCLE, Code.CONTACT_FORCE)
     measured = [math.hypot(*row.values[:3]) for row in run.rows["force_measured"]]
     assert max(measured) < 0.2 * math.hypot(*newtons), "nothing is touched"
     signs = np.sign(np.where(np.abs(speeds) < 0.3, 0.0, speeds)).T

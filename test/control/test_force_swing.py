@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from test_force_loop import ARM, CONFIGURATION, DT, GIVEN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceLoop, ForceOutput
 from wam_control.force.force_swing import Reversals, Shake
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.signals import NO_CONTACT, Contact
 
 LIMITS = replace(GIVEN.limits, settling_time=0.5)
@@ -45,28 +46,28 @@ def test_a_force_that_cycles_and_is_off_is_reported_as_both() -> None:
     loop = force_loop(ARM, PINNED)
     for k in range(420):
         ask(loop, World(400.0, force=3.0 + 0.4 * math.sin(2.0 * math.pi * k * DT / 0.2)), down(5.0))
-    assert list(loop.reactions)[:2] == [ForceReaction.NOT_REACHED, ForceReaction.CYCLE]
+    assert list(loop.reactions)[:2] == [Code.NOT_REACHED, Code.CYCLE]
 
 
-@pytest.mark.parametrize(("lasting", "expected"), [(0.085, ForceReaction.NONE), (1.0, ForceReaction.CYCLE)])
-def test_an_impact_that_bounces_is_no_limit_cycle(lasting: float, expected: ForceReaction) -> None:
+@pytest.mark.parametrize(("lasting", "expected"), [(0.085, Code.NONE), (1.0, Code.CYCLE)])
+def test_an_impact_that_bounces_is_no_limit_cycle(lasting: float, expected: Code) -> None:
     """At a touch the force turned back five times in 75 ms, and a limit cycle was reported for two seconds."""
     loop = force_loop(ARM, PINNED)
     for k in range(100):
         swing = 0.9 * (-1) ** (k // 3) if k * DT < lasting else 0.0
         ask(loop, World(400.0, force=5.0 + swing), down(5.0))
-    assert loop.reaction is expected
+    assert loop.reaction.code is expected
 
 
 def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     loop = force_loop(ARM, PINNED)
     for k in range(220):
         ask(loop, World(400.0, force=5.0 + 0.4 * math.sin(2.0 * math.pi * k * DT / 0.2)), down(5.0))
-    assert loop.reaction is ForceReaction.CYCLE
-    assert "0.2 s about 5 N" in loop.reason
+    assert loop.reaction.code is Code.CYCLE
+    assert "0.2 s about 5 N" in sentence(loop.reaction)
     for _ in range(220):
         ask(loop, World(400.0, force=5.0), down(5.0))
-    assert loop.reaction is ForceReaction.NONE
+    assert loop.reaction.code is Code.NONE
 
 
 @pytest.mark.slow
@@ -99,41 +100,41 @@ def test_where_the_late_force_of_the_motors_swings_the_arm_is_slowed_down(
         speeds.append(float(out.axis.lever @ out.velocity))
     assert speeds[1] == pytest.approx(share * speeds[0], rel=0.1)
     if swing < 0.8:
-        assert loop.reaction is ForceReaction.NONE
+        assert loop.reaction.code is Code.NONE
 
 
 def test_a_pinned_force_that_is_known_badly_is_reported_with_its_uncertainty() -> None:
     loop = force_loop(ARM, PINNED)
     for _ in range(200):
         ask(loop, World(400.0, force=0.6), down(0.6))
-    assert loop.reaction is ForceReaction.UNCERTAIN
-    assert "the force is known to +-0.077 N" in loop.reason
+    assert loop.reaction.code is Code.UNCERTAIN
+    assert "the force is known to +-0.077 N" in sentence(loop.reaction)
     for _ in range(200):
         ask(loop, World(400.0, force=15.0), down(15.0))
-    assert loop.reaction is ForceReaction.NONE
+    assert loop.reaction.code is Code.NONE
 
 
 def test_errors_of_torques_count_less_than_friction_in_what_is_reported() -> None:
     """Those found are half of what is stated; friction is bounded by little more than its standard deviation."""
     for friction, torque_sd, reaction in (
-        (0.0, 0.15, ForceReaction.NONE),
-        (0.0, 0.25, ForceReaction.UNCERTAIN),
+        (0.0, 0.15, Code.NONE),
+        (0.0, 0.25, Code.UNCERTAIN),
     ):
         sensing = replace(PINNED.sensing, friction=friction, torque_sd=torque_sd, reported_fraction=0.04)
         loop = force_loop(ARM, replace(PINNED, sensing=sensing))
         for _ in range(200):
             out = ask(loop, World(400.0, force=4.0), down(4.0))
-        assert loop.reaction is reaction, out.axis.force_sd
+        assert loop.reaction.code is reaction, out.axis.force_sd
 
 
 @pytest.mark.slow
 def test_an_error_of_the_measured_force_leaves_less_to_what_is_not_known() -> None:
     """8 % are measured, and 7 % are not known: the true force may well be off by more than 10 %."""
     loop = force_loop(ARM, PINNED)
-    for measured, reaction in ((2.5, ForceReaction.NONE), (2.7, ForceReaction.UNCERTAIN)):
+    for measured, reaction in ((2.5, Code.NONE), (2.7, Code.UNCERTAIN)):
         for _ in range(420):
             ask(loop, World(400.0, force=measured), down(2.5))
-        assert loop.reaction is reaction
+        assert loop.reaction.code is reaction
 
 
 def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_commanded() -> None:
@@ -151,17 +152,17 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
         return out
 
     out = press(5.0, 1e-4)
-    assert loop.reaction is ForceReaction.SHAKEN
-    assert "where no surface is as stiff, lower guard.contact_stiffness" in loop.reason
+    assert loop.reaction.code is Code.SHAKEN
+    assert "where no surface is as stiff, lower guard.contact_stiffness" in sentence(loop.reaction)
     assert float(axis @ out.velocity) == pytest.approx(0.0, abs=2e-3)
-    advised = re.search(r"command (\S+) N", loop.reason)
-    assert advised, loop.reason
+    advised = re.search(r"command (\S+) N", sentence(loop.reaction))
+    assert advised, sentence(loop.reaction)
     assert float(axis @ press(float(advised[1]), 1e-4).velocity) > 0.005, "more force is commanded"
     ask(loop, world, None)
     press(3.0, 0.0)
-    assert loop.reaction is ForceReaction.NONE
+    assert loop.reaction.code is Code.NONE
     press(3.0, 1e-4)
-    assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
+    assert loop.reaction.code is Code.NONE, "the motion that was there before counts"
 
 
 @pytest.mark.parametrize("samples", [8, 16, 32])
@@ -175,8 +176,8 @@ def test_the_shaking_is_watched_for_a_whole_cycle_of_the_dither(samples: int) ->
         swing = size * math.sin(2.0 * math.pi * k / samples)
         world.q = (POSE + swing * axis / float(axis @ axis)).tolist()
         ask(loop, world, down(5.0), external=STILL)
-    assert loop.reaction is ForceReaction.SHAKEN
-    assert f"the arm shakes by {2.0 * size:.3g} m" in loop.reason
+    assert loop.reaction.code is Code.SHAKEN
+    assert f"the arm shakes by {2.0 * size:.3g} m" in sentence(loop.reaction)
 
 
 def test_what_is_advised_in_place_of_a_force_that_is_not_detected_does_not_shake_the_arm_too_much_either() -> None:
@@ -190,8 +191,8 @@ def test_what_is_advised_in_place_of_a_force_that_is_not_detected_does_not_shake
         for k in range(60):
             world.q = (POSE + amplitude * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
             ask(loop, world, down(5.0), external=STILL, external_sd=[sd] * 4)
-        assert loop.reaction is ForceReaction.NOT_SENSED
-        assert f"command {advised:g} N" in loop.reason
+        assert loop.reaction.code is Code.NOT_SENSED
+        assert f"command {advised:g} N" in sentence(loop.reaction)
 
 
 def test_where_the_arm_would_shake_less_in_another_pose_it_is_advised() -> None:
@@ -208,10 +209,10 @@ def test_where_the_arm_would_shake_less_in_another_pose_it_is_advised() -> None:
         return loop
 
     loop = shaken(list(POSE))
-    assert loop.reaction is ForceReaction.SHAKEN
-    turned = re.search(r"turn joint4 from \S+ to (\S+) rad", loop.reason)
-    assert turned, loop.reason
-    assert shaken([*POSE[:3], float(turned[1])]).reaction is ForceReaction.NONE
+    assert loop.reaction.code is Code.SHAKEN
+    turned = re.search(r"turn joint4 from \S+ to (\S+) rad", sentence(loop.reaction))
+    assert turned, sentence(loop.reaction)
+    assert shaken([*POSE[:3], float(turned[1])]).reaction.code is Code.NONE
 
 
 def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_holds() -> None:
@@ -220,13 +221,13 @@ def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_hol
     own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
     free = ask(force_loop(ARM, own), World(1e-9), down(5.0), external=STILL).axis
     alike = 1.0 / (1.0 / (free.impact_mass * (2.0 * math.pi / (40 * timing.period)) ** 2) - free.compliance)
-    for part, reaction in ((0.2, ForceReaction.NONE), (1.0, ForceReaction.SHAKEN)):
+    for part, reaction in ((0.2, Code.NONE), (1.0, Code.SHAKEN)):
         stiff = replace(own, guard=replace(own.guard, contact_stiffness=part * alike))
         loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
         for k in range(60):
             world.q = (POSE + 1.5e-5 * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
             ask(loop, world, down(2.5), external=STILL)
-        assert loop.reaction is reaction
+        assert loop.reaction.code is reaction
 
 
 @pytest.mark.parametrize(("before", "quiet"), [(4.0, 30), (5.0, 102)])
@@ -237,8 +238,8 @@ def test_a_reported_force_stays_so_until_it_has_been_right_for_some_time(before:
     for force, periods in ((before, 20), (4.0, 110), (5.0, quiet - 10), (5.0, 10)):
         for _ in range(periods):
             ask(loop, World(400.0, force=force), down(5.0))
-        reactions.append(loop.reaction)
-    late, now = ForceReaction.NOT_REACHED, ForceReaction.NONE
+        reactions.append(loop.reaction.code)
+    late, now = Code.NOT_REACHED, Code.NONE
     assert reactions == [now, late, late, now]
 
 

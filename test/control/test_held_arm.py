@@ -12,11 +12,12 @@ from test_force_plant import MOTORS
 
 from wam_control.force.arm_push import ArmPush
 from wam_control.force.contact_position import torque_of_position
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.given_way import GivenWay
 from wam_control.force.held_arm import HeldArm
 from wam_control.task.scenario import Push, ScenarioStep
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
@@ -41,13 +42,13 @@ class Moment(NamedTuple):
     time: float
     tool: np.ndarray
     speed: float
-    reaction: ForceReaction
+    reaction: Code
     reason: str
 
 
 def came(
     step: ScenarioStep, begin: float, cover: str = OUTER, place: float = PLACE, away: float = 0.0, **changes: Any
-) -> tuple[float, ForceReaction, str]:
+) -> tuple[float, Code, str]:
     """Largest force of a surface that comes at 20 mm/s by 30 mm, N, and what the arm reports at the end."""
     across = -BODY.cover_pose(POSE, cover).rotation[:, 1]
     surface = Surface(
@@ -67,7 +68,7 @@ def came(
     peak, loop = 0.0, run.nodes["force_loop"]
     while not run.step():
         peak = max(peak, float(np.linalg.norm(run.driver.true_contact.force)))
-        reaction, reason = loop.force_reaction, loop.reason
+        reaction, reason = loop.reaction.code, sentence(loop.reaction)
     return peak, reaction, reason
 
 
@@ -78,22 +79,22 @@ def force(newtons: float, direction: np.ndarray, seconds: float) -> ScenarioStep
 @pytest.mark.parametrize(
     ("step", "given", "reaction", "most"),
     [
-        (force(4.0, DOWN, 3.5), {"driver:mismatch.payload": 0.3}, ForceReaction.NOT_SENSED, 8.0),
-        (force(1.0, ASIDE, 3.5), {}, ForceReaction.NOT_SENSED, 4.0),
-        (force(8.0, DOWN, 5.5), {"away": NOTHING_NEAR, "begin": 2.8}, ForceReaction.NOTHING_TOUCHED, 12.0),
-        (force(8.0, DOWN, 3.0), {"cover": "inner_link", "place": 0.45}, ForceReaction.OTHER_LINK, 12.0),
+        (force(4.0, DOWN, 3.5), {"driver:mismatch.payload": 0.3}, Code.NOT_SENSED, 8.0),
+        (force(1.0, ASIDE, 3.5), {}, Code.NOT_SENSED, 4.0),
+        (force(8.0, DOWN, 5.5), {"away": NOTHING_NEAR, "begin": 2.8}, Code.NOTHING_TOUCHED, 12.0),
+        (force(8.0, DOWN, 3.0), {"cover": "inner_link", "place": 0.45}, Code.OTHER_LINK, 12.0),
         # what the motors do not detect yet presses harder
-        (force(1.0, ASIDE, 3.5), MOTORS, ForceReaction.NOT_SENSED, 9.0),
+        (force(1.0, ASIDE, 3.5), MOTORS, Code.NOT_SENSED, 9.0),
         (
             force(15.0, DOWN, 3.0),
             {"cover": "inner_link", "place": 0.45, **MOTORS},
-            ForceReaction.OTHER_LINK,
+            Code.OTHER_LINK,
             22.0,
         ),
     ],
 )
 def test_a_surface_that_comes_to_an_arm_that_holds_is_pressed_no_harder_than_commanded(
-    step: ScenarioStep, given: dict[str, Any], reaction: ForceReaction, most: float
+    step: ScenarioStep, given: dict[str, Any], reaction: Code, most: float
 ) -> None:
     """It had not pressed before, and stayed where it was: 27 to 69 N, and nothing was said of it.
 
@@ -126,7 +127,7 @@ def test_a_false_contact_does_not_make_the_arm_wander() -> None:
     for _ in range(300):  # what overpowers the motors does not make it give way again
         q = q + np.array([0.0, 0.001, 0.0, 0.0])
         assert float(step() @ torques) < 1e-9
-    assert "something touches the arm" in held.push
+    assert held.pushed > 0.0
 
 
 def pushed(command: ForceCommand, hand: Push, pulses: int, pose: list[float], **near: Any) -> list[Moment]:
@@ -141,7 +142,7 @@ def pushed(command: ForceCommand, hand: Push, pulses: int, pose: list[float], **
         if run.driver.is_outer and time > 0.0:
             speed = float(np.linalg.norm(BODY.tool_jacobian(plant.q) @ plant.qd))
             tool = BODY.tool_pose(plant.q).position
-            found.append(Moment(time, tool, speed, loop.force_reaction, loop.reason))
+            found.append(Moment(time, tool, speed, loop.reaction.code, sentence(loop.reaction)))
     return found
 
 
@@ -169,8 +170,8 @@ def test_an_arm_that_was_pushed_away_goes_back_no_faster_than_it_may_come_to_a_s
     pose = [0.0, -1.0, 0.0, 1.55]
     hand = Push("inner_link", 0.4, (0.0, 20.0, 0.0), 0.2, 1.4, WAM.covers.aside("inner_link", 0.4))
     moments = pushed(ForceCommand("base", (0.0, 0.0, 1.0)), hand, 1, pose, **FAR)
-    assert moments[0].reaction is ForceReaction.NOT_SENSED
-    assert moments[-1].reaction is ForceReaction.OTHER_LINK
+    assert moments[0].reaction is Code.NOT_SENSED
+    assert moments[-1].reaction is Code.OTHER_LINK
     assert max(float(np.linalg.norm(one.tool - moments[0].tool)) for one in moments) < WAY + 0.03
     assert max(one.speed for one in moments if one.time > 1.6) < 0.05
 
@@ -192,6 +193,6 @@ def test_what_pushes_against_the_commanded_force_is_followed_no_further_than_the
     places, found = [], set()
     while not run.step():
         places.append(float(DOWN @ BODY.point(run.driver.plant.q, OUTER, (PLACE, 0.0, 0.0))))
-        found.add(run.nodes["force_loop"].force_reaction)
+        found.add(run.nodes["force_loop"].reaction.code)
     assert max(places) - min(places) < WAY + 0.02
-    assert ForceReaction.NOTHING_TOUCHED in found
+    assert Code.NOTHING_TOUCHED in found

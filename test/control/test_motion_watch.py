@@ -5,14 +5,15 @@ from collections.abc import Callable
 
 import pytest
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.motion_watch import MotionWatch
 from wam_control.thresholds import MOTION
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Code
+from wam_description.event_text import sentence
 
 OWN = Configuration.load(packaged("wam")).node("force_loop", ForceLoopParameters)
-NONE, NOT_REACHED, NOT_FOLLOWED = ForceReaction.NONE, ForceReaction.NOT_REACHED, ForceReaction.NOT_FOLLOWED
+NONE, NOT_REACHED, NOT_FOLLOWED = Code.NONE, Code.NOT_REACHED, Code.NOT_FOLLOWED
 LASTING, RATE, FASTEST = OWN.limits.settling_time, OWN.task.largest_rate, OWN.task.speed_limit
 LEVER, DT, LAG = 0.5, 0.005, 0.05  # m, s, s
 ALLOWED = MOTION.at_rest * LEVER / RATE  # m
@@ -25,7 +26,7 @@ def position(
     rate: Callable[[float], float] = lambda time: 0.0,
     share: float = 1.0,
     law: float = RATE,
-) -> list[ForceReaction]:
+) -> list[Code]:
     """What is reported of an arm that goes to a goal, m, by the law of the axis, and not beyond an end, m."""
     watch, x, v, found = MotionWatch("axis", "m"), 0.0, 0.0, []
     for k in range(round(seconds / DT)):
@@ -39,7 +40,7 @@ def position(
 
 def velocity(
     wanted: Callable[[float], float], made: Callable[[float], float], seconds: float, share: float = 1.0
-) -> list[ForceReaction]:
+) -> list[Code]:
     """What is reported of an arm that makes another velocity than the commanded one, m/s."""
     watch, times = MotionWatch("axis", "m"), [k * DT for k in range(round(seconds / DT))]
     return [watch.velocity(wanted(t), made(t) * DT, LEVER, share, OWN, DT)[0] for t in times]
@@ -120,9 +121,13 @@ def test_a_push_that_is_over_is_not_reported_for_long() -> None:
 def test_the_reason_has_the_axis_and_the_commanded_and_the_present_value() -> None:
     watch = MotionWatch("velocity of joint 4", "rad")
     for _ in range(400):
-        _, why = watch.velocity(1.2, 0.0, 1.0, 1.0, OWN, DT)
-    assert why.startswith("velocity of joint 4: 1.2 rad/s are commanded, and it moves with 0 rad/s; it has been off by")
+        event = watch.velocity(1.2, 0.0, 1.0, 1.0, OWN, DT)
+    assert sentence(event).startswith(
+        "velocity of joint 4: 1.2 rad/s are commanded, and it moves with 0 rad/s; it has been off by"
+    )
     watch = MotionWatch("position of joint 4", "rad")
     for _ in range(400):
-        _, why = watch.position(0.3, 0.0, 0.1, 1.0, (RATE, FASTEST), 1.0, OWN, DT)
-    assert why.startswith("position of joint 4: 0.3 rad is commanded, and it is at 0.1 rad; it has been off by more")
+        event = watch.position(0.3, 0.0, 0.1, 1.0, (RATE, FASTEST), 1.0, OWN, DT)
+    assert sentence(event).startswith(
+        "position of joint 4: 0.3 rad is commanded, and it is at 0.1 rad; it has been off by more"
+    )

@@ -11,8 +11,9 @@ from arms import CONFIGURATION, NOWHERE, WAM, ideal_mjcf, ideal_plant
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
 from wam_control.contact.momentum_observer import MomentumObserver
-from wam_control.force.force_hold import ForceReaction
 from wam_control.task.scenario import ScenarioStep
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, State
@@ -94,7 +95,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
     )
     reasons, node = [], run.nodes["force_loop"]
     while not run.step():
-        reasons.append(node.reason)
+        reasons.append(sentence(node.reaction))
     assert "the force is known to +-0.5" in reasons[-500]
 
 
@@ -166,8 +167,8 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
     run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
     loop, reasons = run.nodes["force_loop"], [""]
     while not run.step():
-        if loop.reason != reasons[-1] and loop.force_reaction is not ForceReaction.NOT_FOLLOWED:
-            reasons.append(loop.reason)
+        if sentence(loop.reaction) != reasons[-1] and loop.reaction.code is not Code.NOT_FOLLOWED:
+            reasons.append(sentence(loop.reaction))
     assert "it comes to rest first" in reasons[1]
     assert expected in reasons[2]
     assert bool(reasons[2]) is bool(expected)

@@ -9,8 +9,9 @@ import pytest
 from arms import CONFIGURATION
 from test_force_lasting import BODY, DIRECTION, OUTER, POSE, press
 
-from wam_control.force.force_hold import ForceReaction
 from wam_control.task.scenario import ScenarioStep
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import RANGES, triple
@@ -25,7 +26,7 @@ UNBOUND = {"force_loop:limits.whole_force": 1e9}
 
 def pushed(
     step: ScenarioStep, cover: str, place: float, pinned: bool = False, **changes: Any
-) -> tuple[float, set[ForceReaction], str]:
+) -> tuple[float, set[Code], str]:
     """Largest force of a rod of 40 000 N/m from the side, N, what the arm reports once it comes, and why at last."""
     aside = -BODY.cover_pose(POSE, cover).rotation[:, 2]
     still = Surface(OUTER, 0.25, DIRECTION, 4000.0, 0.3, False)
@@ -52,8 +53,8 @@ def pushed(
                 mujoco.mj_contactForce(model, data, i, wrench)
                 peak = max(peak, abs(float(wrench[0])))
         if periods > 1e3 * (RANGES.release + 2.0):
-            found.add(loop.force_reaction)
-            reason = loop.reason or reason
+            found.add(loop.reaction.code)
+            reason = sentence(loop.reaction) or reason
     return peak, found, reason
 
 
@@ -67,7 +68,7 @@ def test_a_rod_that_comes_from_the_side_to_an_arm_that_presses_is_given_way_to(
     """8 N are pressed, 12 N are allowed; at a position that is not known, where it takes the least force for them."""
     peak, reactions, _ = pushed(press(8.0, 3.5), cover, place, pinned)
     assert peak < most
-    assert ForceReaction.CONTACT_FORCE in reactions
+    assert Code.CONTACT_FORCE in reactions
     peak, _, _ = pushed(press(8.0, 3.5), cover, place, pinned, **UNBOUND)
     assert peak > before
 
@@ -76,7 +77,7 @@ def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() ->
     step = ScenarioStep("rest", 3.5)
     peak, reactions, reason = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 20.0})
     assert peak < 30.0
-    assert ForceReaction.CONTACT_FORCE in reactions
+    assert Code.CONTACT_FORCE in reactions
     assert "gives way by limits.free_travel" in reason
     peak, _, _ = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 1e6})
     assert peak > 100.0

@@ -4,92 +4,99 @@ import math
 
 import pytest
 
-from wam_control.force.force_hold import ForceReaction, by_seriousness
-from wam_control.force.reaction_status import facts_of, stated
+from wam_control.force.force_hold import by_seriousness
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
-from wam_description.signals import BASE, Level, NodeStatus
+from wam_description.event import OBEYED, Code, Event, Level, refused, warning
+from wam_description.signals import BASE, NodeStatus
+from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
 from wam_sim.recording import RecordedStep
 from wam_sim.sweep import SweepPoint, outcome
 
-NONE, UNCERTAIN, NOT_REACHED, JOINT_END = (
-    ForceReaction[name] for name in ("NONE", "UNCERTAIN", "NOT_REACHED", "JOINT_END")
-)
 SECOND = 1_000_000_000
 ELBOW = [0.0, -1.2, 0.0, 2.35]  # rad, joint4 near its end at 2.44
 
 
-def status(reactions: dict[ForceReaction, str], refused: dict[str, str]) -> NodeStatus:
-    message, facts = facts_of(reactions, refused)
-    return NodeStatus(Level.WARN, message, facts={"margin": "2", **facts})
+def named(code: Code, joint: str) -> Event:
+    return warning(code, "test", joint=joint)
 
 
 def test_a_command_that_is_not_reached_comes_before_what_is_less_serious() -> None:
-    found = [(NONE, ""), (UNCERTAIN, "joint3"), (JOINT_END, "joint4"), (NOT_REACHED, "joint4"), (NOT_REACHED, "joint1")]
-    assert list(by_seriousness(found).items()) == [
-        (NOT_REACHED, "joint4"),
-        (UNCERTAIN, "joint3"),
-        (JOINT_END, "joint4"),
-    ]
-    push = ForceReaction.CONTACT_FORCE, "a push"
-    assert next(iter(by_seriousness([*found, push]))) is ForceReaction.CONTACT_FORCE
-    assert by_seriousness([*found, push, (ForceReaction.NOT_SENSED, "blind")]) == {ForceReaction.NOT_SENSED: "blind"}
-    assert by_seriousness([(NONE, "")]) == {}
+    late, uncertain = named(Code.NOT_REACHED, "joint4"), named(Code.UNCERTAIN, "joint3")
+    end, push = named(Code.JOINT_END, "joint4"), named(Code.CONTACT_FORCE, "")
+    found = [OBEYED, uncertain, end, late, named(Code.NOT_REACHED, "joint1")]
+    assert list(by_seriousness(found).values()) == [late, uncertain, end]
+    assert next(iter(by_seriousness([*found, push]))) is Code.CONTACT_FORCE
+    blind = named(Code.NOT_SENSED, "")
+    assert by_seriousness([*found, push, blind]) == {Code.NOT_SENSED: blind}
+    assert by_seriousness([OBEYED]) == {}
 
 
-@pytest.mark.parametrize("reactions", [{}, {NOT_REACHED: "late"}, {NOT_REACHED: "late", JOINT_END: "at its end"}])
-@pytest.mark.parametrize("refused", [{}, {"joint_posture_command": "no effect"}])
-def test_each_report_is_in_the_status_with_its_own_reason(reactions: dict, refused: dict) -> None:
-    found = stated(status(reactions, refused))
-    assert found == {
-        **({"refused": "no effect"} if refused else {}),
-        **{one.name.lower(): why for one, why in reactions.items()},
-    }
-    message = status(reactions, refused).message
-    assert message == ("no effect" if refused else "; ".join(reactions.values()))
+def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
+    events = (
+        refused("joint_posture_command", "no effect"),
+        warning(Code.NOT_REACHED, "force_off", measured=3.1, desired=-1e-7, cover="12", time=math.inf),
+        Event(Code.FAULT, Level.ERROR, {"reason": 'a "quoted" one'}),
+    )
+    status = NodeStatus(Level.WARN, "text", facts={"margin": "2"}, events=events)
+    found = pairs(status)
+    assert ("event.2", "not_reached") in found
+    assert ("event.2.measured", "3.1") in found
+    assert parse("", Level.WARN, "text", found) == status
 
 
-def test_a_command_that_is_refused_because_the_arm_holds_is_one_report() -> None:
-    held = {ForceReaction.NOT_SENSED: "no lever"}
-    assert stated(status(held, {"force_command": "no lever"})) == {"not_sensed": "no lever"}
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"event.1": "of another version", "event.1.severity": "WARN"},
+        {"event.1": "fault", "event.1.severity": "loud", "event.1.force": "{"},
+        {"event.1": "fault"},
+    ],
+)
+def test_an_event_that_is_not_understood_is_left_out(given: dict[str, str]) -> None:
+    assert parse("driver", 1, "", given.items()).events == ()
 
 
-def test_a_status_of_an_older_recording_has_the_reaction_and_what_is_refused() -> None:
-    old = NodeStatus(Level.WARN, "late", facts={"reaction": "not_reached", "refused": "joint_posture_command"})
-    assert stated(old) == {"refused": "joint_posture_command", "not_reached": "late"}
+def test_a_message_that_is_refused_before_the_node_has_it_is_an_event_of_its_status() -> None:
+    late = warning(Code.NOT_REACHED, "joint_end", joint="joint1")
+    status = with_refused(NodeStatus(Level.WARN, "late", events=(late,)), {"task_command": "no table"})
+    assert status.events == (late, refused("task_command", "no table"))
+    assert status.message == "late; no table"
+    plain = with_refused(NodeStatus(Level.OK, "at work"), {"task_command": "no table"})
+    assert (plain.level, plain.message) == (Level.WARN, "no table")
 
 
 def test_what_is_reported_at_the_same_time_has_times_of_its_own() -> None:
-    late, end = "not_reached", "joint_end"
-    found = lasting([(0, {}), (1, {end: "a"}), (2, {late: "b", end: "c"}), (4, {late: "b: turn joint4"}), (6, {})], 9)
-    assert sorted(found) == [
-        RecordedReaction(1, 4, end, "a"),
-        RecordedReaction(2, 6, late, "b: turn joint4"),
-    ]
+    end, late = named(Code.JOINT_END, "joint1"), named(Code.NOT_REACHED, "joint1")
+    more, other = end.with_values(angle=1.0), late.with_values(ways="turn joint4")
+    found = lasting([(0, ()), (1, (end,)), (2, (late, more)), (4, (other,)), (6, ())], 9)
+    assert sorted(found, key=lambda one: one.begin) == [RecordedReaction(1, 4, more), RecordedReaction(2, 6, other)]
 
 
 def test_what_holds_for_another_reason_is_another_reaction() -> None:
-    fast, loaded, also = "the arm moved faster than 0.3 rad/s", "it measures -2.9 N: tare", "it measures -3.1 N: tare"
-    found = lasting([(0, {"not_sensed": fast}), (2, {"not_sensed": loaded}), (4, {"not_sensed": also})], 9)
-    assert found == [RecordedReaction(0, 2, "not_sensed", fast), RecordedReaction(2, 9, "not_sensed", loaded)]
+    fast = warning(Code.NOT_SENSED, "moved_fast", speed=0.3)
+    loaded, also = (warning(Code.NOT_SENSED, "loaded", force=force) for force in (-2.9, -3.1))
+    found = lasting([(0, (fast,)), (2, (loaded,)), (4, (also,))], 9)
+    assert found == [RecordedReaction(0, 2, fast), RecordedReaction(2, 9, loaded)]
 
 
 def test_a_command_is_not_met_that_is_refused_or_in_the_end_not_reached() -> None:
     step = RecordedStep("press", 0, 4 * SECOND, {})
-    late = RecordedReaction(2 * SECOND, 4 * SECOND, "not_reached", "late")
-    refused = RecordedReaction(0, 4 * SECOND, "refused", "no effect")
-    seen_late, seen_refused = (one._replace(begin=3 * SECOND) for one in (late, refused))
-    assert unmet([late, late._replace(name="uncertain")], step) == [seen_late]
+    denied = refused("joint_posture_command", "no effect")
+    late = RecordedReaction(2 * SECOND, 4 * SECOND, Event(Code.NOT_REACHED))
+    taken = RecordedReaction(0, 4 * SECOND, denied)
+    seen_late, seen_refused = (one._replace(begin=3 * SECOND) for one in (late, taken))
+    assert unmet([late, late._replace(event=Event(Code.UNCERTAIN))], step) == [seen_late]
     assert not unmet([late._replace(end=3_500_000_000)], step)
-    assert unmet([late, refused], step) == [seen_refused, seen_late]
-    assert not unmet([refused._replace(end=2 * SECOND), late._replace(name="joint_end")], step)
+    assert unmet([late, taken], step) == [seen_refused, seen_late]
+    assert not unmet([taken._replace(end=2 * SECOND), late._replace(event=Event(Code.JOINT_END))], step)
 
 
 def test_a_command_is_not_met_with_more_force_than_allowed_in_all_of_its_steady_state() -> None:
     step = RecordedStep("press", 0, 4 * SECOND, {})
-    hard = RecordedReaction(SECOND, 4 * SECOND, "contact_force", "13 N in all")
+    hard = RecordedReaction(SECOND, 4 * SECOND, Event(Code.CONTACT_FORCE))
     seen = hard._replace(begin=3 * SECOND)
     assert unmet([hard], step) == [seen]
     assert seen.outcome == "with too much force"

@@ -11,10 +11,11 @@ from test_force_loop import ARM, BODY, DRIVEN, DT, STILL, force_loop
 
 from wam_control.force.contact_position import ForceCase, ForcePoint
 from wam_control.force.force_axis import ForceAxes
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.sensing_advice import Advice, OtherForces, Turnable
 from wam_control.force.thresholds import FORCE
+from wam_description.event import Code
+from wam_description.event_text import sentence
 from wam_description.signals import BASE, NO_CONTACT, ForceCommand, State
 
 LONG = 60  # periods, in which all is tried
@@ -45,10 +46,10 @@ class Refused:
     @property
     def ways(self) -> list[str]:
         """What is advised and can be followed."""
-        _, _, advised = self.loop.reason.partition(f"{HELD}: ")
+        _, _, advised = sentence(self.loop.reaction).partition(f"{HELD}: ")
         return [way for way in advised.split(", or ") if re.match("turn|command [0-9]|pin", way)]
 
-    def followed(self, way: str, sd_factor: float = 1.0) -> ForceReaction:
+    def followed(self, way: str, sd_factor: float = 1.0) -> Code:
         """What becomes of it with an advice."""
         q, force, own = list(self.q), self.force, self.own
         for name, angle in re.findall(r"turn (\w+) from \S+ to (\S+) rad", way):
@@ -58,7 +59,7 @@ class Refused:
         if "pin the position" in way:
             own = replace(own, contact_source="pinned")
         along = self.along if self.frame == BASE else BODY.cover_pose(q, self.frame).rotation @ self.along
-        return Refused(own, q, along, force, self.frame, sd_factor * self.sd).loop.reaction
+        return Refused(own, q, along, force, self.frame, sd_factor * self.sd).loop.reaction.code
 
 
 def moving(speed: float) -> ForceLoopParameters:
@@ -90,8 +91,8 @@ def test_what_is_advised_is_accepted_word_for_word(
     """Before, a force in the base frame at an estimated position got neither; a pinned position was always named."""
     q = bent(bend)
     refused = Refused(own, q, radial(q), force, frame, sd)
-    assert refused.loop.reaction.holds
-    assert [way.split()[0] for way in refused.ways] == kinds, refused.loop.reason
+    assert refused.loop.reaction.code.holds
+    assert [way.split()[0] for way in refused.ways] == kinds, sentence(refused.loop.reaction)
     for way in refused.ways:
         # what the estimator states of its torques is not the same in every pose
         assert not refused.followed(way, sd_factor=1.15).holds, way
@@ -112,7 +113,7 @@ def test_what_would_be_sensed_but_is_refused_for_another_reason_is_not_advised()
     sensed = Refused(moving(0.0), q, radial(q), 5.0)
     fast = Refused(moving(1e-2), q, radial(q), 5.0)
     assert sensed.ways
-    assert {Refused.followed(fast, way) for way in sensed.ways} == {ForceReaction.TOO_SLOW}
+    assert {Refused.followed(fast, way) for way in sensed.ways} == {Code.TOO_SLOW}
     assert not fast.ways
 
 
@@ -131,7 +132,7 @@ def test_where_nothing_computed_helps_the_reason_states_it(own: ForceLoopParamet
     q = bent(0.4)
     refused = Refused(own, q, radial(q), 5.0, sd=sd)
     nothing = "no force up to 5 times and no angle of one joint up to 1.6 rad away was found that would be"
-    assert f"{HELD}; {nothing} {text}" in refused.loop.reason
+    assert f"{HELD}; {nothing} {text}" in sentence(refused.loop.reaction)
 
 
 def test_every_refusal_before_the_motion_advises_what_is_computed() -> None:
@@ -139,7 +140,7 @@ def test_every_refusal_before_the_motion_advises_what_is_computed() -> None:
     stiff = replace(QUIET, guard=replace(QUIET.guard, contact_stiffness=2.2e4), feedback="contact_estimate")
     pose = (0.0, -1.8, 0.0, 1.45)
     refused = Refused(stiff, pose, np.array([0.0, 0.0, -1.0]), 20.0, sd=1e-3)
-    assert refused.loop.reaction is ForceReaction.TOO_SLOW
+    assert refused.loop.reaction.code is Code.TOO_SLOW
     assert [way.split()[0] for way in refused.ways] == ["command", "pin"]
     for way in refused.ways:
         assert not refused.followed(way).holds
@@ -148,17 +149,17 @@ def test_every_refusal_before_the_motion_advises_what_is_computed() -> None:
 def test_the_advice_is_that_for_the_present_force_and_within_the_limits() -> None:
     loop, q = force_loop(ARM, PINNED), bent(0.4)
     press(loop, q, radial(q), 2.0, LONG)
-    assert "command" not in loop.reason.partition(HELD)[2]
+    assert "command" not in sentence(loop.reaction).partition(HELD)[2]
     press(loop, q, radial(q), 10.0)
-    assert loop.reason.endswith(HELD), "it is looked for again"
+    assert sentence(loop.reaction).endswith(HELD), "it is looked for again"
     press(loop, q, radial(q), 10.0, LONG)
-    assert loop.reason == Refused(PINNED, q, radial(q), 10.0).loop.reason
-    assert "command 16 N" in loop.reason
+    assert sentence(loop.reaction) == sentence(Refused(PINNED, q, radial(q), 10.0).loop.reaction)
+    assert "command 16 N" in sentence(loop.reaction)
     narrow = replace(PINNED, limits=replace(PINNED.limits, joint_margin=2.1))
-    assert "turn joint4" not in Refused(narrow, q, radial(q), 10.0).loop.reason
+    assert "turn joint4" not in sentence(Refused(narrow, q, radial(q), 10.0).loop.reaction)
     weak = replace(PINNED, limits=replace(PINNED.limits, contact_force=15.0))
     for limited in (replace(PINNED, force_limit=15.0), weak):
-        assert "command " not in Refused(limited, q, radial(q), 10.0).loop.reason.partition(HELD)[2]
+        assert "command " not in sentence(Refused(limited, q, radial(q), 10.0).loop.reaction).partition(HELD)[2]
 
 
 def test_few_ways_are_tried_in_a_period() -> None:

@@ -8,9 +8,10 @@ import pytest
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Timing
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Level
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
-from wam_description.signals import Level, NodeStatus, State, Wrench
+from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.synchroniser import Inputs, InputSpec, OutOfTime, Synchroniser
 from wam_driver.session import Session
 from wam_sim.simulation import Simulation

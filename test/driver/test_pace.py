@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 from arms import CONFIGURATION
 
+from wam_description.event import Level
 from wam_description.interface import Interface
-from wam_description.signals import Level, NodeStatus
+from wam_description.signals import NodeStatus
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import Lockstep
 from wam_driver.pacer import Pacer

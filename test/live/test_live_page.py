@@ -35,13 +35,13 @@ from wam_cli.commands.live import NICENESS, PageProcess, lateness, page_next_to
 from wam_cli.options import take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
+from wam_description.event import Code, Event, Level
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
 from wam_description.signals import (
     BASE,
     NO_CONTACT,
     Contact,
-    Level,
     LikelyRange,
     NodeStatus,
     ObjectState,
@@ -241,10 +241,10 @@ def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap
 
 
 def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
-    loop = NodeStatus(Level.WARN, "another link is touched", node="force_loop", facts={"reaction": "other_link"})
+    loop = NodeStatus(Level.WARN, "another link is touched", node="force_loop", events=(Event(Code.OTHER_LINK),))
     page = status_page(Snapshot(measured=0.0, statuses={"force_loop": loop}), pressing=5.0)
     assert "commanded 5.0 N, not done: another link is touched" in page
-    loop = loop._replace(facts={"reaction": "none"})
+    loop = loop._replace(events=())
     assert "measured 4.8 N" in status_page(Snapshot(measured=4.8, statuses={"force_loop": loop}), pressing=5.0)
 
 
@@ -582,9 +582,9 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         press = Press(BASE, (0.0, 0.0, -5.0))  # as the page opens
-        reaction = lambda: panel.snapshot.statuses["force_loop"].facts.get("reaction")  # noqa: E731
+        events = lambda: panel.snapshot.statuses["force_loop"].events  # noqa: E731
         panel.requests.put(press)
-        shown.wait(lambda: reaction() not in (None, "none"), spin)
+        shown.wait(events, spin)
         panel.requests.put(NO_PRESS)
         panel.requests.put(Bend())
         shown.wait(lambda: "the scenario has ended" in panel._shown.content, spin)

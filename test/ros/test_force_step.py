@@ -13,7 +13,8 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
-from wam_description.signals import Level, NodeStatus
+from wam_description.event import Level
+from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME
 from wam_ros.messages import diagnostic_status
 from wam_ros.topics import qos

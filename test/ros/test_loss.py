@@ -7,7 +7,8 @@ import pytest
 from conftest import RosWorld
 from test_nodes import ARM, MS, SIX, changed, make
 
-from wam_description.signals import Level, NodeStatus, State
+from wam_description.event import Level
+from wam_description.signals import NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.messages import diagnostic_status, joint_state, message_type

@@ -12,7 +12,8 @@ from geometry_msgs.msg import PointStamped, WrenchStamped
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState, PointCloud2
 
-from wam_description.signals import Level, NodeStatus, Point, State, Table, Wrench
+from wam_description.event import Level
+from wam_description.signals import NodeStatus, Point, State, Table, Wrench
 from wam_ros.messages import (
     Refused,
     diagnostic_status,

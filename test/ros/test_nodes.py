@@ -18,10 +18,11 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_control.velocity.transform import Transform
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Level
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Level, NodeStatus, State, Wrench
+from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition

@@ -17,9 +17,10 @@ from wam_control.task.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.defects import UnusableOutput, conversion
+from wam_description.event import Level
 from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
-from wam_description.signals import ForceCommand, Level, NodeStatus, State, Table, Wrench
+from wam_description.signals import ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
 from wam_description.wiring import Call, Input, Outputs, declaration, reaction

@@ -41,8 +41,9 @@ from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_description.agreement import DIGESTS, digests
 from wam_description.configuration import Configuration
+from wam_description.event import Level
 from wam_description.parameters import ParameterError, flatten
-from wam_description.signals import Level, NodeStatus
+from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.bring_up import Composition
 from wam_ros.limits import RECORDER_LIMITS

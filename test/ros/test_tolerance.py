@@ -23,7 +23,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_bag.printable import printable
 from wam_description.configuration import Configuration, packaged
-from wam_description.signals import Level, NodeStatus
+from wam_description.event import Level
+from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.limits import NODE_LIMITS

@@ -12,6 +12,7 @@ from wam_analysis.findings.analysis import Analysis, analyse_bag
 from wam_bag.bag import Bag, TableColumns, read
 from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import Code, Event
 from wam_sim.reactions import RecordedReaction, sentences, steady_begin, within
 from wam_sim.simulated_bag import record
 
@@ -194,7 +195,7 @@ def test_the_true_force_along_an_axis_of_the_base_is_that_of_the_arm_on_the_obje
 
 
 def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
-    late = RecordedReaction(0, 1_005_000_000, "not_reached", "why")
+    late = RecordedReaction(0, 1_005_000_000, Event(Code.NOT_REACHED, values={"reason": "why"}))
     assert within([late], 1_000_000_000, 2_000_000_000) == ()
     assert len(within([late], 0, 1_000_000_000)) == 1
     again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]

@@ -9,6 +9,7 @@ import pytest
 from arms import CONFIGURATION, WAM
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_description.event import OBEYED, Code, warning
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.amplifier import Amplifier
@@ -23,6 +24,7 @@ from wam_studies.harness import chosen_cases
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
 Q = (0.0, -1.0, 0.0, 0.8)
 ACROSS = Surface("outer_link", 0.3, (0.0, 0.0, -1.0), 4000.0, 0.3, is_plane=False)
+REPORTED = warning(Code.NOT_REACHED, "force_strays", desired=10.0, allowed=1.0)
 TASK = Task(Q, ACROSS, 10.0)
 
 
@@ -121,7 +123,7 @@ def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
 
 def test_the_last_command_limits_the_force_at_the_end() -> None:
     """A hold that goes on pressing as before is not a task given up."""
-    task, held_back = TASK._replace(before=30.0), {"reason": "held", "is_stopped": True}
+    task, held_back = TASK._replace(before=30.0), {"event": REPORTED, "is_stopped": True}
     down = [0.0] * 100 + [31.0] * 2000
     assert not evaluated(task, trace(down + [10.1] * 3000)).is_over
     assert evaluated(task, trace(down + [10.1] * 3000, **held_back)).outcome is TaskEnd.GIVEN_UP
@@ -162,7 +164,7 @@ def test_true_motors_give_another_torque_than_their_reported_one() -> None:
 
 # ------------------------------------------------------------------------------------ outcomes
 def trace(forces: Any, **more: Any) -> TaskTrace:
-    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, "", False, False, 0.0, 0.0145)
+    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, OBEYED, False, False, 0.0, 0.0145)
     return given._replace(**more)
 
 
@@ -174,17 +176,17 @@ def held(newtons: float, **more: Any) -> TaskTrace:
     ("seen", "expected"),
     [
         (held(10.9), TaskEnd.DONE),
-        (held(9.1, reason="place assumed"), TaskEnd.DONE),
-        (held(10.9, reason="held", is_stopped=True), TaskEnd.ENDED),
+        (held(9.1, event=REPORTED), TaskEnd.DONE),
+        (held(10.9, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
         (held(11.1), TaskEnd.SILENT),
         (held(0.0), TaskEnd.SILENT),
-        (held(11.1, reason="not reached"), TaskEnd.ENDED),
-        (held(0.0, reason="not sensed", is_stopped=True, travel=0.0), TaskEnd.REFUSED),
-        (held(0.0, reason="not sensed", is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
-        (held(2.0, reason="another link", is_stopped=True), TaskEnd.GIVEN_UP),
-        (trace([0.0, 10.1] + [2.0] * 3000, reason="another link", is_stopped=True), TaskEnd.ENDED),
-        (held(2.0, reason="fault", is_stopped=True, is_fault=True), TaskEnd.ENDED),
-        (held(0.0, reason="not reached", travel=0.0), TaskEnd.ENDED),
+        (held(11.1, event=REPORTED), TaskEnd.ENDED),
+        (held(0.0, event=REPORTED, is_stopped=True, travel=0.0), TaskEnd.REFUSED),
+        (held(0.0, event=REPORTED, is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
+        (held(2.0, event=REPORTED, is_stopped=True), TaskEnd.GIVEN_UP),
+        (trace([0.0, 10.1] + [2.0] * 3000, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
+        (held(2.0, event=REPORTED, is_stopped=True, is_fault=True), TaskEnd.ENDED),
+        (held(0.0, event=REPORTED, travel=0.0), TaskEnd.ENDED),
     ],
 )
 def test_an_outcome_is_that_of_the_true_force_and_the_report(seen: TaskTrace, expected: TaskEnd) -> None:
@@ -198,7 +200,7 @@ def test_a_peak_counts_above_one_and_a_half_times_the_command_and_the_impact() -
 
 @pytest.mark.parametrize(
     ("size", "more", "is_silent"),
-    [(0.4, {}, False), (0.8, {}, True), (0.8, {"predicted_cycle": 1.5}, False), (0.8, {"reason": "so"}, False)],
+    [(0.4, {}, False), (0.8, {}, True), (0.8, {"predicted_cycle": 1.5}, False), (0.8, {"event": REPORTED}, False)],
 )
 def test_a_cycle_above_the_tolerance_counts_unless_it_is_reported(
     size: float, more: dict[str, Any], is_silent: bool
@@ -276,7 +278,7 @@ def trials() -> list[ForceTrial]:
     found[3] = found[3]._replace(result=evaluated(DRAWN[3], held(2.0 * DRAWN[3].force)))
     above = trace([4.0 * DRAWN[4].force] + [DRAWN[4].force] * 3000, impact=0.0)
     found[4] = found[4]._replace(result=evaluated(DRAWN[4], above))
-    blind = held(0.0, reason="force known to +-3.7 N; bend the arm", is_stopped=True, travel=0.0)
+    blind = held(0.0, event=REPORTED, is_stopped=True, travel=0.0)
     found[5] = found[5]._replace(result=evaluated(DRAWN[5], blind))
     return found
 
@@ -289,7 +291,7 @@ def test_the_scores_count_what_went_in_and_list_each_failure() -> None:
     assert rows["tasks refused with a reason"].found[::3] == (1 / 200, 200)
     outcomes, reasons = scores.tables
     assert outcomes.rows[0] == ["all", "", "200", "99%", "0%", "0%", "0%", "0%", "2", "0"]
-    assert reasons.rows == [["force known to +-# N", "1"]]
+    assert reasons.rows == [["not_reached force_strays", "1"]]
     failures = {trial.number: STUDY.failure(trial).partition(":")[0] for trial in trials() if STUDY.failure(trial)}
     assert failures == {3: "silent and above the limit", 4: "above the limit"}
 
@@ -297,7 +299,7 @@ def test_the_scores_count_what_went_in_and_list_each_failure() -> None:
 def test_required_shares_are_of_the_accepted_tasks() -> None:
     found = trials()
     number = next(t.number for t in found[6:] if not t.task.conditions.is_dithered)
-    left = held(0.0, reason="another link", is_stopped=True)
+    left = held(0.0, event=REPORTED, is_stopped=True)
     found[number] = found[number]._replace(result=evaluated(DRAWN[number], left))
     ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
     refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)

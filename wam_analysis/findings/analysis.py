@@ -24,7 +24,7 @@ from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import Bag, BagError, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
-from wam_description.status import DONE
+from wam_description.event import Code
 from wam_sim.recording import RecordedRun
 
 OF_THE_START = "predicted for the parameters at the start, which were changed"
@@ -155,7 +155,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     mode = recording.mode if recording.mode != "unknown" else "not known whether in lockstep or in realtime"
     sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {mode}.")
     if summary.steps:
-        ended = " to its end" if summary.outcome == DONE else f"; {summary.outcome}"
+        ended = " to its end" if summary.outcome == Code.DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
     if recording.holds:
         forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
@@ -174,7 +174,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     verdict += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
     verdict += [f"STOPPED: {fault}." for fault in faults]
     verdict += _changed(recording.run, summary.traces.zero)
-    if summary.steps and summary.outcome != DONE and not faults:
+    if summary.steps and summary.outcome != Code.DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")
     return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
 

@@ -25,9 +25,9 @@ from wam_cli.options import (
 )
 from wam_control.task.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
+from wam_description.event import Code
 from wam_description.interface import Interface, require_parameters
 from wam_description.nodes import ONE
-from wam_description.status import DONE
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
@@ -177,7 +177,7 @@ def _cause(bag: Path) -> str:
         outcome = recorded_run(read(bag, ["status"], may_lack=True)).outcome
     except (BagError, OSError):
         return ""
-    return "" if outcome == DONE else outcome
+    return "" if outcome == Code.DONE else outcome
 
 
 def _next(mode: str, bag: Path | None) -> list[str]:

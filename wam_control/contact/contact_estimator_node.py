@@ -8,13 +8,13 @@ from wam_control.contact.contact_table import friction_table, hypothesis_table
 from wam_control.contact.thresholds import CONTACT
 from wam_control.force.task import is_pressing
 from wam_description.arm import Shared, seconds
+from wam_description.event import Level
 from wam_description.signals import (
     BASE,
     NO_CONTACT,
     Answer,
     Contact,
     ContactView,
-    Level,
     LikelyRange,
     NodeStatus,
     Point,

@@ -23,7 +23,6 @@
 ``motion_limits``          limits of the velocities: ends of the joints; gives way above the contact force
 ``motion_watch``           whether a position or a velocity of a task is reached
 ``posture_watch``          whether a posture or a position moves faster than the arm follows
-``reaction_status``        what the loop does instead of what is commanded, in its status and back
 ``sampled_loop``           arm, velocity loop and force loop as one linear map from sample to sample
 ``sensing_advice``         what to change so that a refused force would be accepted
 ``stability_guard``        domain, margin and largest saturation of a parameter set on the arm

@@ -25,7 +25,7 @@ class ForcePoint(NamedTuple):
     is_identified : whether it is pinned, or the link is that of the present estimate, whose position may be unknown.
     is_doubtful : whether something is touched, and the position is not pinned nor the link identified.
     rejection : why the present estimate is not used, '' if it is or is not needed.
-    conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
+    conflict : the cover that is touched instead, so that no force can be controlled there; '' if none is known.
     is_single : False where a second contact is nearly certain, whose torques are not those of the force.
     """
 
@@ -169,13 +169,10 @@ def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> 
 
 
 def _conflict(contact: Contact, cover: str, parameters: ForceLoopParameters) -> str:
-    """Why a contact on another cover than that of the force forbids to control it, '' where there is none."""
+    """Another cover than that of the force whose contact forbids to control it, '' where there is none."""
     if contact.cover in ("", cover) or not contact.probability >= parameters.link_probability_limit:
         return ""
-    return (
-        f"{contact.cover} is touched, with a probability of {contact.probability:.2f}, and the force is commanded on "
-        f"{cover}; command it on {contact.cover}, with its position, or free the arm"
-    )
+    return contact.cover
 
 
 def position_is_certain(position: float, position_sd: float, limit: float) -> bool:
@@ -201,7 +198,8 @@ class ForceCase(NamedTuple):
     signal : its torques per standard deviation of the estimated ones; infinite with sensors.
     elsewhere : the same if another link is touched.
     torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
-    unknown, meaning : force, N, of torques at rest before, which no touched surface gives, and what they mean.
+    unknown, payload : force, N, of torques at rest before, which no touched surface gives, and the mass at the tool,
+        kg, that explains them; 0 where none does.
     """
 
     axis: ForceAxis
@@ -211,7 +209,7 @@ class ForceCase(NamedTuple):
     elsewhere: float = math.inf
     torque_error: float = 0.0
     unknown: float = 0.0
-    meaning: str = ""
+    payload: float = 0.0
 
     def worse(self, factor: float) -> "ForceCase":
         """The same, with all that is not known of it larger by a factor, and the arm as much slower."""

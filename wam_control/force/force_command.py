@@ -1,7 +1,7 @@
 """Which commands the force loop obeys: within the limits; what it does where one ends."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from wam_control.force.contact_position import pinned_position, torque_of_position
@@ -10,6 +10,7 @@ from wam_control.force.task import TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Covers
+from wam_description.event import Event, Value, refused
 from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
 
@@ -25,15 +26,15 @@ class Commands(NamedTuple):
     torque : commanded joint torques of the arm on the world (n,), N m; None where there are none.
     posture : joint angles to hold (n,), rad.
     refusals : why a command of this period is not taken, by topic.
-    rising : how far force or torque are on the way to their command, limited in rate; '' where they are there.
+    rising : how far force or torque are on the way to their command, limited in rate; nothing where they are there.
     risen : for how long, s.
     """
 
     force: ForceCommand | None
     torque: Sequence[float] | None
     posture: list[float]
-    refusals: dict[str, str]
-    rising: str = ""
+    refusals: dict[str, Event]
+    rising: Mapping[str, Value] = {}
     risen: float = 0.0
 
 
@@ -84,7 +85,7 @@ class CommandAdmission:
         task: TaskCommand | None = None,
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
-        refusals = {}
+        refusals: dict[str, str] = {}
         pressed = self._force is not None and any(self._force.force)
         commanded = _size(force)
         if force is not None and commanded < FORCE.smallest_force and force.force != ZERO:
@@ -122,10 +123,11 @@ class CommandAdmission:
         risen_torque = self._rising_torque(self._torque, parameters.torque_rate_limit * dt)
         rising = self._rising(parameters)
         self._risen = self._risen + dt if rising else 0.0
-        return Commands(risen_force, risen_torque, self.posture, refusals, rising, self._risen)
+        events = {topic: refused(topic, reason) for topic, reason in refusals.items()}
+        return Commands(risen_force, risen_torque, self.posture, events, rising, self._risen)
 
-    def _rising(self, parameters: ForceLoopParameters) -> str:
-        """How far force or torque are on the way to their command, '' where they are there."""
+    def _rising(self, parameters: ForceLoopParameters) -> dict[str, Value]:
+        """How far force or torque are on the way to their command, nothing where they are there."""
         force, torque = self._force, self._torque
         is_of_torque = parameters.mode == "joint_torque"
         if force is not None and not is_of_torque and self._present.force != force.force:
@@ -133,11 +135,9 @@ class CommandAdmission:
         elif torque is not None and is_of_torque and list(self._present_torque) != list(torque):
             present, wanted, name, unit = _largest(self._present_torque), _largest(torque), "torque_rate_limit", "N m"
         else:
-            return ""
-        return (
-            f"the set point is {present:.3g} {unit} on its way to the command, {wanted:.3g} {unit}, at {name}, "
-            f"{getattr(parameters, name):g} {unit}/s: raise that, or command it for longer"
-        )
+            return {}
+        rate = float(getattr(parameters, name))
+        return {"rising": present, "rising_to": wanted, "rising_unit": unit, "rising_limit": name, "rising_rate": rate}
 
     def _add_without_effect(
         self,

@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable
-from enum import IntEnum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,76 +13,24 @@ from wam_control.force.force_measurement import LowPass
 from wam_control.force.force_swing import Reversals, Shake
 from wam_control.force.sensing_advice import Advice, OtherForces
 from wam_control.force.thresholds import FORCE
-from wam_description.number_text import brief
+from wam_description.event import Code, Event, Value, warning
 
 Array = NDArray[np.float64]
-SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
-SENSORS = "use joint sensors"
-UNLOAD = "the arm holds its position: declare what it carries (arm.payload), or end the command and tare in free space"
 STILL = [0.0]  # m/s
 
 
-class ForceReaction(IntEnum):
-    """What the force loop does instead of what is commanded, as a number for a topic."""
-
-    NONE = 0  # the command is obeyed
-    NOT_SENSED = 1  # holds: the commanded force cannot be measured here
-    OTHER_LINK = 2  # holds: another link is touched
-    NOTHING_TOUCHED = 3  # holds: it has gone as far as allowed and nothing was touched
-    CONTACT_FORCE = 4  # does not move against the world
-    JOINT_END = 5  # a joint is at its end
-    NOT_REACHED = 6  # goes on: the force or the motion is not reached within the time for it
-    POSITION_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
-    NOT_EXPLAINED = 8  # goes on: the torques are not those of the commanded force where it is thought to act
-    TASK_REFUSED = 9  # holds: the axes of the task cannot be done here
-    UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
-    CYCLE = 11  # goes on: the measured force is in a limit cycle
-    SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
-    TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
-    SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
-    NOT_FOLLOWED = 15  # goes on: the commanded posture or position moves faster than the arm may
-
-    @property
-    def holds(self) -> bool:
-        """Whether the arm holds its position instead of controlling the force."""
-        return self in (
-            ForceReaction.NOT_SENSED,
-            ForceReaction.OTHER_LINK,
-            ForceReaction.NOTHING_TOUCHED,
-            ForceReaction.TASK_REFUSED,
-            ForceReaction.SHAKEN,
-            ForceReaction.TOO_SLOW,
-            ForceReaction.SECOND_CONTACT,
-        )
+SERIOUS = (Code.CONTACT_FORCE, Code.NOT_REACHED)  # of those that do not hold
 
 
-Found = tuple[ForceReaction, str]  # a reaction and its reason
-SERIOUS = (ForceReaction.CONTACT_FORCE, ForceReaction.NOT_REACHED)  # of those that do not hold
-
-
-def by_seriousness(found: Iterable[Found]) -> dict[ForceReaction, str]:
-    """Each reaction that there is with its first reason, the most serious one first; one that holds is alone."""
-    there: dict[ForceReaction, str] = {}
-    for reaction, reason in found:
-        if reaction.holds:
-            return {reaction: reason}
-        if reaction is not ForceReaction.NONE:
-            there.setdefault(reaction, reason)
+def by_seriousness(found: Iterable[Event]) -> dict[Code, Event]:
+    """The first event of each code, the most serious one first; one that holds is alone."""
+    there: dict[Code, Event] = {}
+    for event in found:
+        if event.code.holds:
+            return {event.code: event}
+        if event.code is not Code.NONE:
+            there.setdefault(event.code, event)
     return {one: there[one] for one in dict.fromkeys((*SERIOUS, *there)) if one in there}
-
-
-class Refusal(NamedTuple):
-    """Why a force is refused before the arm moves.
-
-    Attributes
-    ----------
-    reaction, why : what the loop reports.
-    besides : what else helps than is computed; '' for nothing.
-    """
-
-    reaction: ForceReaction
-    why: str
-    besides: str = ""
 
 
 class ForceHold:
@@ -124,7 +70,8 @@ class ForceHold:
         self._wanted = self._unloading = 0.0  # N, commanded before; s, for which the arm may still unload itself
         self._least = math.inf  # N, that has been measured meanwhile
         self._most = 0.0  # N, that has been measured
-        self._is_slow, self._other, self._gone = False, "", ""
+        self._is_slow = False
+        self._over: Event | None = None  # why the arm holds until the command ends
         self._pace.reset()
         self._advice.reset()
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
@@ -136,7 +83,8 @@ class ForceHold:
     def _forget_swings(self) -> None:
         """What the force was before something was touched shows nothing of how it is held."""
         self._strayed = self._within = 0.0
-        self._report, self._returns = "", FORCE.left_after
+        self._report: Event | None = None
+        self._returns = FORCE.left_after
         self._turns.reset()
 
     def approach_speed(
@@ -226,7 +174,7 @@ class ForceHold:
         shaking = self._shake.along(axis.lever)
         return shaking, axis.impact_mass * self._frequency * self._frequency * shaking
 
-    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Event | None:
         """Why the arm shakes too much for the surface, None where it does not.
 
         A soft surface, in series with the cables, follows the swing of the position, and the force swings by k times
@@ -242,12 +190,14 @@ class ForceHold:
         force = 1.0 / math.hypot(apart, 1.0 / (FORCE.resonance * least))
         if force <= parameters.limits.shake_force * desired:
             return None
-        return Refusal(
-            ForceReaction.SHAKEN,
-            f"the arm shakes by {brief(self._shaking)} m along the force (dither): on "
-            f"{parameters.guard.contact_stiffness:g} N/m the force would swing by {force:.3g} N; allowed: "
-            f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N",
-            f"{SENSORS}, or, {SOFTER}",
+        return warning(
+            Code.SHAKEN,
+            "shaken",
+            shaking=self._shaking,
+            stiffness=parameters.guard.contact_stiffness,
+            force=force,
+            allowed=parameters.limits.shake_force,
+            desired=desired,
         )
 
     def step(
@@ -260,8 +210,8 @@ class ForceHold:
         pushed: float | None = None,
         others: Callable[[], OtherForces] | None = None,
         given_way: float = 0.0,
-    ) -> list[Found]:
-        """What to do instead of what is commanded, and why; nothing where it is obeyed.
+    ) -> list[Event]:
+        """What to do instead of what is commanded; nothing where it is obeyed.
 
         Parameters
         ----------
@@ -289,26 +239,29 @@ class ForceHold:
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
         is_strange = self._is_sensed and unexplained > FORCE.unexplained
         self._conflict = max(self._conflict + dt * self._against(point, is_strange), 0.0)
-        if self._conflict > FORCE.conflict_time and not self._other:
-            touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
-            self._other = f"{touched}; the arm goes back to where it was free until the command ends"
+        if self._conflict > FORCE.conflict_time and (self._over is None or self._over.code is not Code.OTHER_LINK):
+            self._over = (
+                warning(Code.OTHER_LINK, "other_link", touched=point.conflict, cover=point.cover)
+                if point.conflict
+                else warning(Code.OTHER_LINK, "link_in_doubt", cover=point.cover)
+            )
         weak = self._too_weak(case, parameters)
         if is_loaded:
-            return [(ForceReaction.NOT_SENSED, _loaded(case.unknown, case.meaning, desired))]
+            force, payload = case.unknown, case.payload
+            return [
+                warning(
+                    Code.NOT_SENSED, "loaded", force=force, desired=desired, payload=payload, allowed=FORCE.tolerance
+                )
+            ]
         if ended := self._ended(parameters, is_blind=bool(blind or weak)):
             return [ended]
         if refusal := blind or weak or self._shaken(axis, desired, parameters) or self._too_slow(case, parameters):
-            why = f"{refusal.why}; the arm holds its position{self._advised(case, refusal, parameters, others)}"
-            return [(refusal.reaction, why)]
+            return [refusal.with_values(**self._advised(case, refusal, parameters, others))]
         self._advice.reset()
         is_double = not point.is_single and (is_strange or not point.is_pinned)
         self._double = self._double + dt if is_double else 0.0
         if self._double > FORCE.conflict_time:  # an impact looks like one for a moment, and a sudden hold is a jerk
-            why = (
-                f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
-                "commanded force alone; the arm holds its position until the second contact has gone"
-            )
-            return [(ForceReaction.SECOND_CONTACT, why)]
+            return [warning(Code.SECOND_CONTACT, "second_contact", cover=point.cover)]
         # what is off already leaves less of the tolerance to what is not known
         left = max(1.0 - abs(desired - measured) / (FORCE.tolerance * desired), 0.0)
         is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
@@ -328,10 +281,9 @@ class ForceHold:
             self.share = FORCE.slowed  # less would let the force creep away: motors at rest do not show it
             self._turns.reset()
             is_cycling = False
-        found = [(ForceReaction.CYCLE, _cycle(self._turns, desired, parameters))] if is_cycling else []
-        found += [(ForceReaction.NOT_REACHED, missed)] if missed else []
-        found += [(ForceReaction.NOT_EXPLAINED, turned)] if turned else []
-        return found or [self._doubted(case, force_sd, unexplained, parameters)]
+        found = [self._cycle(desired, parameters)] if is_cycling else []
+        found += [one for one in (missed, turned) if one]
+        return found or self._doubted(case, force_sd, unexplained, parameters)
 
     def _turns_again(self, measured: float, least: float, window: float, dt: float) -> bool:
         """Whether the measured force turns back again and again, as `Reversals.step`, and not by an impact."""
@@ -340,7 +292,7 @@ class ForceHold:
         self._bouncing -= dt
         return self._turns.step(measured, least, window, dt)
 
-    def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+    def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Event | None:
         """Why the force is not measured well enough, None where it is.
 
         What the estimator states of its torques counts until the force is controlled: it states more while the arm
@@ -353,47 +305,43 @@ class ForceHold:
         if self._is_sensed:
             return None
         if not is_known:
-            return Refusal(
-                ForceReaction.NOT_SENSED,
-                f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
-                f"to start, it must be known to {sensing.stated_fraction * desired:.3g} N, "
-                f"{sensing.stated_fraction:.0%} of the commanded force (sensing.stated_fraction)",
-                f"{SENSORS}, or allow more where less accuracy will do",
+            return warning(
+                Code.NOT_SENSED,
+                "stated_sd",
+                sd=stated,
+                position=point.position,
+                cover=point.cover,
+                allowed=sensing.stated_fraction * desired,
+                fraction=sensing.stated_fraction,
             )
-        return Refusal(
-            ForceReaction.NOT_SENSED,
-            f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-            f"of {point.cover}; to start, it must be below {FORCE.resume * limit:.3g} N, {FORCE.resume:.0%} of the "
-            "limit "
-            "(sensing.force_sd_limit, force_sd_fraction)",
+        return warning(
+            Code.NOT_SENSED,
+            "sd",
+            sd=axis.force_sd,
+            position=point.position,
+            cover=point.cover,
+            allowed=FORCE.resume * limit,
+            fraction=FORCE.resume,
         )
 
     def _advised(
         self,
         case: ForceCase,
-        refusal: Refusal,
+        refusal: Event,
         parameters: ForceLoopParameters,
         others: Callable[[], OtherForces] | None,
-    ) -> str:
-        """What to do in place of a refused command, in words to follow the reason; '' while that is looked for."""
-        besides = f", or {refusal.besides}" if refusal.besides else ""
+    ) -> dict[str, Value]:
+        """What to do in place of a refused command; nothing while that is looked for."""
         if others is None:
-            return f": bend the arm, or command more force, another direction or position{besides}"
+            return {"searched": "nothing"}
         if self._is_watching:
-            return ""  # how the dither shakes the arm counts, too
-        self._advice.step(
-            case.desired, (refusal.reaction, parameters), others, lambda one: self._admits(one, parameters)
-        )
+            return {}  # how the dither shakes the arm counts, too
+        self._advice.step(case.desired, (refusal.code, parameters), others, lambda one: self._admits(one, parameters))
         if not self._advice.is_complete:
-            return ""
+            return {}
         if self._advice.ways:
-            return f": {', or '.join(self._advice.ways)}{besides}"
-        pinned = "" if case.point.is_pinned else ", with a pinned position or without"
-        return (
-            f"; no force up to 5 times and no angle of one joint up to {FORCE.turns[-1]:g} rad away was found that "
-            "would be "
-            f"accepted with a margin{pinned}: command another direction or position{besides}"
-        )
+            return {"ways": ", or ".join(self._advice.ways)}
+        return {"searched": "pinned" if case.point.is_pinned else "both", "turned": FORCE.turns[-1]}
 
     def _admits(self, case: ForceCase, parameters: ForceLoopParameters) -> bool:
         """Whether another force would be accepted in place of the commanded one, with a reserve."""
@@ -401,9 +349,9 @@ class ForceHold:
         hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
         largest = min(parameters.force_limit, parameters.limits.contact_force)
         found = hold.step(case.worse(FORCE.reserve), still, 0.0, parameters, 0.0)
-        return case.desired <= largest and not any(reaction.holds for reaction, _ in found)
+        return case.desired <= largest and not any(event.code.holds for event in found)
 
-    def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+    def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Event | None:
         """Why the contact estimator would not detect the force, None where it would or something is touched."""
         point, desired, sensing = case.point, case.desired, parameters.sensing
         name, least = ("least_signal", sensing.least_signal)
@@ -415,19 +363,19 @@ class ForceHold:
         if self._is_detectable:
             return None
         if is_weak:
-            return Refusal(
-                ForceReaction.NOT_SENSED,
-                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {brief(case.signal)} "
-                f"times the standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, "
-                "and above, or the force is detected late or on the wrong link",
-                SENSORS,
+            return warning(
+                Code.NOT_SENSED,
+                "weak",
+                desired=desired,
+                position=point.position,
+                cover=point.cover,
+                signal=case.signal,
+                limit=name,
+                allowed=least,
             )
-        return Refusal(
-            ForceReaction.NOT_SENSED,
-            f"the torques of {desired:.3g} N on another link than {point.cover} are {brief(case.elsewhere)} times the "
-            "standard deviation with which the motors show them; allowed: sensing.least_signal, "
-            f"{sensing.least_signal:g}, and above, or that link is pressed harder than commanded before it is detected",
-            SENSORS,
+        signal, allowed = case.elsewhere, sensing.least_signal
+        return warning(
+            Code.NOT_SENSED, "weak_elsewhere", desired=desired, cover=point.cover, signal=signal, allowed=allowed
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -437,31 +385,20 @@ class ForceHold:
             return 1.0
         return FORCE.conflict_time / FORCE.uncertain_time if point.is_doubtful else -FORCE.free_rate
 
-    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> Found | None:
+    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> Event | None:
         """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
-        if self._other:
-            return ForceReaction.OTHER_LINK, self._other
-        if self._gone:
-            return ForceReaction.NOTHING_TOUCHED, self._gone
-        if is_blind:
-            return None
-        if self._travel > parameters.limits.free_travel:
-            since = "since the force last was right, or rose" if self.has_touched else "and nothing was touched"
-            return ForceReaction.NOTHING_TOUCHED, (
-                f"the arm has moved {self._travel:.3g} m along the force {since}; allowed: "
-                f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
-                "force, then again"
-            )
+        if self._over or is_blind:
+            return self._over
+        way, free_travel = self._travel, parameters.limits.free_travel
+        if way > free_travel:
+            touched = float(self.has_touched)
+            return warning(Code.NOTHING_TOUCHED, "free_travel", way=way, has_touched=touched, allowed=free_travel)
         if (
             not self.has_touched
             and self._missed > FORCE.crept * parameters.limits.settling_time
-            and self._travel < FORCE.little_way
+            and way < FORCE.little_way
         ):
-            return ForceReaction.NOTHING_TOUCHED, (
-                f"nothing was touched {brief(self._missed)} s after the command: the arm creeps, and has moved "
-                f"{brief(1e3 * self._travel)} mm; it holds its position: go nearer, or pin the "
-                f"position, or, {SOFTER}; command no force, then again"
-            )
+            return warning(Code.NOTHING_TOUCHED, "creeping", time=self._missed, way_mm=1e3 * way)
         return None
 
     def _count(
@@ -484,8 +421,15 @@ class ForceHold:
         slowest = limits.surface_speed + FORCE.creep / limits.settling_time
         is_pushed = measured > desired + tolerated or (self._pace.value or STILL)[0] < -slowest
         self.goes_back = self.is_touching and is_pushed and not (self._is_led or is_unloading)
-        if self.goes_back and given_way > limits.free_travel and not self._gone:
-            self._gone = _gone(given_way, measured, desired, parameters)
+        if self.goes_back and given_way > limits.free_travel and not self._over:
+            self._over = warning(
+                Code.NOTHING_TOUCHED,
+                "gave_way",
+                way=given_way,
+                desired=desired,
+                measured=measured,
+                allowed=limits.free_travel,
+            )
 
     def _unloads(self, measured: float, desired: float, lasting: float, dt: float) -> bool:
         """Whether less is commanded than before, N, and the force still falls, or did until `lasting`, s, ago."""
@@ -499,67 +443,60 @@ class ForceHold:
             self._most = min(self._most, measured)
         return self._unloading > 0.0
 
-    def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+    def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Event | None:
         """Why the arm would be too slow on its way or on the surface, None where it is not or something is touched."""
         axis, point, desired = case.axis, case.point, case.desired
         if self.is_touching:
             return None
-        stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+        surface = parameters.guard.contact_stiffness
+        stiffness = 1.0 / (1.0 / surface + axis.compliance)
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
         self._is_slow = pace * parameters.limits.settling_time < FORCE.settled / (
             FORCE.resume if self._is_slow else 1.0
         )
         if self._is_slow:
-            return Refusal(
-                ForceReaction.TOO_SLOW,
-                f"the force would settle with a time constant of {brief(1.0 / pace)} s{_slowed(axis)}; allowed: "
-                f"1/{FORCE.settled:g} of limits.settling_time",
+            return warning(
+                Code.TOO_SLOW, "settles_slowly", time_constant=1.0 / pace, allowed=FORCE.settled, **_slowness(axis)
             )
-        way = desired / parameters.guard.contact_stiffness
+        way = desired / surface
         if parameters.is_estimated and not point.is_pinned and way < FORCE.coarse_way:
-            return Refusal(
-                ForceReaction.TOO_SLOW,
-                f"the whole force is {brief(1e3 * way)} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
-                f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * FORCE.coarse_way:g} mm "
-                "is the "
-                "least, as the velocity loops wind up through friction for longer than limits.settling_time",
-                SENSORS,
+            return warning(
+                Code.TOO_SLOW, "stiff", way_mm=1e3 * way, stiffness=surface, allowed_mm=1e3 * FORCE.coarse_way
             )
         if moves := _left_behind(axis, desired, parameters):
             return moves
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < FORCE.creep:
-            return Refusal(
-                ForceReaction.TOO_SLOW,
-                f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
-                f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * FORCE.creep:g} "
-                "mm "
-                "within limits.settling_time, in which friction moves the arm in jerks",
-                SOFTER,
-            )
+            slow, least = 1e3 * speed, 1e3 * FORCE.creep
+            return warning(Code.TOO_SLOW, "creeps", stiffness=surface, speed_mm=slow, desired=desired, allowed_mm=least)
         return None
 
-    def _doubted(self, case: ForceCase, force_sd: float, unexplained: float, parameters: ForceLoopParameters) -> Found:
+    def _doubted(
+        self, case: ForceCase, force_sd: float, unexplained: float, parameters: ForceLoopParameters
+    ) -> list[Event]:
         """Why the measured force may not be the true one, where that lasts."""
         point, desired, lasting = case.point, case.desired, parameters.limits.settling_time
+        where: dict[str, Value] = {"position": point.position, "cover": point.cover}
         if self._strange > lasting:
-            return ForceReaction.NOT_EXPLAINED, (
-                f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
-                f"{point.cover} ({_deviation(unexplained, FORCE.unexplained)}): it acts elsewhere or on another "
-                "link, or is not the only one; pin it where it acts, or free the arm"
-            )
+            return [
+                warning(Code.NOT_EXPLAINED, "torques_differ", **where, **_deviation(unexplained, FORCE.unexplained))
+            ]
         if self._assumed > lasting:
-            return ForceReaction.POSITION_ASSUMED, _position_assumed(
-                point, math.hypot(case.axis.free_sd, case.torque_error)
-            )
+            if not point.is_identified:
+                return [warning(Code.POSITION_ASSUMED, "position_unknown", **where)]
+            sd = math.hypot(case.axis.free_sd, case.torque_error)
+            return [warning(Code.POSITION_ASSUMED, "position_from_torques", **where, sd=sd)]
         if self._uncertain > lasting:
-            return ForceReaction.UNCERTAIN, (
-                f"the force is known to +-{brief(force_sd)} N, {force_sd / desired:.0%} of the commanded "
-                f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
-                "known, less where it is measured off: tare in free space, command more force, or another direction "
-                "or pose"
-            )
-        return ForceReaction.NONE, ""
+            part, allowed = force_sd / desired, parameters.sensing.reported_fraction
+            return [
+                warning(Code.UNCERTAIN, "force_uncertain", sd=force_sd, fraction=part, desired=desired, allowed=allowed)
+            ]
+        return []
+
+    def _cycle(self, desired: float, parameters: ForceLoopParameters) -> Event:
+        swing, period = self._turns.cycle
+        allowed = parameters.limits.cycle_force
+        return warning(Code.CYCLE, "cycle", swing=swing, period=period, desired=desired, allowed=allowed)
 
     def _has_turned(
         self,
@@ -569,8 +506,8 @@ class ForceHold:
         desired: float,
         parameters: ForceLoopParameters,
         dt: float,
-    ) -> str:
-        """Why something else seems to act since the force has settled, '' where nothing does.
+    ) -> Event | None:
+        """Why something else seems to act since the force has settled, None where nothing does.
 
         The torques of one contact keep their proportions while the arm rests, unless its friction turns.
         """
@@ -579,26 +516,21 @@ class ForceHold:
             self._pattern.reset()
         self._desired = desired
         if not self.is_touching:
-            return ""
+            return None
         if self._settled is None:
             pattern, _ = self._pattern.step((external / measured).tolist(), FORCE.steady_time, dt)
             self._settled = (
                 np.array(pattern) if self._within >= FORCE.left_after * parameters.limits.settling_time else None
             )
-            return ""
+            return None
         change = axis.turned(external - measured * self._settled)
         lasts = change > (FORCE.turned_back if self._turned > FORCE.conflict_time else FORCE.turned)
         self._turned = self._turned + dt if lasts else 0.0
         if self._turned <= FORCE.conflict_time:
-            return ""
-        return (
-            f"the torques are no longer those with which the force of {desired:.3g} N has settled "
-            f"({_deviation(change, FORCE.turned)}): something else acts on the arm, and the measured force is that of "
-            "both "
-            "together, or the friction of the surface has turned; free the arm, or command the force again"
-        )
+            return None
+        return warning(Code.NOT_EXPLAINED, "torques_changed", desired=desired, **_deviation(change, FORCE.turned))
 
-    def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
+    def _lasting(self, missed: Event | None, parameters: ForceLoopParameters) -> Event | None:
         """A reason, or the last one until the force has been within the tolerance for as long as it may be off.
 
         A force that had been right before has to be right for the whole settling time: what takes it away comes again.
@@ -611,8 +543,8 @@ class ForceHold:
 
     def _not_reached(
         self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters, dt: float
-    ) -> str:
-        """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
+    ) -> Event | None:
+        """Why the force counts as not reached, None where it does not: it is off on one side, or swings."""
         error, lasting = desired - measured, parameters.limits.settling_time
         is_off = abs(error) > tolerance(desired, parameters)
         self._within = 0.0 if is_off else self._within + dt
@@ -626,25 +558,22 @@ class ForceHold:
         has_rested = not self._has_settled or self._within >= FORCE.left_after * lasting
         self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
         if not self.has_touched and abs(self._missed) > lasting:
-            return (
-                f"nothing is touched yet, {brief(abs(self._missed))} s after the command: the arm has moved "
-                f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position, or, {SOFTER}"
-            )
+            time, way = abs(self._missed), 1e3 * self._travel
+            return warning(Code.NOT_REACHED, "nothing_touched_yet", time=time, way_mm=way)
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else FORCE.left_after * lasting):
-            return (
-                f"{measured:.3g} N are measured and {desired:.3g} N commanded; the force has been too "
-                f"{'small' if error > 0.0 else 'large'} for {brief(abs(self._missed))} s{_slowed(axis)}: command what "
-                "can be reached, another direction, or bend the arm"
+            return warning(
+                Code.NOT_REACHED,
+                "force_off",
+                measured=measured,
+                desired=desired,
+                error=error,
+                time=abs(self._missed),
+                **_slowness(axis),
             )
         if self._strayed > FORCE.left_after * lasting:
-            return (
-                f"the force was reached, and leaves {desired:.3g} N again and again by more than "
-                f"{brief(tolerance(desired, parameters))} N: the surface moves, something else pushes, friction turns, "
-                "the position is unknown, or it is a limit cycle; free the arm of what else touches it, pin the "
-                "position, or, for a cycle, lower force_gain"
-            )
-        return ""
+            return warning(Code.NOT_REACHED, "force_strays", desired=desired, allowed=tolerance(desired, parameters))
+        return None
 
 
 def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
@@ -652,19 +581,14 @@ def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
     return max(FORCE.tolerance * desired, parameters.limits.least_tolerance)
 
 
-def _deviation(unexplained: float, most: float) -> str:
-    """A chi^2 and the largest one in the standard deviations that they are."""
-    return f"off by {math.sqrt(unexplained):.3g} standard deviations; allowed: {math.sqrt(most):.2g}"
+def _deviation(unexplained: float, most: float) -> dict[str, Value]:
+    """A chi^2 and the largest one, in the standard deviations that they are."""
+    return {"off_sd": math.sqrt(unexplained), "allowed_sd": math.sqrt(most)}
 
 
-def _slowed(axis: ForceAxis) -> str:
-    """Why the arm is slow along the force, '' where it is not."""
-    if axis.speed_fraction > FORCE.not_slowed:
-        return ""
-    return (
-        f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
-        "own inertia resists like a large mass in this pose (sensing.apparent_mass_limit)"
-    )
+def _slowness(axis: ForceAxis) -> dict[str, Value]:
+    """How slow the arm is along the force, nothing where it is not."""
+    return {} if axis.speed_fraction > FORCE.not_slowed else {"speed_fraction": axis.speed_fraction}
 
 
 def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParameters) -> float:
@@ -676,79 +600,34 @@ def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParame
     return math.sqrt(max(whole * whole - (1.0 - FORCE.likely * FORCE.likely) * stated * stated, 0.0))
 
 
-def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Event | None:
     """Why a surface that moves would keep the force off, None where it would not.
 
     Along the force the integral law is v/G_I behind, and the force rises in no less than `known_rise`.
     A surface that moves across it comes nearer by a slope that nobody knows, if it is stiff by more than the force
     allows before the friction of the arm has turned round.
     """
-    limits, yielding = parameters.limits, 1.0 / parameters.guard.contact_stiffness + axis.compliance
-    lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+    limits, stiffness = parameters.limits, parameters.guard.contact_stiffness
+    yielding, speed = 1.0 / stiffness + axis.compliance, limits.surface_speed
+    lag = speed / (max(parameters.force_gain) * axis.speed_fraction)
     most = parameters.sensing.reported_fraction * desired
     if lag > most:
-        return Refusal(
-            ForceReaction.TOO_SLOW,
-            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
-            f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction)",
-            "set a larger force_gain, or let the surface move more slowly",
-        )
+        return warning(Code.TOO_SLOW, "surface_lag", speed=speed, off=lag, allowed=most)
     fastest = desired * yielding / (FORCE.motors_rise if parameters.is_estimated else FORCE.known_rise)
-    if limits.impact and limits.surface_speed > fastest:
-        return Refusal(
-            ForceReaction.TOO_SLOW,
-            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
-            f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
-            f"{brief(fastest)} m/s",
-            "let the surface move more slowly",
+    if limits.impact and speed > fastest:
+        return warning(
+            Code.TOO_SLOW, "surface_fast", speed=speed, desired=desired, stiffness=stiffness, allowed=fastest
         )
     nearer = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed
     off = nearer / yielding
     if off > tolerance(desired, parameters):
-        return Refusal(
-            ForceReaction.TOO_SLOW,
-            f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
-            f"by {brief(1e6 * nearer)} um while the friction of the arm turns round, which is {brief(off)} N on "
-            f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
-            f"{brief(tolerance(desired, parameters))} N",
-            "let the surface move more slowly",
+        return warning(
+            Code.TOO_SLOW,
+            "surface_slope",
+            speed=limits.slide_speed,
+            nearer_um=1e6 * nearer,
+            off=off,
+            stiffness=stiffness,
+            allowed=tolerance(desired, parameters),
         )
     return None
-
-
-def _gone(way: float, measured: float, desired: float, parameters: ForceLoopParameters) -> str:
-    return (
-        f"the arm has gone back by {way:.3g} m against the force of {desired:.3g} N, as what presses it with "
-        f"{measured:.3g} N moves on: it is not at rest, or is no surface; allowed: limits.free_travel, "
-        f"{parameters.limits.free_travel:g} m; the arm holds its position: free it, or, for a surface that moves, "
-        "declare limits.surface_speed; command no force, then again"
-    )
-
-
-def _loaded(force: float, meaning: str, desired: float) -> str:
-    return (
-        f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
-        f"{FORCE.tolerance:g} of the commanded; {UNLOAD}"
-    )
-
-
-def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:
-    swing, period = turns.cycle
-    return (
-        f"the measured force is in a limit cycle of {brief(swing)} N peak to peak and {brief(period)} s about "
-        f"{desired:.3g} N; allowed: limits.cycle_force, {parameters.limits.cycle_force:g} of the commanded; friction "
-        "or the surface keeps it up: lower force_gain, or use joint sensors"
-    )
-
-
-def _position_assumed(point: ForcePoint, force_sd: float) -> str:
-    known = (
-        f"where it is known from the torques alone, so that the force is known to {brief(force_sd)} N"
-        if point.is_identified
-        else "it is not known where"
-    )
-    return (
-        f"something is touched and {known}; {point.position:.3g} m of {point.cover} is assumed, and the force is as "
-        "wrong as that; pin it by the torque of a command across a link, or set contact_source to pinned "
-        "(contact_position)"
-    )

@@ -19,7 +19,7 @@ from wam_control.force.contact_position import ContactPosition, ForceCase, Force
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force.force_command import CommandAdmission, Commands
-from wam_control.force.force_hold import ForceHold, ForceReaction, Found, by_seriousness
+from wam_control.force.force_hold import ForceHold, by_seriousness
 from wam_control.force.force_law import BumplessTransfer, DelayLine
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import ForceMeasurement, LowPass
@@ -27,7 +27,7 @@ from wam_control.force.given_way import GivenWay, has_left
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.held_arm import HeldArm, RetreatForce
 from wam_control.force.hybrid_velocity import followed, hybrid_velocity, posture_velocity
-from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, MotionLimits, WholeForce
+from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_MIDDLE, HowKnown, MotionLimits, WholeForce
 from wam_control.force.motion_watch import MotionWatch
 from wam_control.force.posture_watch import PostureWatch, ShortfallWatch
 from wam_control.force.sensing_advice import OtherForces, Turnable
@@ -38,7 +38,7 @@ from wam_control.force.thresholds import FORCE
 from wam_control.force.torque_watch import TorqueWatch
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.number_text import brief
+from wam_description.event import OBEYED, Code, Event, refused, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
@@ -48,7 +48,6 @@ Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 RESTED = 3.0 * FORCE.steady_time  # s at rest, after which it is
 SHORTEST = FORCE.shortest_lever**2  # m^2, square of a lever
-TAKEN = "the task leaves the posture too little: command a posture that its axes leave, or end one of them"
 
 
 class ForceOutput(NamedTuple):
@@ -89,7 +88,7 @@ class ForceLoop:
     refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in force.
     fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
-    reactions : what the loop does instead of what is commanded, and why, the most serious first; none where it obeys.
+    reactions : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
 
     def __init__(
@@ -124,7 +123,7 @@ class ForceLoop:
         self._resting: Array | None = None
         self._is_moving = self._is_fast = False
         self._rested = 0.0  # s
-        self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
+        self._unknown: tuple[Array, float] = np.zeros(self._n), 0.0  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
@@ -133,24 +132,19 @@ class ForceLoop:
         self._rate: Sequence[float] | None = None
         self._posture_watch = PostureWatch(arm.joints.names, "posture", "joint_speed_limit", "rad/s")
         self._posture_shortfall = ShortfallWatch(arm.joints.names)
-        self._posture_motions = [MotionWatch(f"posture of {name}", "rad", TAKEN) for name in arm.joints.names]
+        self._posture_motions = [MotionWatch(f"posture of {name}", "rad", "posture_taken") for name in arm.joints.names]
         self._posture_before: list[float] = []  # (n,) rad, as the task began
         self._has_posture = False  # whether another one has been commanded since
         self.refused = 0
-        self.refusals: dict[str, str] = {}
+        self.refusals: dict[str, Event] = {}
         self.fallback = ""
-        self.reactions: dict[ForceReaction, str] = {}
+        self.reactions: dict[Code, Event] = {}
         self._take(servo, parameters)
 
     @property
-    def reaction(self) -> ForceReaction:
-        """The most serious one; NONE where the loop obeys."""
-        return next(iter(self.reactions), ForceReaction.NONE)
-
-    @property
-    def reason(self) -> str:
-        """Of the most serious reaction, '' where there is none."""
-        return next(iter(self.reactions.values()), "")
+    def reaction(self) -> Event:
+        """The most serious one; OBEYED where the loop obeys."""
+        return next(iter(self.reactions.values()), OBEYED)
 
     @property
     def assessment(self) -> GuardAssessment | None:
@@ -224,7 +218,7 @@ class ForceLoop:
     @property
     def is_pushed(self) -> bool:
         """Whether something has pushed the arm since it holds."""
-        return bool(self._held.push or self._tasks.is_pushed)
+        return bool(self._held.pushed or self._tasks.is_pushed)
 
     @property
     def _is_at_rest(self) -> bool:
@@ -295,7 +289,7 @@ class ForceLoop:
         commands = self._admission.step(own, joints.position, command, posture, torque, dt, task)
         self._rate = posture_rate if posture_rate and commands.posture == posture else None
         if commands.refusals:
-            self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
+            self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
         self.reactions = {}
         self._measurement.step(own, sensors, external, dt)
@@ -316,29 +310,29 @@ class ForceLoop:
         if is_braked:
             self._limits.forget()  # the force with which brakes stop the arm is none of the world
         else:
-            self._react_too(ForceReaction.CONTACT_FORCE, limited.contact_force)
-        self._react_too(ForceReaction.JOINT_END, limited.joint_end)
+            self._react_too(limited.contact_force)
+        self._react_too(limited.joint_end)
         self._watch_rise(commands)
         self._watch_posture(commands, posture is not None, joints.position, dt)
         return ForceOutput(limited.velocity, *out[1:])
 
     def _watch_rise(self, commands: Commands) -> None:
-        """State that the set point is not the command yet, in each reason of a reaction and, if that lasts, as one."""
+        """State that the set point is not the command yet, in each reaction and, if that lasts, as one."""
         if not commands.rising or self._axes in ("", TASK):
             return
-        self.reactions = {one: f"{why}; {commands.rising}" for one, why in self.reactions.items()}
+        self.reactions = {code: event.with_values(**commands.rising) for code, event in self.reactions.items()}
         if commands.risen > self.parameters.limits.settling_time:
-            self._react((ForceReaction.NOT_REACHED, commands.rising), *self.reactions.items())
+            self._react(warning(Code.NOT_REACHED, "rising", **commands.rising), *self.reactions.values())
 
     def _watch_posture(self, commands: Commands, is_commanded: bool, q: Sequence[float], dt: float) -> None:
         """React to a posture that moves on faster than the arm follows, or is not reached where it is all there is."""
-        is_held = self.reaction.holds or "joint_posture_command" in commands.refusals
-        own, is_pushed = self.parameters, ForceReaction.CONTACT_FORCE in self.reactions
+        is_held = self.reaction.code.holds or "joint_posture_command" in commands.refusals
+        own, is_pushed = self.parameters, Code.CONTACT_FORCE in self.reactions
         if is_held or is_pushed or self._axes or not is_commanded or own.mode != "hybrid":
             self._posture_shortfall.restart()
         else:
             short = self._posture_shortfall.step(commands.posture, q, own.posture_gain, own.joint_speed_limit, dt)
-            self._react_too(ForceReaction.NOT_REACHED, short)
+            self._react_too(short)
         if self._axes != TASK or is_held or not self._posture_before:
             self._posture_before, self._has_posture = commands.posture, False
         if is_held:
@@ -350,7 +344,7 @@ class ForceLoop:
             if is_commanded
             else self._posture_watch.wait(dt)
         )
-        self._react_too(ForceReaction.NOT_FOLLOWED, late)
+        self._react_too(late)
         if self._posture_before is not commands.posture:
             self._watch_posture_of_task(commands.posture, q, dt)
 
@@ -366,7 +360,7 @@ class ForceLoop:
         own, rate, share = self.parameters, self._rate or [0.0] * self._n, self._tasks.share
         law = own.posture_gain, own.joint_speed_limit
         for goal, speed, at, watch in zip(posture, rate, q, self._posture_motions, strict=True):
-            self._react_too(*watch.position(goal, speed, at, 1.0, law, share, own, dt))
+            self._react_too(watch.position(goal, speed, at, 1.0, law, share, own, dt))
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""
@@ -375,8 +369,8 @@ class ForceLoop:
         pressed = out.pressed
         return WholeForce(out.desired, (lambda: self._whole_force(pressed)) if pressed else lambda: None)
 
-    def _whole_force(self, pressed: PressedForce) -> tuple[float, str]:
-        """The force in all, N, and its words: at its position, or on another link if it would be less there.
+    def _whole_force(self, pressed: PressedForce) -> tuple[float, HowKnown]:
+        """The force in all, N, and how it is known: at its position, or on another link if it would be less there.
 
         Torques that no force along the commanded direction gives may be those of a push on another link.  They may
         look like a force along this one, which would have to be many times as large.
@@ -390,18 +384,18 @@ class ForceLoop:
             return size, AT_COMMANDED
         here = self._push(q, pressed[:2]).least(self._body, q), AT_LEAST
         others = [
-            (self._push(q, (cover, FORCE.middle * length)).least(self._body, q), AT_OTHER.format(cover))
+            (self._push(q, (cover, FORCE.middle * length)).least(self._body, q), (AT_MIDDLE, cover))
             for cover, length in self._other_covers(pressed)
         ]
         return min((size, AT_COMMANDED), max([here, *others]))
 
-    def _react(self, *found: Found) -> None:
+    def _react(self, *found: Event) -> None:
         self.reactions = by_seriousness(found)
 
-    def _react_too(self, reaction: ForceReaction, reason: str) -> None:
-        """React to this, too, where there is a reason."""
-        if reason:
-            self._react(*self.reactions.items(), (reaction, reason))
+    def _react_too(self, event: Event | None) -> None:
+        """React to this, too, where there is something."""
+        if event:
+            self._react(*self.reactions.values(), event)
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
@@ -487,14 +481,15 @@ class ForceLoop:
         is_watching = self._is_watching(force_axis, moved, dt)
         self._react(*self._found(q, force_axis, point, direction, (measured, free), desired, dt, command.frame))
         self._remember(q, moved, contact, point, force_axis, direction, dt)
-        if self.reaction.holds:
+        if self.reaction.code.holds:
             measured -= -float(force_axis.sense @ self._unknown[0])
             excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
             factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
             force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
             velocity, effort = self._hold_still(q, contact, point, force, desired, dt)
-            self._react((self.reaction, self.reason + self._held.push))
-            self.refusals["force_command"] = self.reason
+            if pushed := self._held.pushed:
+                self._react(self.reaction.with_values(pushed=pushed))
+            self.refusals["force_command"] = self.reaction
             return out._replace(velocity=[] if is_open else velocity, effort=effort)
         if self._held.is_holding:
             self._held.release()
@@ -547,15 +542,10 @@ class ForceLoop:
         desired: float,
         dt: float,
         frame: str,
-    ) -> list[Found]:
-        """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
+    ) -> list[Event]:
+        """What the loop does instead of the command; forces in N, the measured one without inertia, too."""
         if self._is_fast:
-            why = (
-                f"the arm moved faster than {FORCE.fast:g} rad/s as the force began, and it is not known what it "
-                "carries: it "
-                "comes to rest first"
-            )
-            return [(ForceReaction.NOT_SENSED, why)]
+            return [warning(Code.NOT_SENSED, "moved_fast", speed=FORCE.fast)]
         if self._resting is not None:
             self._judge(q, point, direction, self._resting)
         return self._hold.step(
@@ -581,7 +571,7 @@ class ForceLoop:
             elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
             torque_error=self._torque_error(axis),
             unknown=-float(axis.sense @ self._unknown[0]),
-            meaning=self._unknown[1],
+            payload=self._unknown[1],
         )
 
     def _others(self, q: Sequence[float], point: ForcePoint, direction: Array, frame: str) -> OtherForces:
@@ -621,8 +611,7 @@ class ForceLoop:
         carried = self._carried(q, resting)
         is_pressed = force > 0.0 and axis.unexplained(resting) <= FORCE.unexplained
         is_contact = (is_pressed or self._is_moving) and not carried
-        meaning = carried or "not the force of a surface that is touched there"
-        self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
+        self._resting, self._unknown = None, (np.zeros(self._n), 0.0) if is_contact else (resting, carried)
 
     def _judge_load(self, q: Sequence[float]) -> None:
         """The same for no direction: what no mass at the tool explains may be surfaces that are touched already."""
@@ -630,11 +619,11 @@ class ForceLoop:
             carried = self._carried(q, resting)
             self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
 
-    def _carried(self, q: Sequence[float], resting: Array) -> str:
-        """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
+    def _carried(self, q: Sequence[float], resting: Array) -> float:
+        """The mass at the tool, kg, that explains torques at rest (n,), N m; 0 where none does."""
         sd = math.hypot(sensing_of(self.parameters).torque_sd, FORCE.payload_rest * float(np.abs(resting).max()))
         mass, left = self._measurement.payload(q, resting, sd)
-        return f"as with {brief(mass)} kg at the tool" if mass > 0.0 and left <= FORCE.unexplained else ""
+        return mass if mass > 0.0 and left <= FORCE.unexplained else 0.0
 
     def _hold_still(
         self,
@@ -648,7 +637,7 @@ class ForceLoop:
         """Velocities and torques of an arm that holds: to where it does, or away from what pushes too hard."""
         own, still = self.parameters, [0.0] * self._n
         self._hold.fed = 0.0
-        goes_back = self.reaction is ForceReaction.OTHER_LINK
+        goes_back = self.reaction.code is Code.OTHER_LINK
         if not self._held.is_holding or goes_back != self._goes_back:
             self._goes_back = goes_back
             self._held.hold(self._free_of(force.axis) if goes_back else q)
@@ -669,7 +658,7 @@ class ForceLoop:
 
     def _push_on_arm(self, q: Sequence[float], contact: Contact, where: tuple[str, float] | None) -> ArmPush:
         """What pushes the arm: where the commanded force acts, or no nearer to the base than a contact is estimated."""
-        if self.reaction.holds:
+        if self.reaction.code.holds:
             return self._push(q, self._pushed_position(contact, where))
         probable = self.parameters.link_probability_limit
         if where is not None or not contact.cover or not contact.probability >= probable:
@@ -709,13 +698,13 @@ class ForceLoop:
         dt: float,
     ) -> None:
         """Keep where the arm presses, how far it has slid, its way there and back, and where it was free."""
-        if not self.reaction.holds and self.parameters.mode != "open_loop":
+        if not self.reaction.code.holds and self.parameters.mode != "open_loop":
             self._hold.travel(float(axis.lever @ moved), dt, self._posture_watch.is_moving)
             if self._hold.goes_back:
                 self._given.give(-direction)
         self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         if self._hold.is_touching:
-            if not self.reaction.holds:
+            if not self.reaction.code.holds:
                 self._pressed_at = list(q)
         else:
             way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
@@ -781,8 +770,8 @@ class ForceLoop:
         push = self._push(q, self._pushed_position(contact, _known_position(None, task)))
         found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self.reactions = found.reactions
-        if self.reaction.holds:
-            self.refusals["task_command"] = self.reason
+        if self.reaction.code.holds:
+            self.refusals["task_command"] = self.reaction
         elif self._tasks.is_touching:
             self._pressed_at = list(q)
         if found.has_changed:
@@ -802,7 +791,7 @@ class ForceLoop:
         before, self._torque_before = self._torque_before or measured, measured
         self._judge_load(self._joints)
         self._watch_torques(torque, dt)
-        if self.reaction.holds:
+        if self.reaction.code.holds:
             self._delay.reset()
             return ForceOutput([0.0] * self._n, [0.0] * self._n)
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
@@ -833,7 +822,7 @@ class ForceLoop:
         self.fallback = point.rejection
         if point.rejection and self.parameters.is_estimated:
             self.refused += not self._contact_rejected
-            self.refusals["contact/hypotheses"] = point.rejection
+            self.refusals["contact/hypotheses"] = refused("contact/hypotheses", point.rejection)
         self._contact_rejected = bool(point.rejection)
         return point
 

@@ -4,16 +4,17 @@ import math
 from typing import Any
 
 from wam_control.contact.contact_table import contact_of
-from wam_control.force.force_hold import ForceReaction
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.guard import Report
-from wam_control.force.reaction_status import facts_of
 from wam_control.force.task import TaskCommand, task_of
 from wam_control.task.trajectory_goal import TrajectoryPlayer
 from wam_description.arm import Shared
+from wam_description.event import Code, Event, Level, refused
+from wam_description.event_text import sentences
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
-from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
+from wam_description.signals import BASE, ZERO, Answer, ForceCommand, NodeStatus, State, Table, Wrench
+from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
@@ -38,7 +39,7 @@ class ForceLoopNode:
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
         self._reported: tuple[Any, ...] | None = None
-        self._reaction = ForceReaction.NONE
+        self._reaction = Code.NONE
 
     @reaction(
         Input("joint_states"),
@@ -121,7 +122,7 @@ class ForceLoopNode:
 
     def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:
         """How well the force is known, at the display rate and where the reaction has changed."""
-        reaction, before = self._loop.reaction, self._reaction
+        reaction, before = self._loop.reaction.code, self._reaction
         self._reaction = reaction
         if reaction is before and not self._timing.is_display(stamp):
             return {}
@@ -131,45 +132,44 @@ class ForceLoopNode:
         if axis is None or point is None:
             return {"force_axis": Table(BASE, ())}
         lever = math.hypot(*axis.lever)
-        row = (float(reaction), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
+        row = (float(reaction.number), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
         return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reactions = self._loop.report, self._loop.reactions
-        refused = self.refusals
-        refused.pop("contact/hypotheses", None)
+        refusals = self.refusals
+        refusals.pop("contact/hypotheses", None)
         why = self._loop.is_advised, self._loop.is_stopping, self._refusal or self._player.refusal
         commanded: tuple[str, ...] = ()
-        if self._loop.reason or refused:  # which is that of the command for which it was given
+        if reactions or refusals:  # which is that of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             commanded = tuple(map(brief, values))
-        present = report, tuple(reactions), self._loop.is_pushed, tuple(refused), why, commanded
+        present = report, tuple(reactions), self._loop.is_pushed, tuple(refusals), why, commanded
         if present == self._reported:
             return {}
         self._reported = present
-        message, facts = facts_of(reactions, refused)
-        level = Level.WARN if report.is_warning or message else Level.OK
-        return {"status": NodeStatus(level, message or report.message, facts={**report.facts, **facts})}
+        refused_ones = [event for event in refusals.values() if event.code is Code.REFUSED]
+        found = [*reactions.values(), *refused_ones]
+        events = tuple(sorted(found, key=lambda event: (not event.code.holds, event.code is not Code.REFUSED)))
+        level = Level.WARN if report.is_warning or events else Level.OK
+        message = sentences(events) or report.message
+        facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
+        return {"status": NodeStatus(level, message, facts=facts, events=events)}
 
     @property
-    def refusals(self) -> dict[str, str]:
+    def refusals(self) -> dict[str, Event]:
         """Why a present command or contact is not used, by topic."""
         refusals = self._loop.refusals.copy()
         if self._refusal:
-            refusals["task_command"] = self._refusal
+            refusals["task_command"] = refused("task_command", self._refusal)
         if self._player.refusal:
-            refusals["joint_trajectory"] = self._player.refusal
+            refusals["joint_trajectory"] = refused("joint_trajectory", self._player.refusal)
         return refusals
 
     @property
-    def reason(self) -> str:
-        """Why the loop does not do what is commanded, '' where it does."""
-        return self._loop.reason
-
-    @property
-    def force_reaction(self) -> ForceReaction:
+    def reaction(self) -> Event:
         """What the loop does instead of what is commanded."""
         return self._loop.reaction
 

@@ -14,7 +14,6 @@ from wam_control.force.given_way import GivenWay
 from wam_control.force.hybrid_velocity import posture_velocity
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
-from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -54,14 +53,9 @@ class HeldArm:
         return bool(self._at)
 
     @property
-    def push(self) -> str:
-        """What has pushed the arm since it holds, in words; '' where nothing has."""
-        if not self._pushed:
-            return ""
-        return (
-            f"; something touches the arm since, and has pushed with up to {brief(self._pushed)} N: the arm gives way "
-            "by limits.free_travel at most, unless that overpowers its motors"
-        )
+    def pushed(self) -> float:
+        """Largest force, N, with which something has pushed the arm since it holds; 0 where nothing has."""
+        return self._pushed
 
     def hold(self, at: Sequence[float]) -> None:
         """Hold a posture (n,), rad."""

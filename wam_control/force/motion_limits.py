@@ -12,7 +12,7 @@ from wam_control.force.arm_push import ArmPush
 from wam_control.force.given_way import GivenWay
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
-from wam_description.number_text import brief
+from wam_description.event import Code, Event, Value, warning
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
 
@@ -71,10 +71,11 @@ class LimitParameters:
     )
 
 
-AT_LEAST: Final = "at least {} N in all"
-AT_COMMANDED: Final = "{} N in all, if it acts where the commanded force does"
-AT_OTHER: Final = "at least {{}} N in all, if it acts in the middle of {}"
-AT_ESTIMATED: Final = "at least {} N in all, if the estimated contact is on the right link"
+HowKnown = tuple[str, str]  # how a force is known, and the cover in whose middle it is assumed
+AT_LEAST: Final[HowKnown] = ("at_least", "")
+AT_COMMANDED: Final[HowKnown] = ("at_commanded", "")
+AT_ESTIMATED: Final[HowKnown] = ("at_estimated", "")
+AT_MIDDLE: Final = "at_middle"
 
 
 class WholeForce(NamedTuple):
@@ -83,19 +84,20 @@ class WholeForce(NamedTuple):
     Attributes
     ----------
     desired : commanded, N, in all directions together.
-    measured : the one in all, N, and its words, where the position of the commanded one is known; None where not.
+    measured : the one in all, N, and how it is known, where the position of the commanded one is known;
+        None where not.
     """
 
     desired: float
-    measured: Callable[[], tuple[float, str] | None]
+    measured: Callable[[], tuple[float, HowKnown] | None]
 
 
 class Limited(NamedTuple):
-    """Joint velocities (n,), rad/s, and why they are not those commanded, '' where they are."""
+    """Joint velocities (n,), rad/s, and why they are not those commanded, None where they are."""
 
     velocity: list[float]
-    joint_end: str
-    contact_force: str
+    joint_end: Event | None
+    contact_force: Event | None
 
 
 class MotionLimits:
@@ -117,8 +119,9 @@ class MotionLimits:
         self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
         self._given, self._pushed = given, 0.0  # N, in the present push
         self._on = ""  # the cover that is pushed, '' where that is not known
-        self._how_known = ""  # that force: a lower bound, or the one at an assumed position
-        self._reason, self._reported = "", 0.0  # the last one, and for how long, s, it is reported still
+        self._how_known = AT_LEAST  # that force: a lower bound, or the one at an assumed position
+        self._event: Event | None = None  # the last one
+        self._reported = 0.0  # s, for which it is reported still
 
     def step(
         self,
@@ -139,14 +142,14 @@ class MotionLimits:
         whole : the commanded force, if something is pressed.
         """
         if not velocity:
-            return Limited([], "", "")
+            return Limited([], None, None)
         slowed, force = self._against_the_world(list(velocity), q, push, whole)
         stopped, end = self._before_the_ends(slowed, q)
         if force:
-            self._reason, self._reported = force, FORCE.lasting
+            self._event, self._reported = force, FORCE.lasting
         else:
             self._reported = max(self._reported - dt, 0.0)
-        return Limited(stopped, end, self._reason if self._reported else "")
+        return Limited(stopped, end, self._event if self._reported else None)
 
     def forget(self) -> None:
         """Report nothing any more of what has pushed."""
@@ -154,58 +157,53 @@ class MotionLimits:
 
     def _against_the_world(
         self, velocity: list[float], q: Sequence[float], push: ArmPush, whole: WholeForce | None
-    ) -> tuple[list[float], str]:
+    ) -> tuple[list[float], Event | None]:
         """Against a force that has come near the largest one no faster than the force law towards that one."""
         on = push.position[0] if push.position else ""
         if on != self._on:
             self._on, self._pushed = on, 0.0  # what pushes elsewhere was not this
         force, allowed, how_known = self._push(q, push, whole)
         if not self._pushed and force <= FORCE.slow_from * allowed:
-            return velocity, ""
+            return velocity, None
         has_room = self._given.way < self._parameters.free_travel
         push = push._replace(allowed=allowed, gain=push.gain if has_room or force < allowed else 0.0)
         missing = push.correction(self._body, q, velocity, force, self._fastest)
         is_bound = bool(missing.any())
         if not is_bound and force <= FORCE.slow_from * allowed:
             self._pushed = 0.0
-            return velocity, ""
+            return velocity, None
         if force > self._pushed:
             self._pushed, self._how_known = force, how_known
         limited: list[float] = (np.array(velocity) + missing).tolist()
         if force > allowed:
             self._given.give()
         if not is_bound and (force <= allowed or float(push.torques @ limited) > 0.0):
-            return limited, ""  # by itself, the arm gives way fast enough
-        limit = self._in_words(allowed, whole)
-        return limited, (
-            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; from "
-            f"{FORCE.slow_from:g} of "
-            "that on the arm is slow against it, above it gives way by limits.free_travel at most, unless that "
-            "overpowers its motors: command a direction or a posture away from it, or less force"
-        )
+            return limited, None  # by itself, the arm gives way fast enough
+        own, (known, cover) = self._parameters, self._how_known
+        values: dict[str, Value] = {"force": self._pushed, "known": known, "cover": cover, "begin": FORCE.slow_from}
+        if whole is None or allowed == own.contact_force:
+            values |= {"limit": "contact_force", "allowed": own.contact_force}
+        else:
+            values |= {"limit": "whole_force", "allowed": own.whole_force, "desired": whole.desired}
+        return limited, warning(Code.CONTACT_FORCE, "contact_force", **values)
 
-    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
-        """Force, N, the largest one allowed, of those that count here the one that is nearest to it, and its words."""
+    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, HowKnown]:
+        """Force, N, the largest one allowed, of those that count here the one nearest to it, and how it is known."""
         own = self._parameters
         most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
         least = push.least(self._body, q, FORCE.slow_from * min(most, allowed))
         if whole and allowed < most:
-            force, words = whole.measured() or (least, AT_LEAST)
+            force, known = whole.measured() or (least, AT_LEAST)
             if force * most >= least * allowed:
-                return force, allowed, words
+                return force, allowed, known
         return least, most, AT_ESTIMATED if push.is_estimated else AT_LEAST
 
-    def _in_words(self, allowed: float, whole: WholeForce | None) -> str:
-        own = self._parameters
-        if whole is None or allowed == own.contact_force:
-            return f"limits.contact_force, {own.contact_force:g} N"
-        return f"limits.whole_force, {own.whole_force:g} times the commanded {whole.desired:.3g} N"
-
-    def _before_the_ends(self, velocity: list[float], q: Sequence[float]) -> tuple[list[float], str]:
+    def _before_the_ends(self, velocity: list[float], q: Sequence[float]) -> tuple[list[float], Event | None]:
         gain, margin = self._parameters.joint_gain, self._parameters.joint_margin
         if not gain:
-            return velocity, ""
-        joints, reason, limited = self._joints, "", []
+            return velocity, None
+        joints, limited = self._joints, []
+        reason: Event | None = None
         for name, low, angle, high, speed in zip(joints.names, joints.lower, q, joints.upper, velocity, strict=True):
             slowest, fastest = -_approach(angle - low, gain, margin), _approach(high - angle, gain, margin)
             if slowest <= speed <= fastest:
@@ -214,10 +212,7 @@ class MotionLimits:
             limited.append(min(max(speed, slowest), fastest))
             end = low if speed < slowest else high
             if limited[-1] != speed and abs(angle - end) <= margin + FORCE.push_back / gain:
-                reason = (
-                    f"{name} is at {angle:.4g} rad, its end is {end:.4g} rad and limits.joint_margin {margin:g} rad: "
-                    "it does not move on; command another posture or direction"
-                )
+                reason = warning(Code.JOINT_END, "joint_end", joint=name, angle=angle, end=end, margin=margin)
         return limited, reason
 
 

@@ -1,21 +1,11 @@
 """Whether an axis gets where the position or the velocity commanded along it takes an arm that nothing hinders."""
 
 import math
-from collections.abc import Callable
-from typing import Final
 
-from wam_control.force.force_hold import ForceReaction, Found
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
-from wam_description.number_text import brief
-
-IN_THE_WAY: Final = (
-    "something is in the way, a joint is at its end, or the arm has no lever for it here: command what is free and "
-    "within reach, or another posture"
-)
-TOO_FAST: Final = "a joint would be faster than force_loop:joint_speed_limit: command less speed, or raise it"
-OBEYS: Final[Found] = (ForceReaction.NONE, "")
+from wam_description.event import OBEYED, Code, Event, Value, warning
 
 
 class MotionWatch:
@@ -30,11 +20,11 @@ class MotionWatch:
     Parameters
     ----------
     name, unit : of the axis, 'm' or 'rad'.
-    advice : what to do where it is behind.
+    hindrance : what keeps it behind where no joint is too fast.
     """
 
-    def __init__(self, name: str, unit: str, advice: str = IN_THE_WAY) -> None:
-        self._name, self._unit, self._advice = name, unit, advice
+    def __init__(self, name: str, unit: str, hindrance: str = "in_the_way") -> None:
+        self._name, self._unit, self._hindrance = name, unit, hindrance
         self.restart()
 
     def restart(self) -> None:
@@ -42,12 +32,12 @@ class MotionWatch:
         self._ideal, self._goal, self._rested = math.nan, math.nan, 0.0
         self._behind, self._mean, self._error, self._made = 0.0, math.nan, 0.0, 0.0
         self._off = self._within = 0.0  # s
-        self._found = OBEYS
+        self._found = OBEYED
 
     def velocity(
         self, speed: float, moved: float, lever: float, share: float, parameters: ForceLoopParameters, dt: float
-    ) -> Found:
-        """What a commanded velocity does not reach, and why.
+    ) -> Event:
+        """What a commanded velocity does not reach.
 
         Parameters
         ----------
@@ -73,7 +63,9 @@ class MotionWatch:
             FORCE.left_after * lasting,
             dt,
             share < 1.0,
-            lambda: f"{speed:.4g} {self._unit}/s are commanded, and it moves with {brief(self._made)} {self._unit}/s",
+            "velocity_off",
+            speed,
+            self._made,
         )
 
     def position(
@@ -86,8 +78,8 @@ class MotionWatch:
         share: float,
         parameters: ForceLoopParameters,
         dt: float,
-    ) -> Found:
-        """What a commanded position does not reach, and why.
+    ) -> Event:
+        """What a commanded position does not reach.
 
         Parameters
         ----------
@@ -113,7 +105,9 @@ class MotionWatch:
             FORCE.left_after * lasting,
             dt,
             share < 1.0 and not is_at_rest,
-            lambda: f"{goal:.4g} {self._unit} is commanded, and it is at {at:.4g} {self._unit}",
+            "position_off",
+            goal,
+            at,
         )
 
     def _reported(
@@ -123,23 +117,23 @@ class MotionWatch:
         lasting: float,
         dt: float,
         is_limited: bool,
-        what: Callable[[], str],
-    ) -> Found:
-        """The reaction to a way, m or rad, that is missing for so long, s, until it is not for as long."""
+        cause: str,
+        commanded: float,
+        measured: float,
+    ) -> Event:
+        """What is reported of a way, m or rad, that is missing for so long, s, until it is not for as long."""
         if abs(behind) <= allowed:
             self._within += dt
             if self._within >= lasting:
-                self._off, self._found = 0.0, OBEYS
+                self._off, self._found = 0.0, OBEYED
             return self._found
         self._within = 0.0
         self._off += dt
-        if self._off > lasting and self._found is OBEYS:
-            why = TOO_FAST if is_limited else self._advice
-            text = (
-                f"{self._name}: {what()}; it has been off by more than {brief(allowed)} {self._unit} for "
-                f"{brief(self._off)} s; {why}"
-            )
-            self._found = (ForceReaction.NOT_FOLLOWED if is_limited else ForceReaction.NOT_REACHED), text
+        if self._off > lasting and self._found is OBEYED:
+            values: dict[str, Value] = {"axis": self._name, "unit": self._unit, "time": self._off}
+            values |= {"why": "too_fast" if is_limited else self._hindrance}
+            values |= {"commanded": commanded, "measured": measured, "allowed": allowed}
+            self._found = warning(Code.NOT_FOLLOWED if is_limited else Code.NOT_REACHED, cause, **values)
         return self._found
 
 

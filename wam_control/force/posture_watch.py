@@ -6,6 +6,7 @@ from typing import Final
 
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
+from wam_description.event import Code, Event, warning
 
 STILL: Final = [0.0]
 
@@ -31,7 +32,8 @@ class PostureWatch:
         self._before: list[float] = []
         self._follower: list[float] = []
         self._behind = STILL
-        self._interval, self._late = math.inf, ""  # s, between the last two changes
+        self._interval = math.inf  # s, between the last two changes
+        self._late: Event | None = None
         self._rested, self._held = 0.0, 0.0  # s, since the last one, and of that commanded
         self._is_goal = True
 
@@ -40,15 +42,17 @@ class PostureWatch:
         """Whether the commanded posture moves."""
         return not self._is_goal and self._rested <= max(FORCE.pause, FORCE.rhythm * self._interval) + FORCE.rounding
 
-    def wait(self, dt: float) -> str:
+    def wait(self, dt: float) -> Event | None:
         """Why the arm is late, while no posture is commanded for a period of dt, s, as before."""
         self._rested += dt
         if not self.is_moving:
-            self._late = ""
+            self._late = None
         return self._late
 
-    def step(self, posture: Sequence[float], has_rate: bool, q: Sequence[float], limit: float, dt: float) -> str:
-        """Why the arm is late, '' where it is not.
+    def step(
+        self, posture: Sequence[float], has_rate: bool, q: Sequence[float], limit: float, dt: float
+    ) -> Event | None:
+        """Why the arm is late, None where it is not.
 
         Parameters
         ----------
@@ -64,14 +68,14 @@ class PostureWatch:
         elif self._before != before:
             self._change(before, limit)
         if self._follower == self._before:
-            self._behind, self._late = STILL, ""
-            return ""
+            self._behind, self._late = STILL, None
+            return None
         most = (1.0 if has_rate or self._late else FORCE.caught_up) * limit * dt
         pairs = zip(posture, self._follower, q, strict=True)
         self._follower = [_nearer(goal, at + min(max(goal - at, -most), most), arm) for goal, at, arm in pairs]
         self._behind = [abs(a - b) for a, b in zip(posture, self._follower, strict=True)]
         if max(self._behind) <= FORCE.rounding:
-            self._late = ""
+            self._late = None
         return self._late
 
     def _change(self, before: list[float], limit: float) -> None:
@@ -82,21 +86,22 @@ class PostureWatch:
         if is_soon and self._is_goal:  # a motion begins, there
             self._follower, self._behind = before, STILL
         if not goes_on:
-            self._late = ""
+            self._late = None
         elif max(self._behind) > MOTION.arrived and not self._late:
             k = self._behind.index(max(self._behind))
             way = self._before[k] - before[k]
             moves_on = way * (before[k] - self._follower[k]) > 0.0  # and was not set elsewhere at once, before
             if moves_on and (speed := abs(way) / held) > limit:
-                advice = (
-                    f"give the motion more time, or raise force_loop:{self._limit}"
-                    if held > time - FORCE.rounding
-                    else "a command lasts ages.command: stream it at shorter intervals than that"
-                )
-                self._late = (
-                    f"the commanded {self._what} moves faster than the arm follows, {self._names[k]} with "
-                    f"{speed:.3g} {self._unit}; allowed: {self._limit}, {limit:g} {self._unit}; the arm goes on and "
-                    f"is late: {advice}"
+                self._late = warning(
+                    Code.NOT_FOLLOWED,
+                    "posture_late",
+                    axis=self._what,
+                    joint=self._names[k],
+                    speed=speed,
+                    unit=self._unit,
+                    limit=self._limit,
+                    allowed=limit,
+                    is_streamed=float(held > time - FORCE.rounding),
                 )
         self._interval, self._is_goal, self._rested, self._held = time, not goes_on, 0.0, 0.0
 
@@ -118,10 +123,11 @@ class ShortfallWatch:
     def restart(self) -> None:
         """No posture is commanded, or the arm does something else."""
         self._follower: list[float] = []
-        self._lasts, self._report = 0.0, ""  # s
+        self._lasts = 0.0  # s
+        self._report: Event | None = None
 
-    def step(self, posture: Sequence[float], q: Sequence[float], gain: float, limit: float, dt: float) -> str:
-        """Why the posture is not reached, '' where it is.
+    def step(self, posture: Sequence[float], q: Sequence[float], gain: float, limit: float, dt: float) -> Event | None:
+        """Why the posture is not reached, None where it is.
 
         Parameters
         ----------
@@ -143,13 +149,16 @@ class ShortfallWatch:
         k = max(range(len(short)), key=lambda joint: short[joint] - allowed[joint])
         self._lasts = self._lasts + dt if short[k] > allowed[k] else 0.0
         if not self._lasts:
-            self._report = ""
+            self._report = None
         elif self._lasts > FORCE.short_for and not self._report:
-            self._report = (
-                f"{self._names[k]} is {short[k]:.3g} rad away from the commanded posture; allowed: {allowed[k]:.3g} "
-                f"rad, {FORCE.behind_angle:g} rad at rest; raise force_loop:posture_gain, {gain:g} 1/s, if it is too "
-                "low for this "
-                "motion, or give the motion more time; or something is in the way: free the arm"
+            self._report = warning(
+                Code.NOT_REACHED,
+                "posture_missed",
+                joint=self._names[k],
+                way=short[k],
+                allowed=allowed[k],
+                allowed_at_rest=FORCE.behind_angle,
+                gain=gain,
             )
         return self._report
 

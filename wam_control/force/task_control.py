@@ -11,7 +11,7 @@ from wam_control.force.arm_push import ArmPush
 from wam_control.force.contact_position import ForceCase, ForcePoint, position_is_certain, slid_position
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
-from wam_control.force.force_hold import ForceHold, ForceReaction, Found, by_seriousness
+from wam_control.force.force_hold import ForceHold, by_seriousness
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.given_way import GivenWay
 from wam_control.force.guard import Supervision
@@ -25,6 +25,7 @@ from wam_control.force.task_frame import AxisState, TaskFrame, force_speed
 from wam_control.force.thresholds import FORCE
 from wam_control.force.torque_watch import TorqueWatch
 from wam_description.arm import Arm
+from wam_description.event import Code, Event, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 
@@ -40,7 +41,7 @@ class TaskOutput(NamedTuple):
     velocity, effort : of the joints (n,), rad/s and N m.
     measured, error : sum of the forces along the force axes, and of their errors, in the frame of the task (3,), N.
     rows : of each axis, as the topic task_axes has them.
-    reactions : what is done instead of what is commanded, and why, the most serious first.
+    reactions : what is done instead of what is commanded, the most serious first.
     has_changed : whether the law has changed since the period before.
     desired : N, of all its forces, where the task is nothing but forces of points, and one touches; else 0.
     pressed : the commanded force, where that is at one known position.
@@ -51,7 +52,7 @@ class TaskOutput(NamedTuple):
     measured: Array
     error: Array
     rows: tuple[AxisRow, ...]
-    reactions: dict[ForceReaction, str]
+    reactions: dict[Code, Event]
     has_changed: bool
     desired: float
     pressed: PressedForce | None
@@ -120,7 +121,7 @@ class TaskControl:
         posture: Sequence[float],
         rate: Sequence[float] | None,
         dt: float,
-        unknown: tuple[Array, str],
+        unknown: tuple[Array, float],
         push: ArmPush,
     ) -> TaskOutput:
         """One outer period.
@@ -133,7 +134,7 @@ class TaskControl:
         contact : estimated contact.
         posture, rate : joint angles to hold in what the task leaves (n,), rad, and their velocity, rad/s.
         dt : outer period, s.
-        unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
+        unknown : torques at rest before that no touched surface gives (n,), N m, and the mass, kg, that explains them.
         push : what pushes an arm that holds, as far as it is allowed without a task.
         """
         own = self._parameters
@@ -148,7 +149,7 @@ class TaskControl:
         self._find_sides(states, forces)
         self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
         found = (
-            [(ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")]
+            [warning(Code.TASK_REFUSED, "task", reason=self._refusal)]
             if self._refusal
             else [
                 *self._watch(states, forces, torques[0], push.torque_sd, moved, dt, unknown),
@@ -156,7 +157,7 @@ class TaskControl:
             ]
         )
         reactions = by_seriousness(found)
-        holds = any(reaction.holds for reaction in reactions)
+        holds = any(code.holds for code in reactions)
         if holds != self._held.is_holding:
             has_changed = True
             if holds:
@@ -183,7 +184,8 @@ class TaskControl:
             back = [self._back(*one, self._torque_error(one[0], push.torque_sd), factor, dt) for one in pairs]
             inertia = self._force_axes.moved_inertia(q)
             velocity, is_yielding = self._held.step(q, [one for one in back if one], push, inertia, own)
-            reactions = {reaction: reason + self._held.push for reaction, reason in reactions.items()}
+            if pushed := self._held.pushed:
+                reactions = {code: event.with_values(pushed=pushed) for code, event in reactions.items()}
             fed = np.zeros(len(q)) if is_yielding else None
         effort = [0.0] * len(q) if fed is None else self._feed_forward.step(fed, velocity, own, dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
@@ -245,7 +247,7 @@ class TaskControl:
     @property
     def is_pushed(self) -> bool:
         """Whether something has pushed the arm since it holds."""
-        return bool(self._held.push)
+        return self._held.pushed > 0.0
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""
@@ -287,10 +289,10 @@ class TaskControl:
         external_sd: Array,
         moved: Array,
         dt: float,
-        unknown: tuple[Array, str],
-    ) -> list[Found]:
+        unknown: tuple[Array, float],
+    ) -> list[Event]:
         """What the force axes report; `moved` by the joints since the period before (n,), rad."""
-        found: list[Found] = []
+        found: list[Event] = []
         is_led = any(state.axis.kind is not AxisKind.FORCE for state in states)
         for state, force, hold, torque in zip(states, forces, self._holds, self._torques, strict=True):
             desired = _desired(state)
@@ -311,11 +313,12 @@ class TaskControl:
 
     def _watch_motions(
         self, states: Sequence[AxisState], anchors: Sequence[float], moved: Array, dt: float
-    ) -> list[Found]:
+    ) -> list[Event]:
         """What the positions and velocities report; an arm that holds its position is not to follow them."""
         if self._held.is_holding:
             return []
-        own, found = self._parameters, []
+        own = self._parameters
+        found: list[Event] = []
         for state, anchor, motion, path in zip(states, anchors, self._motions, self._paths, strict=True):
             axis = state.axis
             if axis.kind not in (AxisKind.VELOCITY, AxisKind.POSITION):
@@ -328,7 +331,7 @@ class TaskControl:
                 at, (fastest, _) = state.coordinate, own.task.fastest(axis.joint >= 0)
                 law = own.task.largest_rate, fastest
                 if late := path.step([anchor], axis.rate != 0.0, [at], fastest, dt):
-                    found.append((ForceReaction.NOT_FOLLOWED, late))
+                    found.append(late)
                 found.append(motion.position(anchor, axis.rate, at, lever, law, self.share, own, dt))
         return found
 
@@ -338,7 +341,7 @@ class TaskControl:
         known = [axis.cover for axis in task.axes if axis.is_sensed and axis.cover]
         conflict = ""
         if contact.cover and contact.cover not in known and contact.probability >= own.link_probability_limit:
-            conflict = f"{contact.cover} is touched, and no force of the task acts on it"
+            conflict = contact.cover
         is_single = contact.is_single or len(set(known)) > 1  # a task may press at two positions
         limit = own.position_uncertainty_limit
         if (
@@ -409,7 +412,7 @@ class TaskControl:
         return posture
 
     def _case(
-        self, state: AxisState, axis: ForceAxis, point: ForcePoint, torque_sd: Array, unknown: tuple[Array, str]
+        self, state: AxisState, axis: ForceAxis, point: ForcePoint, torque_sd: Array, unknown: tuple[Array, float]
     ) -> ForceCase:
         """The force of an axis, with what is known of the torques now."""
         desired = _desired(state)
@@ -420,7 +423,7 @@ class TaskControl:
             signal=axis.signal(desired, torque_sd.tolist()) if self._parameters.is_estimated else math.inf,
             torque_error=self._torque_error(state, torque_sd),
             unknown=-float(axis.sense @ unknown[0]),
-            meaning=unknown[1],
+            payload=unknown[1],
         )
 
     def _torque_error(self, state: AxisState, torque_sd: Array) -> float:

@@ -2,10 +2,9 @@
 
 import math
 
-from wam_control.force.force_hold import UNLOAD, ForceReaction, Found
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
-from wam_description.number_text import brief
+from wam_description.event import OBEYED, Code, Event, warning
 
 
 class TorqueWatch:
@@ -19,7 +18,8 @@ class TorqueWatch:
     """
 
     def __init__(self, name: str) -> None:
-        self._name, self._report = name, ""
+        self._name = name
+        self._report: Event | None = None
         self._off = self._side = self._within = self._uncertain = 0.0  # s
 
     def step(
@@ -30,9 +30,9 @@ class TorqueWatch:
         parameters: ForceLoopParameters,
         dt: float,
         unknown: float = 0.0,
-        meaning: str = "",
-    ) -> Found:
-        """What to do instead of what is commanded, and why.
+        payload: float = 0.0,
+    ) -> Event:
+        """What to do instead of what is commanded.
 
         Parameters
         ----------
@@ -40,29 +40,39 @@ class TorqueWatch:
         sd : standard deviation of the measured torque, N m.
         parameters : of the force loop.
         dt : outer period, s.
-        unknown, meaning : torque at rest before that no touched surface gives, N m, and what it means.
+        unknown, payload : torque at rest before that no touched surface gives, N m, and the mass, kg, that explains it.
         """
         allowed = max(FORCE.tolerance * abs(desired), FORCE.certain * sd)
         if abs(unknown) > allowed:
-            return ForceReaction.NOT_SENSED, (
-                f"{self._name}: the arm at rest already measures {brief(unknown)} N m, {meaning}; allowed: "
-                f"{brief(allowed)} N m for {brief(desired)} N m; {UNLOAD}"
+            return warning(
+                Code.NOT_SENSED,
+                "loaded_torque",
+                axis=self._name,
+                torque=unknown,
+                payload=payload,
+                allowed=allowed,
+                desired=desired,
             )
         lasting = parameters.limits.settling_time
         if missed := self._not_reached(desired, measured, allowed, lasting, dt):
-            return ForceReaction.NOT_REACHED, missed
+            return missed
         known = parameters.sensing.reported_fraction
         self._uncertain = self._uncertain + dt if sd > known * abs(desired) > 0.0 else 0.0
         if self._uncertain > FORCE.left_after * lasting:
-            return ForceReaction.UNCERTAIN, (
-                f"{self._name}: the torque is known to +-{brief(sd)} N m, {sd / abs(desired):.0%} of the commanded "
-                f"{brief(desired)} N m; sensing.reported_fraction, {known:.0%}, is to be known: use joint sensors, or "
-                "command more torque"
+            part = sd / abs(desired)
+            return warning(
+                Code.UNCERTAIN,
+                "torque_uncertain",
+                axis=self._name,
+                sd=sd,
+                fraction=part,
+                desired=desired,
+                allowed=known,
             )
-        return ForceReaction.NONE, ""
+        return OBEYED
 
-    def _not_reached(self, desired: float, measured: float, allowed: float, lasting: float, dt: float) -> str:
-        """Why the torque counts as not reached, until it has been right for a while; '' where it does not.
+    def _not_reached(self, desired: float, measured: float, allowed: float, lasting: float, dt: float) -> Event | None:
+        """Why the torque counts as not reached, until it has been right for a while; None where it does not.
 
         The time counts on where another torque is commanded: one that varies would never be late.
         """
@@ -70,16 +80,20 @@ class TorqueWatch:
         if abs(error) <= allowed:
             self._within += dt
             if self._within >= FORCE.left_after * lasting:
-                self._off, self._side, self._report = 0.0, 0.0, ""
+                self._off, self._side, self._report = 0.0, 0.0, None
             return self._report
         self._within = 0.0
         self._off += dt
         self._side += math.copysign(dt, error)
         if self._off > lasting:
-            swings = "" if abs(self._side) > FORCE.one_sided * self._off else ", to both sides"
-            self._report = (
-                f"{self._name}: {brief(measured)} N m are measured and {brief(desired)} N m commanded; the "
-                f"torque has been off by more than {brief(allowed)} N m{swings} for {brief(self._off)} s: command what "
-                "something that is touched can take, or another posture, or, where it swings, lower torque_gain"
+            self._report = warning(
+                Code.NOT_REACHED,
+                "torque_off",
+                axis=self._name,
+                measured=measured,
+                desired=desired,
+                allowed=allowed,
+                swings=float(abs(self._side) <= FORCE.one_sided * self._off),
+                time=self._off,
             )
         return self._report

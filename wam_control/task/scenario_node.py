@@ -7,8 +7,10 @@ from wam_control.force.task import table_of
 from wam_control.task.scenario import Scenario, ScenarioOutput, ScenarioParameters, load, script_file
 from wam_control.task.scenario_settings import Setting
 from wam_description.arm import Shared
-from wam_description.signals import BASE, Level, NodeStatus, State, Wrench
-from wam_description.status import DONE, ENABLED
+from wam_description.event import Code, Event, Level
+from wam_description.event_text import sentences
+from wam_description.signals import BASE, NodeStatus, State, Wrench
+from wam_description.status import ENABLED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
 
@@ -104,7 +106,8 @@ class ScenarioNode:
     def _end(self, failure: str) -> Outputs:
         self.done, self.failure = True, self.failure or failure
         level = Level.ERROR if self.failure else Level.OK
-        return {"status": NodeStatus(level, self.failure or DONE, stamp=self._stamp)}
+        events = () if self.failure else (Event(Code.DONE),)
+        return {"status": NodeStatus(level, self.failure or sentences(events), stamp=self._stamp, events=events)}
 
 
 def _plain(setting: Setting) -> Any:

@@ -4,7 +4,8 @@ from typing import Any, Final
 
 from wam_control.velocity.transform import Transform, TransformParameters
 from wam_description.arm import Shared
-from wam_description.signals import Level, NodeStatus, State
+from wam_description.event import Level
+from wam_description.signals import NodeStatus, State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 

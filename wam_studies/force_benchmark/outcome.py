@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_description.event import CAUSE, OBEYED, Event
+from wam_description.event_text import sentence
 from wam_studies.force_benchmark.tasks import RANGES, Task
 
 Array = NDArray[np.float64]
@@ -50,7 +52,7 @@ class TaskTrace(NamedTuple):
     period : s.
     travel : largest motion of the touched point along the force, m.
     impact : largest force of the first touch by (3.1), N; 0 where nothing was touched.
-    reason : why the loop or the driver does not do the task, at the end; '' if it does.
+    event : why the loop or the driver does not do the task, at the end; OBEYED if it does.
     is_stopped : whether the loop holds the arm instead, or the driver is in fault, at the end.
     is_fault : whether the driver is in fault.
     predicted_cycle : peak to peak of the limit cycle that the guard reports, N.
@@ -61,7 +63,7 @@ class TaskTrace(NamedTuple):
     period: float
     travel: float
     impact: float
-    reason: str
+    event: Event
     is_stopped: bool
     is_fault: bool
     predicted_cycle: float
@@ -80,6 +82,7 @@ class TaskResult(NamedTuple):
     cycle_is_reported : whether the loop reports a reason, or the guard a cycle of this size.
     gain : force gain in use, m/s/N.
     reason : of a refusal, an end or a warning.
+    cause : its code, and the cause where the code has several; '' without a reason.
     is_over : whether the true force was above the largest allowed, or at the end above that of the last command.
     """
 
@@ -92,6 +95,7 @@ class TaskResult(NamedTuple):
     cycle_is_reported: bool
     gain: float
     reason: str
+    cause: str
     is_over: bool
 
     @property
@@ -103,7 +107,7 @@ class TaskResult(NamedTuple):
 def refused(task: Task, reason: str) -> TaskResult:
     """The result of a task that is refused before the start."""
     limit = OUTCOME.overshoot * task.force
-    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason, is_over=False)
+    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason, "parameters", is_over=False)
 
 
 def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
@@ -118,9 +122,10 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
         peak=peak,
         limit=limit,
         cycle=cycle,
-        cycle_is_reported=bool(trace.reason) or trace.predicted_cycle >= OUTCOME.predicted * cycle > 0.0,
+        cycle_is_reported=trace.event != OBEYED or trace.predicted_cycle >= OUTCOME.predicted * cycle > 0.0,
         gain=trace.gain,
-        reason=trace.reason,
+        reason=sentence(trace.event),
+        cause=_cause(trace.event),
         is_over=peak > limit or mean > OUTCOME.overshoot * task.force + trace.impact,
     )
 
@@ -141,7 +146,12 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
     is_declined = task.before and peak <= OUTCOME.overshoot * task.before and is_below
     if trace.is_stopped and not trace.is_fault and (peak <= task.force or is_declined):
         return TaskEnd.GIVEN_UP
-    return TaskEnd.ENDED if trace.reason else TaskEnd.SILENT
+    return TaskEnd.ENDED if trace.event != OBEYED else TaskEnd.SILENT
+
+
+def _cause(event: Event) -> str:
+    """Code of an event, and its cause where the code has several; '' where nothing has happened."""
+    return f"{event.code} {event.values.get(CAUSE, '')}".strip() if event != OBEYED else ""
 
 
 def _cycle(task: Task, trace: TaskTrace) -> float:

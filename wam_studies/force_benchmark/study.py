@@ -1,6 +1,5 @@
 """Random forces on random surfaces: outcomes by class of task, true force against the commanded one."""
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,6 @@ from wam_studies.harness import Study, option
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, share
 
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
-NUMBER = re.compile(r"(?:(?<!\+)[-+])?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -152,10 +150,10 @@ def _counts(title: str, name: str, trials: Sequence[ForceTrial]) -> list[str]:
 
 
 def _reasons(trials: Sequence[ForceTrial]) -> ScoreTable:
-    """How often each reason was given, without its numbers."""
-    texts = [NUMBER.sub("#", trial.result.reason.split(";")[0])[:150] for trial in trials if trial.result.reason]
+    """How often each reason was given."""
+    texts = [trial.result.cause for trial in trials if trial.result.cause]
     rows = [[text, str(number)] for text, number in Counter(texts).most_common()]
-    return ScoreTable("Reasons", ("reason", "tasks"), rows, "As reported, without their numbers.")
+    return ScoreTable("Reasons", ("reason", "tasks"), rows, "Code and cause, as reported.")
 
 
 def _kinds(trial: ForceTrial) -> list[str]:

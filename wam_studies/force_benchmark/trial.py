@@ -12,6 +12,7 @@ from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_description.event import Code, Event, Level
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
@@ -28,7 +29,7 @@ STOPPED = 1.0  # s, after which a task that is held or in fault is over
 class _Standing(NamedTuple):
     """What driver and loop report in a period: as in `TaskTrace`."""
 
-    reason: str
+    event: Event
     is_stopped: bool
     is_fault: bool
     predicted_cycle: float
@@ -144,7 +145,7 @@ class TaskWatch:
                 period=period,
                 travel=float(way),
                 impact=impact,
-                reason=standing.reason,
+                event=standing.event,
                 is_stopped=standing.is_stopped,
                 is_fault=standing.is_fault,
                 predicted_cycle=standing.predicted_cycle,
@@ -157,11 +158,21 @@ class TaskWatch:
     def _standing(self) -> _Standing:
         fault, node = self._run.driver.safety.fault, self._node
         return _Standing(
-            fault or node.refusals.get("force_command", "") or node.refusals.get("task_command", "") or node.reason,
-            bool(fault) or node.force_reaction.holds,
+            self._event,
+            bool(fault) or node.reaction.code.holds,
             bool(fault),
             float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
         )
+
+    @property
+    def _event(self) -> Event:
+        """Why the driver or the force loop does not do what is commanded."""
+        if fault := self._run.driver.safety.fault:
+            return Event(Code.FAULT, Level.ERROR, {"reason": fault})
+        refusals = self._node.refusals
+        found = (refusals[topic] for topic in ("force_command", "task_command") if topic in refusals)
+        event: Event = next(found, self._node.reaction)
+        return event
 
     def _along(self, q: list[float]) -> Array:
         """Position of each touched point along its force, m."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from wam_bag.bag import BagError
 from wam_bag.cut import CUT
+from wam_description.event import Code
 from wam_description.parameters import ParameterError
-from wam_description.status import DONE
 from wam_studies.thesis.definition import Experiment, Run
 from wam_studies.thesis.recording import Recording, recording
 from wam_studies.thesis.rows import Comparison, Result, plain
@@ -45,13 +45,13 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
 def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> None:
     """Refuse a run that was interrupted, unless the driver is expected to stop it."""
     names = [str(step["name"]) for step in run.steps]
-    if (recorded.outcome == DONE and len(recorded.steps) >= len(names)) or (run.stops and recorded.fault):
+    if (recorded.outcome == Code.DONE and len(recorded.steps) >= len(names)) or (run.stops and recorded.fault):
         return
     started = [step.name for step in recorded.steps]
     if recorded.outcome in names:  # the last status of the scenario is the step that was running
         started.append(recorded.outcome)
     step = started[-1] if started else names[0]
-    because = f" ({recorded.fault or recorded.outcome})" if recorded.outcome not in (*names, DONE, "") else ""
+    because = f" ({recorded.fault or recorded.outcome})" if recorded.outcome not in (*names, Code.DONE, "") else ""
     finished = max(len(started) - 1, 0)
     raise BagError(
         f"{recorded.bag.path}: run '{run.name}' ended in step '{step}', {finished} of {len(names)} steps "
