@@ -463,16 +463,12 @@ def refusals() -> str:
     return "```\n" + "\n".join(lines) + "\n```\n"
 
 
-def measure_elbow() -> None:
-    """Press with a nearly straight elbow and keep the table."""
-    table = elbow_table(elbow(Configuration.load(CONFIGURATION)))
-    (ROOT / "docs" / "elbow.txt").write_text(table, encoding="utf-8")
-
-
-def measure_force_tasks() -> None:
-    """Do the force tasks in simulation and keep their table."""
-    table = usual_tasks.table(list(usual_tasks.perform_all(Configuration.load(CONFIGURATION))))
-    (ROOT / "docs" / "force-tasks.txt").write_text(table + "\n", encoding="utf-8")
+def measure_forces() -> None:
+    """Press with a nearly straight elbow, do the force tasks, and keep their tables."""
+    configuration, docs = Configuration.load(CONFIGURATION), ROOT / "docs"
+    (docs / "elbow.txt").write_text(elbow_table(elbow(configuration)), encoding="utf-8")
+    done = usual_tasks.table(list(usual_tasks.perform_all(configuration)))
+    (docs / "force-tasks.txt").write_text(done + "\n", encoding="utf-8")
 
 
 def filled(text: str) -> str:
@@ -487,34 +483,16 @@ def pages() -> dict[Path, str]:
     return {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
 
 
-def draw_demonstration() -> None:
-    """Run the demonstration in lockstep and keep its pictures and its report."""
-    demonstrate(CONFIGURATION, "demo", is_moving=True)
-
-
-def draw_barrett() -> None:
-    """The same of the production WAM."""
-    demonstrate(ROOT / "config" / "barrett-wam7.yaml", "barrett-demo")
-
-
-def demonstrate(file: Path, kept: str, is_moving: bool = False) -> None:
-    """Run the demonstration of a configuration in lockstep and keep its report and picture by a name."""
+def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
+    """Run the demonstration of a configuration in lockstep and keep its report and pictures by a name."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
-        configuration = Configuration.load(file).with_values({"recorder:directory": folder})
+        configuration = Configuration.load(ROOT / "config" / name).with_values({"recorder:directory": folder})
         file = Path(folder) / "wam.yaml"
         file.write_text(configuration.text, encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "wam_cli.main",
-            "demo",
-            "--no-live",
-            "--real-time-factor",
-            "0",
-            "--name",
-            "demo",
-        ]
-        done = subprocess.run([*command, "--config", str(file)], stdout=subprocess.PIPE, text=True, check=False)
+        words = ["demo", "--no-live", "--real-time-factor", "0", "--name", "demo", "--config", str(file)]
+        done = subprocess.run(
+            [sys.executable, "-m", "wam_cli.main", *words], stdout=subprocess.PIPE, text=True, check=False
+        )
         if done.returncode:
             raise SystemExit(f"the demonstration failed, see above; docs/{kept}.* are unchanged")
         report = done.stdout[done.stdout.index("Demonstration of") :].partition("\nbag ")[0].rstrip()
@@ -544,8 +522,8 @@ def draw_push() -> None:
 
 DRAWN = {
     "push": draw_push,
-    "demonstration": draw_demonstration,
-    "barrett": draw_barrett,
+    "demonstration": partial(demonstrate, "wam.yaml", "demo", is_moving=True),
+    "barrett": partial(demonstrate, "barrett-wam7.yaml", "barrett-demo"),
     "tasks": draw_tasks,
     "examples": draw_and_run_examples,
 }
@@ -561,8 +539,7 @@ def main() -> None:
         DRAWN[given.only]()
         return
     if not given.pages:
-        measure_elbow()
-        measure_force_tasks()
+        measure_forces()
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))

@@ -27,7 +27,7 @@ from wam_cli.options import batch_of
 from wam_sim import batch, pieces
 from wam_sim.pieces import FinishedPieces
 from wam_sim.progress import Progress
-from wam_studies.stability.stability_map import stability_map
+from wam_theory.stability_map import largest_stable_steps
 
 ROOT = Path(__file__).resolve().parents[2]
 GAMMA, ZETA = np.linspace(0.9, 2.4, 300), np.geomspace(0.05, 1.0, 20)
@@ -48,8 +48,12 @@ def run(inputs: Sequence[float], file: Path | None = None) -> list[float]:
         return batch.results(root, inputs, executor, file)
 
 
+def row(zeta: float) -> np.ndarray:
+    return largest_stable_steps(GAMMA, zeta)
+
+
 def steps(executor: Executor) -> np.ndarray:
-    return stability_map(GAMMA, ZETA, 1.0, 1.0, executor).steps
+    return np.array(batch.results(row, ZETA.tolist(), executor))
 
 
 @pytest.mark.slow

@@ -15,7 +15,6 @@ from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, table
 from wam_studies.figures.series import Series
-from wam_studies.stability.stability_map import stability_map, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
 # the testbed at its joint, SI: 64 oz-in-s^2 of link; 8.33 N m/rad at the motor, N = 14
@@ -169,15 +168,3 @@ def test_command_draws_what_is_named_and_refuses_what_is_not(
         main(["evaluate", "figures", *options, "5.4"])
     assert ended.value.code == 1
     assert "no figure 5.4; choose from 1.1, 2.1.1, 2.1.2, 3.1" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_the_map_is_written_as_a_table(tmp_path: Path) -> None:
-    with processes(1) as executor:
-        found = stability_map(np.linspace(0.9, 2.0, 12), np.array([0.25]), 1.0, 1.0, executor)
-    write_csv(found, tmp_path / "map.csv")
-    head, *rows = [line.split(",") for line in (tmp_path / "map.csv").read_text().splitlines()]
-    assert head[-1] == "largest stable F_error/F_dynamic"
-    steps = {round(float(row[0]), 9): float(row[-1]) for row in rows}
-    assert [steps[1.1], steps[1.5], steps[2.0]] == pytest.approx([25.3, 3.45, 1.17], rel=5e-3)
-    assert steps[0.9] == math.inf

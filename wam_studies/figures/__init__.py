@@ -5,7 +5,8 @@ transmissions             numbers of figure 1.1 and its table: cables, shaft and
 open_loop                 numbers of figure 2.1.1: force without feedback over the workspace, feed-forward
 inner_loops               numbers of figure 2.1.2: loops on torque, and on velocity or position
 links                     numbers of figure 3.1
-backdrivability           numbers of figure 3.2.6; drawing in backdrivability_drawing
+backdrivability           figure 3.2.6
+conditions                loads, steps, poses and frictions of every figure
 reducer                   numbers of figures 4.3 to 4.7
 bandwidth                 numbers of figure 4.9
 responses                 numbers of figures 5.3, 5.5, 5.9, 5.10, 5.11

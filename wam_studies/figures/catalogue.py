@@ -9,7 +9,6 @@ from wam_analysis.table import markdown
 from wam_sim import batch
 from wam_studies.figures import (
     backdrivability,
-    backdrivability_drawing,
     bandwidth,
     cables,
     friction_claims,
@@ -101,7 +100,7 @@ FIGURES: dict[str, ThesisFigure] = {
     "3.2.6": ThesisFigure(
         "Backdriven inertia and friction with 2 kg over the workspace.",
         backdrivability.backdrivability,
-        backdrivability_drawing.draw,
+        backdrivability.draw,
         _no_plant,
     ),
     "4.5": ThesisFigure(

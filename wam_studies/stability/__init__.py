@@ -2,5 +2,4 @@
 
 guard_validation   the stability guard validated by Monte Carlo simulation (`wam evaluate guard`)
 map_picture        figure 5.8 with a loop of your own on it
-stability_map      the stability map of figure 5.8, computed in parallel
 """
