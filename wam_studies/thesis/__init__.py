@@ -6,6 +6,7 @@ or `PACKAGE.MODULE:FUNCTION` of any other, from recordings to a result.
 definition      an experiment as data: runs, values, steps, sample
 evaluation      from the bags of an experiment to its result
 recording       a bag as an experiment reads it: signals, parameters, steps
+bounds          what the evaluations allow
 rows            a result: predicted and measured quantities, curves, tables
 figure, page    the result as a figure, and on a page of the documentation
 claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
