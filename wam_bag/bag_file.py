@@ -13,6 +13,7 @@ from mcap.records import Channel
 
 from wam_bag import safe_yaml
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError
+from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import MAGIC, Bytes
 from wam_bag.message_search import NEVER, Found, MessageBatch, together
@@ -20,8 +21,6 @@ from wam_bag.message_text import Fields, definitions
 
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
 COMPRESSED = ".mcap.zstd"
-LARGEST_METADATA = 2**26  # bytes of metadata.yaml
-LARGEST_BOMB, LARGEST_RATIO = 2**29, 1000  # bytes, and times the file, that are decompressed; recordings have 5 to 100
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
@@ -59,8 +58,8 @@ def _listed_files(path: Path) -> list[str]:
     if not file.is_file():
         return []
     try:
-        if (size := file.stat().st_size) > LARGEST_METADATA:
-            raise ValueError(f"it has {size} bytes; at most {LARGEST_METADATA} are read")
+        if (size := file.stat().st_size) > READING_LIMITS.metadata:
+            raise ValueError(f"it has {size} bytes; at most {READING_LIMITS.metadata} are read")
         text = file.read_text(encoding="utf-8")
         part = _FILE_NAMES.search(text)  # the only lines that are needed of a long file
         listed = [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]]
@@ -199,8 +198,10 @@ def _bounded(mcap: McapFile, batches: Iterator[MessageBatch]) -> Iterator[Messag
     size = 0
     for batch in batches:
         size += len(batch.buffer)
-        if size > LARGEST_BOMB and size > LARGEST_RATIO * mcap.size:
-            raise TooLargeError(f"its {mcap.size} bytes decompress to more than {LARGEST_RATIO} times as many")
+        if size > READING_LIMITS.expanded and size > READING_LIMITS.expansion * mcap.size:
+            raise TooLargeError(
+                f"its {mcap.size} bytes decompress to more than {READING_LIMITS.expansion} times as many"
+            )
         yield batch
 
 

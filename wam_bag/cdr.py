@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wam_bag.definitions import definition, schema
 from wam_bag.errors import Damage
+from wam_bag.limits import READING_LIMITS
 from wam_bag.message_text import PRIMITIVES, Fields, definitions
 
 ENCAPSULATION: Final = 4
@@ -30,7 +31,6 @@ _LETTERS = {
 }  # fmt: skip
 
 _STAMPS = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-_LONGEST_CACHE: Final = 256  # counts of a layout that are kept; a longer message is walked through each time
 
 _AFTER_STAMP: Final = ENCAPSULATION + 8
 
@@ -439,7 +439,7 @@ class ExactLength:
             layout = Layout(self._name, self._definitions, data)
         except Damage:
             return len(data)
-        if len(layout.counts_at) > _LONGEST_CACHE:
+        if len(layout.counts_at) > READING_LIMITS.counts_kept:
             self._counts = None
         else:
             self._keep(layout)

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import yaml
 
 from wam_bag import safe_yaml
+from wam_bag.limits import READING_LIMITS
 
 REPAIRED: Final = "repaired"  # metadata record of a repair; an entry of JSON for each repair of a file
 PARAMETERS: Final = "parameters.yaml"  # attachment of the recorder
@@ -17,8 +18,6 @@ RECORDING: Final = "recording"  # metadata record of the recorder
 LOST_AT_END: Final = "lost_at_end"  # last word of an entry of it
 UNFINISHED: Final = "no final count"  # entry of it, the names of nodes
 CUT: Final = "cut"  # metadata record of a part of a bag
-_LONGEST_NUMBER: Final = 20  # digits of a count
-_NAMED: Final = 3  # topics that a sentence lists
 _TIME_OF_DAY: Final = 10**18  # ns; smaller log times are stamps of lockstep, which start near 0
 
 Metadata = Mapping[str, Mapping[str, str]]
@@ -194,8 +193,8 @@ def _seconds(stamp: int, first: int) -> str:
 
 def _counted(messages: Mapping[str, int]) -> str:
     most = sorted(messages.items(), key=lambda item: (-item[1], item[0]))
-    listed = [f"{count} of {topic}" for topic, count in most[:_NAMED]]
-    if others := most[_NAMED:]:
+    listed = [f"{count} of {topic}" for topic, count in most[: READING_LIMITS.named]]
+    if others := most[READING_LIMITS.named :]:
         listed.append(f"{sum(count for _, count in others)} of {len(others)} other topics")
     return f"{sum(messages.values())} messages ({', '.join(listed)})"
 
@@ -211,7 +210,7 @@ def _parsed(text: str) -> FileLosses | None:
 
 
 def _number(text: str) -> int:
-    return int(text) if text.isdecimal() and len(text) < _LONGEST_NUMBER else 0
+    return int(text) if text.isdecimal() and len(text) < READING_LIMITS.digits else 0
 
 
 def _is_one_of_several(path: Path, metadata: Metadata) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wam_bag.cdr import ENCAPSULATION, Decoder, Definitions, Layout
 from wam_bag.errors import BagError, Damage
+from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import Bytes
 from wam_bag.message_search import Offsets, at
 from wam_bag.message_text import PRIMITIVES
@@ -19,9 +20,6 @@ Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 
 BEFORE: Final = 8 - ENCAPSULATION  # bytes before a message that align its numbers to multiples of eight
-MOST_LAYOUTS: Final = 64  # that are kept; a topic with more has them found message by message
-LEAST_GROUP: Final = 32  # objects that are worth making together
-MOST_TRIALS: Final = 4  # layouts tried among messages of one length before these are decoded one by one
 
 
 class Group(NamedTuple):
@@ -132,7 +130,7 @@ class Grouping:
                 if known is None:
                     first = int(starts[rows[0]])
                     known = Known.of(Layout(self._kind, self._definitions, buffer[first : first + size].tobytes()))
-                    if len(self._known) < MOST_LAYOUTS:
+                    if len(self._known) < READING_LIMITS.layouts:
                         self._known.append(known)
                 fits = known.fits(words)
                 if fits is None:
@@ -178,24 +176,24 @@ def decoded(data: list[bytes], decoder: Decoder) -> list[Any]:
     made: list[Any] = [None] * len(data)
     single = set(range(len(data)))
     for size, number in Counter(map(len, data)).items():
-        if number < LEAST_GROUP or size < ENCAPSULATION:
+        if number < READING_LIMITS.group or size < ENCAPSULATION:
             continue
         rows = np.array([i for i, item in enumerate(data) if len(item) == size])
         padded = np.zeros((number, 8 * _words(size)), np.uint8)
         joined = np.frombuffer(b"".join([data[i] for i in rows]), np.uint8)
         padded[:, BEFORE : BEFORE + size] = joined.reshape(number, size)
         words = padded.view(np.uint64)
-        for _ in range(MOST_TRIALS):
+        for _ in range(READING_LIMITS.trials):
             layout = Layout(decoder.kind, decoder.definitions, data[rows[0]])
             fits = Known.of(layout).fits(words)
             chosen = slice(None) if fits is None else fits
             group = Group(rows[chosen], layout, words[chosen])
-            if len(group.rows) < LEAST_GROUP:
+            if len(group.rows) < READING_LIMITS.group:
                 break
             for i, message in zip(group.rows.tolist(), group.objects(decoder, decoder.kind), strict=True):
                 made[i] = message
             single.difference_update(group.rows.tolist())
-            if fits is None or len(rows) - len(group.rows) < LEAST_GROUP:
+            if fits is None or len(rows) - len(group.rows) < READING_LIMITS.group:
                 break
             rows, words = rows[~fits], words[~fits]
     for i in sorted(single):

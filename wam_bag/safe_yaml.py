@@ -1,11 +1,11 @@
 """YAML of bags: read with bounded effort, written without anchors."""
 
-from typing import Any, Final
+from typing import Any
 
 import yaml
 
-DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
-LONGEST: Final = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
+from wam_bag.limits import READING_LIMITS
+
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, if it was built
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
@@ -21,16 +21,16 @@ def load(text: str | bytes) -> Any:
     UnicodeDecodeError
         if it is not UTF-8.
     """
-    if len(text) > LONGEST:
-        raise yaml.YAMLError(f"it has {len(text)} bytes; at most {LONGEST} are read")
+    if len(text) > READING_LIMITS.yaml_length:
+        raise yaml.YAMLError(f"it has {len(text)} bytes; at most {READING_LIMITS.yaml_length} are read")
     text = text.decode() if isinstance(text, bytes) else text
     depth = 0
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.AliasEvent):
             raise yaml.YAMLError("aliases are not read")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
-            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
+        if depth > READING_LIMITS.yaml_depth:
+            raise yaml.YAMLError(f"it is nested more than {READING_LIMITS.yaml_depth} levels deep")
     try:
         return yaml.load(text, _LOADER)
     except (ValueError, TypeError, LookupError, OverflowError, AttributeError) as error:

@@ -1,7 +1,7 @@
 """The whole stack in one Python process without ROS: simulation, replay of recordings, batches.
 
 - simulation: the nodes of a configuration around the simulated arm, in lockstep
-- bus: the topics of a simulation, and what was published on them
+- bus: topics of a simulation or a replay, and what was published on them
 - simulated_bag: a simulation recorded as the recorder node records the nodes
 - recording, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
 - recorded_commands: the commands of a bag as the stack took them; whether a bag has several runs

@@ -5,6 +5,7 @@ import os
 import random
 import struct
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,7 @@ from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents, mode_of
 from wam_bag.cut import Cut, cut
 from wam_bag.errors import BROKEN
+from wam_bag.limits import READING_LIMITS
 from wam_bag.losses import losses
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC, chunk_index, serialized
 from wam_bag.message_groups import Grouping
@@ -524,7 +526,7 @@ def test_yaml_that_is_too_long_is_refused_before_it_is_parsed(tmp_path: Path) ->
     for text in ("!!bool x", "!!timestamp x", "2001-99-99", '!!int ""'):
         with pytest.raises(yaml.YAMLError, match="does not fit its tag, or is no date"):
             safe_yaml.load(text)
-    long = b"- 1\n" * (safe_yaml.LONGEST // 4 + 1)
+    long = b"- 1\n" * (READING_LIMITS.yaml_length // 4 + 1)
     with pytest.raises(yaml.YAMLError, match="bytes; at most"):
         safe_yaml.load(long)
     assert mode_of({}, long) == "unknown"
@@ -594,7 +596,7 @@ def test_a_file_that_decompresses_to_a_thousand_times_its_size_is_refused(
     path = hostile(tmp_path / "bag.mcap", "uint8[] z", *[message] * 4)
     assert path.stat().st_size < 10_000
     assert len(read(path).topics["/a"].log_time_ns) == 4, "so little may be that small"
-    monkeypatch.setattr(bag_file, "LARGEST_BOMB", 2**24)
+    monkeypatch.setattr(bag_file, "READING_LIMITS", replace(READING_LIMITS, expanded=2**24))
     with pytest.raises(BagError, match="bytes decompress to more than 1000 times as many"):
         read(path)
 
