@@ -533,7 +533,7 @@ def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> 
     begin += ["--results", str(tmp_path / "kept.jsonl")]
     with subprocess.Popen(begin, stderr=subprocess.PIPE, text=True, start_new_session=True) as battery:
         assert battery.stderr is not None
-        assert battery.stderr.readline().startswith("evaluate: 0 of ")
+        assert battery.stderr.readline().startswith("contact: 0 of ")
         wait((tmp_path / "kept.jsonl").exists, "a first scene")
         battery.terminate()
         assert battery.wait(LONG) == 128 + signal.SIGTERM

@@ -6,6 +6,7 @@ position estimated and with it pinned.
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from wam_description.configuration import Configuration
@@ -15,8 +16,17 @@ from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import Task, triple
 from wam_studies.force_benchmark.trial import perform
 
-DEMO = (0.0, -1.8, 0.0, 1.45)  # rad, the pose of the demonstration
-STIFFNESS, FRICTION = 4000.0, 0.3  # N/m; of the surface
+
+@dataclass(frozen=True)
+class UsualSurface:
+    """Pose of the demonstration, rad; stiffness, N/m, and friction of what is pressed."""
+
+    pose: tuple[float, ...] = (0.0, -1.8, 0.0, 1.45)
+    stiffness: float = 4000.0
+    friction: float = 0.3
+
+
+USUAL = UsualSurface()
 
 
 class ForceTaskRow(NamedTuple):
@@ -28,31 +38,31 @@ class ForceTaskRow(NamedTuple):
     pinned: TaskResult
 
 
-def rod(base: Configuration, q: Sequence[float], place: float, force: float, friction: float = FRICTION) -> Task:
+def rod(base: Configuration, q: Sequence[float], place: float, force: float, friction: float = USUAL.friction) -> Task:
     """A rod across the outer link at a position, m, pressed in the plane of the links."""
     return _task(base, q, place, force, 0.0, friction)
 
 
 def tip(base: Configuration, q: Sequence[float], force: float, lean: float) -> Task:
     """A plane at the end of the outer link, tilted by an angle, rad, from its normal."""
-    return _task(base, q, base.shared.arm.covers.length[-1], force, lean, FRICTION)
+    return _task(base, q, base.shared.arm.covers.length[-1], force, lean, USUAL.friction)
 
 
 def _task(base: Configuration, q: Sequence[float], place: float, force: float, lean: float, friction: float) -> Task:
     arm = base.shared.arm
     rotation = RigidBody(arm).cover_pose(q, arm.covers.names[-1]).rotation
     direction = triple(math.sin(lean) * rotation[:, 0] - math.cos(lean) * rotation[:, 1])
-    return Task(tuple(q), Surface(arm.covers.names[-1], place, direction, STIFFNESS, friction, bool(lean)), force)
+    return Task(tuple(q), Surface(arm.covers.names[-1], place, direction, USUAL.stiffness, friction, bool(lean)), force)
 
 
 def tasks(base: Configuration) -> Iterator[tuple[str, Task]]:
     """Every task with its name."""
     for force in (1.0, 5.0, 10.0, 20.0, 40.0):
-        yield f"rod at 0.28 m, {force:g} N", rod(base, DEMO, 0.28, force)
+        yield f"rod at 0.28 m, {force:g} N", rod(base, USUAL.pose, 0.28, force)
     for place in (0.05, 0.1, 0.2, 0.35, 0.39):
-        yield f"rod at {place:g} m, 15 N", rod(base, DEMO, place, 15.0)
+        yield f"rod at {place:g} m, 15 N", rod(base, USUAL.pose, place, 15.0)
     for friction in (0.0, 0.8):
-        yield f"rod at 0.28 m, 10 N, friction {friction:g}", rod(base, DEMO, 0.28, 10.0, friction)
+        yield f"rod at 0.28 m, 10 N, friction {friction:g}", rod(base, USUAL.pose, 0.28, 10.0, friction)
     yield "elbow at 90 deg, rod at 0.28 m, 10 N", rod(base, (0.0, -1.0, 0.0, 0.0), 0.28, 10.0)
     yield "theta2 = 0, rod at 0.28 m, 10 N", rod(base, (0.0, 0.0, 0.0, 0.6), 0.28, 10.0)
     for bend in (7.0, 33.0):

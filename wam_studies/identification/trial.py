@@ -1,5 +1,6 @@
 """One identification: the motion on a plant that differs from the model, identified against true parameters."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +22,17 @@ from wam_studies.identification.plants import EXACT, MeasuredSignals, measured_s
 
 Array = NDArray[np.float64]
 
-SPEED = 10.0  # rad/s of a motor, at which friction is compared
-POSES = 50
-SIGNALS = 1  # stream of random numbers
+
+@dataclass(frozen=True)
+class ComparedAt:
+    """Where identified and true friction and gravity are compared."""
+
+    speed: float = 10.0  # rad/s of a motor
+    poses: int = 50  # drawn, in which the gravity torque is compared
+    signals: int = 1  # stream of random numbers of the measured signals
+
+
+AT = ComparedAt()
 
 
 class IdentificationTrial(NamedTuple):
@@ -49,7 +58,7 @@ class IdentificationResult(NamedTuple):
 
     Attributes
     ----------
-    level : (2 n,), friction of each motor and direction at `SPEED` and its mean load: error per true friction.
+    level : (2 n,), friction of each motor and direction at `AT.speed` and its mean load: error per true friction.
     level_sd : (2 n,), stated standard error per true friction.
     coulomb, coulomb_sd : (2 n,), the same of Coulomb friction alone.
     before : (2 n,), error of the present model's friction.
@@ -81,7 +90,7 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     for way, direction in enumerate(DIRECTIONS):
         moves = (samples.velocities * (1.0 - 2.0 * way) > 0.0).reshape(load.shape)
         rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
-        true = truth.level(way, SPEED, load, moves)
+        true = truth.level(way, AT.speed, load, moves)
         errors["level"].append((rows @ found.values - true) / true)
         errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
         errors["before"].append((rows @ found.unknowns.present - true) / true)
@@ -124,7 +133,7 @@ def play(
             if driver.safety.fault:
                 break
     n, values = len(matrix), np.array(rows)
-    torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, SIGNALS])))
+    torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, AT.signals])))
     return motion(evenly(np.array(stamps)[arrives], values[arrives, :n], torque[arrives])), driver.safety.fault
 
 
@@ -136,12 +145,12 @@ def link_load(shared: Shared, samples: MotionSamples, found: Identification) -> 
 
 
 def friction_row(found: Identification, direction: str, load: Array) -> Array:
-    """(n, p), friction of each motor at `SPEED` and these loads, N m, per parameter."""
+    """(n, p), friction of each motor at `AT.speed` and these loads, N m, per parameter."""
     unknowns, n = found.unknowns, len(load)
     rows = np.zeros((n, len(unknowns.names)))
     rows[range(n), unknowns.places(f"motors.coulomb_{direction}")] = 1.0
     rows[range(n), unknowns.places(f"motors.load_{direction}")] = load
-    rows[range(n), unknowns.places("motors.viscous")] = SPEED
+    rows[range(n), unknowns.places("motors.viscous")] = AT.speed
     return rows
 
 
@@ -152,7 +161,7 @@ def _gravity_errors(configuration: Configuration, found: Identification) -> tupl
     identified = configuration.with_values(model_values(shared, found, "evaluation")).shared
     joints = shared.arm.joints
     random = np.random.Generator(np.random.PCG64(1))
-    poses = random.uniform(joints.lower, joints.upper, (POSES, len(joints.names)))
+    poses = random.uniform(joints.lower, joints.upper, (AT.poses, len(joints.names)))
 
     def error(body: RigidBody) -> float:
         left = [body.gravity_torque(q) - truth.gravity_torque(q) for q in poses]
