@@ -570,7 +570,7 @@ def test_list_names_every_experiment(capfd) -> None:
 
 def test_nothing_to_run_is_refused(capfd) -> None:
     assert run_command() == 1
-    assert "name one experiment, or give --all" in capfd.readouterr().err
+    assert "name an experiment, or give --all" in capfd.readouterr().err
 
 
 def test_force_without_feedback_is_measured_as_a_play_of_its_friction(tmp_path: Path) -> None:
