@@ -129,6 +129,8 @@ BENCHMARKS = {
     "real_time": "stack:REAL_TIME",
     "plant": "simulation:PLANT",
     "compiled": "simulation:COMPILED",
+    "parts": "cost:PARTS",
+    "estimator": "cost:ESTIMATOR",
     "bag_reading": "bags:BAG_READING",
     "analysis": "bags:ANALYSIS",
 }

@@ -17,7 +17,7 @@ from wam_cli.commands.conform import driver_alone
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_description.signals import Answer, State
-from wam_ros import conformance, message_checks
+from wam_ros import conformance
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
 from wam_ros.limits import CONFORMANCE_LIMITS
@@ -134,9 +134,9 @@ def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one(
 def test_without_a_driver_no_row_but_the_interface_is_tested(
     ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("START", "LOOK"):
-        monkeypatch.setattr(message_checks, name, 0.05)
-    monkeypatch.setattr("wam_ros.driver_probe.CONFORMANCE_LIMITS", replace(CONFORMANCE_LIMITS, service_wait=0.05))
+    short = replace(CONFORMANCE_LIMITS, start=0.05, look=0.05, service_wait=0.05)
+    for module in ("driver_probe", "message_checks"):
+        monkeypatch.setattr(f"wam_ros.{module}.CONFORMANCE_LIMITS", short)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(bench.conformance(1).rows())
     assert [row.key for row in rows] == list(REQUIREMENTS)
