@@ -41,6 +41,7 @@ WITHOUT_CLOCK = ("wam_theory", "wam_description", "wam_driver", "wam_control")
 ROS = {"builtin_interfaces", "launch", "launch_ros", "rcl_interfaces", "rclpy", "std_srvs"}
 CLOCKS = {"time", "datetime"}
 BANNED_NAMES = {"base", "common", "helper", "helpers", "manager", "managers", "util", "utils"}
+MOST_CONSTANTS, MOST_ATTRIBUTES = 300, 30
 LARGEST_PART = 1.0 / 3.0  # of the source lines, in one package
 
 
@@ -161,6 +162,30 @@ def source_lines(root: Path) -> Counter[str]:
     for path in paths:
         lines[path.relative_to(root).parts[0]] += len(path.read_text().splitlines())
     return lines
+
+
+def constants_in(tree: ast.Module) -> int:
+    """Numbers that a module assigns at its top level, those of tuples counted one by one."""
+    values = [one.value for one in tree.body if isinstance(one, ast.Assign | ast.AnnAssign)]
+    parts = [part for value in values for part in (value.elts if isinstance(value, ast.Tuple) else [value])]
+    numbers = [part.operand if isinstance(part, ast.UnaryOp) else part for part in parts]
+    return sum(isinstance(one, ast.Constant) and type(one.value) in (int, float) for one in numbers)
+
+
+def attributes_of(kind: ast.ClassDef) -> int:
+    """Attributes that a class assigns on self."""
+    stored = [one for one in ast.walk(kind) if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store)]
+    return len({one.attr for one in stored if isinstance(one.value, ast.Name) and one.value.id == "self"})
+
+
+@pytest.mark.slow
+def test_numbers_have_homes_and_classes_are_small():
+    """A threshold belongs to the dataclass of its subsystem; the force loop's classes are the known exceptions."""
+    trees = modules_under(ROOT).values()
+    assert sum(map(constants_in, trees)) <= MOST_CONSTANTS
+    classes = [one for tree in trees for one in ast.walk(tree) if isinstance(one, ast.ClassDef)]
+    large = {one.name for one in classes if attributes_of(one) > MOST_ATTRIBUTES}
+    assert large == {"ForceLoop", "ForceHold"}
 
 
 @pytest.mark.slow
