@@ -4,7 +4,7 @@ import string
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from wam_description.event import CAUSE, Event
+from wam_description.event import CAUSE, Code, Event
 from wam_description.number_text import brief
 
 HOLDS: Final = "the arm holds its position"
@@ -177,9 +177,9 @@ def sentence(event: Event) -> str:
     """What an event is in words, '' where nothing has happened."""
     values = dict(event.values)
     cause = str(values.get(CAUSE, ""))
-    text = SENTENCES[cause] if cause in SENTENCES else str(values.get("reason", cause))
     if cause not in SENTENCES:
-        return text
+        return str(values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
+    text = SENTENCES[cause]
     parts = {name: _fill(part, values) for name, part in _parts(cause, values).items()}
     end = _fill(PUSHED, values) if "pushed" in values else ""
     if "rising" in values and cause != "rising":

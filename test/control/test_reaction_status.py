@@ -9,6 +9,7 @@ from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.event import OBEYED, Code, Event, Level, refused, warning
+from wam_description.event_text import sentence
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
@@ -45,6 +46,19 @@ def test_events_in_a_status_are_pairs_of_text_and_back() -> None:
     assert ("event.2", "not_reached") in found
     assert ("event.2.measured", "3.1") in found
     assert parse("", Level.WARN, "text", found) == status
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (OBEYED, ""),
+        (Event(Code.DONE), "done"),
+        (refused("task_command", "no effect"), "no effect"),
+        (Event(Code.FAULT, Level.ERROR, {"reason": "the cable slipped"}), "the cable slipped"),
+    ],
+)
+def test_an_event_has_words_of_its_cause_or_reason_or_code(event: Event, words: str) -> None:
+    assert sentence(event) == words
 
 
 @pytest.mark.parametrize(
