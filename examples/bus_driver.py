@@ -1,9 +1,7 @@
-"""A driver of your own: the skeleton around a motor bus, here `fake_bus.py`.
+"""A driver of your own: the skeleton around a motor bus, here `fake_bus.py`.  Test it, then run the stack on it.
 
-Test it against the contract, docs/driver.md, then run the stack on it, from this directory:
-
-    PYTHONPATH=. wam conform --config bus_driver.yaml
-    PYTHONPATH=. wam up --config bus_driver.yaml
+PYTHONPATH=. wam conform --config bus_driver.yaml
+PYTHONPATH=. wam up --config bus_driver.yaml
 """
 
 import time

@@ -347,6 +347,7 @@ def test_info_counts_what_the_file_does_not_count(tmp_path: Path, way: str) -> N
 FILL = """
 import os, sys
 from pathlib import Path
+sys.path.append(sys.argv[3])
 from test_bag_repair import QOS
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 path = Path(sys.argv[1])
@@ -381,7 +382,7 @@ def test_a_disk_that_fills_up_leaves_a_bag_that_is_closed(tmp_path: Path, split_
     if subprocess.run([*own_mounts, "true"], capture_output=True, check=False).returncode:
         pytest.skip("this system lets nobody mount a small disk")
     done = subprocess.run(
-        [*own_mounts, sys.executable, "-c", FILL, str(tmp_path), str(split_size)],
+        [*own_mounts, sys.executable, "-c", FILL, str(tmp_path), str(split_size), str(Path(__file__).parent)],
         env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'test'}"},
         capture_output=True,
         text=True,

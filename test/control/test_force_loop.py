@@ -472,7 +472,7 @@ def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported() -> Non
     loop = force_loop(ARM, turning)
     for _ in range(round(0.6 / DT)):
         loop.step(world.joints, world.sensors, NO_CONTACT, None, None, None, [0.0, -2.0, 0.0, 0.0], DT)
-    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in loop.reactions[Code.NOT_REACHED]
+    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in sentence(loop.reactions[Code.NOT_REACHED])
 
 
 @pytest.mark.parametrize(

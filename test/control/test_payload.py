@@ -102,7 +102,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
 @pytest.mark.slow
 @pytest.mark.parametrize("about", [0.0, 120.0])
 def test_a_press_that_starts_in_contact_goes_on(about: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(surfaces, "GAP", -1e-3)
+    monkeypatch.setattr(surfaces, "SHAPE", dataclasses.replace(surfaces.SHAPE, gap=-1e-3))
     local = np.array([0.0, -math.cos(math.radians(about)), math.sin(math.radians(about))])
     direction = triple(RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation @ local)
     task = Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 10.0)

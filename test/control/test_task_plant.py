@@ -9,6 +9,7 @@ from arms import CONFIGURATION, WAM
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, line_axes, unit
 from wam_control.task.scenario import ScenarioStep
+from wam_description.event_text import sentence
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, PathPoint, PosturePath
 from wam_sim.simulation import Simulation
@@ -40,7 +41,7 @@ class Played:
         run = Simulation(configuration, steps)
         traces = TaskWatch(configuration, task, run).traces()
         self.forces = np.array([trace.forces for trace in traces]).T
-        self.reason, self.q = traces[0].reason, run.driver.plant.q
+        self.reason, self.q = sentence(traces[0].event), run.driver.plant.q
 
 
 @pytest.mark.slow

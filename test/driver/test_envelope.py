@@ -13,6 +13,7 @@ import pytest
 from wam_control.force.force_command import CommandAdmission
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.configuration import Configuration, packaged
+from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ForceCommand, Wrench
@@ -295,7 +296,7 @@ def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_h
     assert admitted(admission, posture=good).posture == good
     found = admitted(admission, posture=[0.1, -2.5, 0.0, 0.6])
     assert found.posture == good
-    assert found.refusals["joint_posture_command"] == (
+    assert sentence(found.refusals["joint_posture_command"]) == (
         "joint2 is to be at -2.5 rad; allowed: -2.356 to 2.356 rad; the last good posture remains in force"
     )
     assert admitted(admission, posture=[0.1, 1e300, 0.0, 0.6]).refusals
