@@ -93,6 +93,11 @@ def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple
     return tuple(one for one in parts if one.end - one.begin > BRIEF or (one.begin < one.end == end))
 
 
+def of_force_loop(reactions: Iterable[RecordedReaction]) -> list[RecordedReaction]:
+    """Those of the force loop: a fault of the driver ends a force, and refuses none."""
+    return [one for one in reactions if one.name is not Code.FAULT]
+
+
 def steady_begin(step: StepSpan) -> int:
     """When what is taken as the steady state of a step begins, ns."""
     return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
@@ -105,7 +110,7 @@ def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Recorde
     """
     steady = steady_begin(step)
     found = within(reactions, steady, step.end)
-    refused = [one for one in found if one.holds and one.name is not Code.FAULT]
+    refused = [one for one in of_force_loop(found) if one.holds]
     at_end = [one for one in found if one.end >= step.end - BRIEF]
     hard = [one for one in at_end if one.name is Code.CONTACT_FORCE and one.begin <= steady]
     missed = [one for one in at_end if one.name is Code.NOT_REACHED]

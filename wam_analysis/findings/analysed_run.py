@@ -12,8 +12,7 @@ from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.bag import Bag, JointColumns
-from wam_description.event import Code
-from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, within
+from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recording import RecordedRun, recorded_run
 
 Numbers = NDArray[np.float64]
@@ -112,8 +111,7 @@ def _holds(run: RecordedRun, summary: DemoSummary) -> tuple[Hold, ...]:
         name = (name or f"{hold.commanded:.3g} N") + f", axis {hold.axis + 1}" * (hold.axis >= 0)
         name = name if name not in taken else f"{name} ({hold.begin / 1e9:.1f} s)"
         pushed = summary.traces.during(hold.begin, hold.end) & summary.traces.push.acts
-        own = [one for one in summary.reactions if one.name is not Code.FAULT]  # a fault ends a force, and refuses none
-        reactions = within(own, hold.begin, hold.end)
+        reactions = within(of_force_loop(summary.reactions), hold.begin, hold.end)
         holds.append(hold._replace(name=name, disturbed=bool(np.any(pushed)), reactions=reactions))
     return tuple(holds)
 

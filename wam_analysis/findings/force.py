@@ -16,9 +16,18 @@ from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.thresholds import GUARD
-from wam_description.event import Code
 from wam_description.signals import BASE
-from wam_sim.reactions import STEADY, TOO_MUCH, UNREACHED, RecordedReaction, too_short, unassessed, unmet, within
+from wam_sim.reactions import (
+    STEADY,
+    TOO_MUCH,
+    UNREACHED,
+    RecordedReaction,
+    of_force_loop,
+    too_short,
+    unassessed,
+    unmet,
+    within,
+)
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
@@ -47,7 +56,7 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
 def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
     """What was not simply obeyed besides constant forces, by step of the scenario, or of the run."""
     spans = [(hold.begin, hold.end) for hold in recording.holds]
-    reactions = [one for one in recording.summary.reactions if one.name is not Code.FAULT]
+    reactions = of_force_loop(recording.summary.reactions)
     rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
     steps: dict[str, tuple[RecordedReaction, ...]] = {}
     for step in recording.summary.steps:  # several may have one name
