@@ -40,6 +40,7 @@ from wam_studies.contact import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers
 from wam_studies.figures.catalogue import table as figures_table
+from wam_studies.figures.panels import Panels, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant.figure import figure
@@ -259,7 +260,7 @@ def plant_study() -> str:
 
 
 @cache
-def found_figures() -> dict[str, Any]:
+def found_figures() -> dict[str, Panels]:
     """Numbers of every figure."""
     with processes() as executor:
         return numbers(list(FIGURES), executor, default_file("figures"))
@@ -271,7 +272,7 @@ def figures() -> str:
     found = found_figures()
     if WRITES_PICTURES:
         for name, values in found.items():
-            FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
+            draw_panels(values, file_of(name, ROOT / "docs" / "figures"))
     return figures_table(found)
 
 
@@ -300,7 +301,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "scorecard": lambda: scorecard(configuration),
         "transmissions": transmissions.table,
         "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
-        "backdrivability": lambda: backdrivability.table(backdrivability.backdrivability()),
+        "backdrivability": lambda: backdrivability.table(found_figures()["3.2.6"]),
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},

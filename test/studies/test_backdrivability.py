@@ -43,10 +43,10 @@ def test_stretched_arm_has_a_direction_that_no_push_moves(arm: Arm) -> None:
 @pytest.mark.slow
 def test_with_two_kilograms_the_rotors_share_is_small_over_most_of_the_workspace_and_the_arm_is_not_isotropic() -> None:
     """7.2.2."""
-    numbers = backdrivability()
-    assert np.quantile(numbers.random[:, 1], 0.9) < 0.15 < np.median(numbers.random_unloaded[:, 1])
-    assert np.median(numbers.random_unloaded[:, 0]) < 0.1
-    assert np.quantile(numbers.random[:, 0], 0.9) < 0.6
+    isotropy, rotors, _ = backdrivability()
+    assert np.quantile(rotors.line("payload 2 kg").x, 0.9) < 0.15 < np.median(rotors.line("payload none").x)
+    assert np.median(isotropy.line("payload none").x) < 0.1
+    assert np.quantile(isotropy.line("payload 2 kg").x, 0.9) < 0.6
 
 
 def test_half_of_the_directions_move_under_the_stated_push(arm: Arm) -> None:

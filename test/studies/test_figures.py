@@ -4,8 +4,8 @@ Some 15 s, once: pieces that docs/figures.md has needed are taken from where it 
 """
 
 import math
+import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from wam_cli.main import main
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, table
-from wam_studies.figures.series import Series
+from wam_studies.figures.panels import Panels, Series, distances, draw_panels
 
 ROOT = Path(__file__).resolve().parents[2]
 # the testbed at its joint, SI: 64 oz-in-s^2 of link; 8.33 N m/rad at the motor, N = 14
@@ -22,15 +22,15 @@ INERTIA, K_TR, K_C = 64.0 / 16.0 * 0.1129848, 14.0**2 * 8.33, 1464.28
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, Any]:
+def found() -> dict[str, Panels]:
     with processes() as executor:
         return numbers(list(FIGURES), executor, default_file("figures"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
-def test_points_of_the_plant_lie_on_the_lines(found: dict[str, Any], name: str) -> None:
-    distance = FIGURES[name].distance(found[name])
+def test_points_of_the_plant_lie_on_the_lines(found: dict[str, Panels], name: str) -> None:
+    distance = distances(found[name])
     assert all(value < 0.02 for value in distance.values()), distance
     assert distance or name in ("2.1.1", "3.1", "3.2.6")  # bounds, geometry and inertia
 
@@ -38,119 +38,129 @@ def test_points_of_the_plant_lie_on_the_lines(found: dict[str, Any], name: str) 
 def test_a_point_beside_the_line_is_noticed() -> None:
     x = np.linspace(1.0, 11.0, 50)
     series = Series(x, 4.0 * x, x[::7], 4.0 * x[::7])
-    assert series.distance == pytest.approx(0.0, abs=1e-12)
-    assert series.relative_distance == pytest.approx(0.0, abs=1e-12)
+    assert [series.distance, series.relative_distance(True)] == pytest.approx([0.0, 0.0], abs=1e-12)
     moved = series._replace(plant_y=series.plant_y + np.eye(1, len(series.plant_x), 3)[0] * 4.0)
     assert moved.distance == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-6)  # across a line at 45 degrees
-    assert moved.relative_distance == pytest.approx(1.0 / x[21])
+    assert moved.relative_distance(False) == moved.relative_distance(True) == pytest.approx(1.0 / x[21])
+
+
+# figure, panel, line; x; y, and its tolerance
+BY_HAND = [
+    ("3.1", 0, "μ = 0.4", 10.0, 0.875, 1e-3),  # 1 - 0.05/0.4
+    ("3.1", 1, "μ = 0.4", 10.0, 0.7, 1e-3),  # 0.8 - 0.1
+    ("3.1", 0, "μ = 0.2", 2.0, 0.0, 1e-12),
+    ("5.3", 0, "(5.1)", 1.0, 20.0 - 20.0 / 4.0, 1e-9),  # G_P K = 3
+    ("5.3", 1, "(5.2)", 0.2, 20.0 * (1.0 - math.exp(-1.0)), 0.01),
+    ("5.8", 0, "ζ = 0.25, Coulomb friction", 1.1, 1.0 / 25.3, 2e-4),
+    ("5.8", 0, "ζ = 0.25, Coulomb friction", 1.5, 1.0 / 3.45, 1.5e-3),
+    ("5.8", 0, "ζ = 0.25, Coulomb friction", 2.0, 1.0 / 1.17, 4e-3),
+    ("6-efficiency", 0, "(6.15)", 60.0 * 0.1129848, 0.966, 1e-3),  # 6.4.5: 60 in-lb, two stages
+    ("6-efficiency", 1, "n = 3", 3.0, 0.97**3, 1e-6),
+]
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_grasp_by_hand(found: dict[str, Any]) -> None:
-    grasp = found["3.1"]
-    # mu = 0.4, L/W = 10: L' = 1 - 0.05/0.4, D = 0.8 - 0.1; mu = 0.2, L/W = 2: nothing
-    at = [np.interp(10.0, grasp.aspect_ratio, rows[1]) for rows in (grasp.length, grasp.diameter)]
-    assert at == pytest.approx([0.875, 0.7], abs=1e-3)
-    assert np.interp(2.0, grasp.aspect_ratio, grasp.length[0]) == 0.0
+@pytest.mark.parametrize(("name", "panel", "label", "x", "y", "within"), BY_HAND)
+def test_line_is_that_of_a_computation_by_hand(
+    found: dict[str, Panels], name: str, panel: int, label: str, x: float, y: float, within: float
+) -> None:
+    line = found[name][panel].line(label)
+    assert np.interp(x, line.x, line.y) == pytest.approx(y, abs=within)
+
+
+# figure; mark; x and y
+MARKED = [
+    ("4.9", "(4.9)", 8.27e5 * 0.1129848, math.nan),
+    ("5.3", "F_des", math.nan, 20.0),
+    ("5.7", "unstable limit cycle", -2.0, 0.0),
+    ("5.8", "B", 2.186, 1.356),
+]
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_breakpoints_are_those_of_two_masses_on_two_springs(found: dict[str, Any]) -> None:
-    numbers_ = found["4.9"]
+@pytest.mark.parametrize(("name", "text", "x", "y"), MARKED)
+def test_mark_is_where_the_thesis_or_the_errata_have_it(
+    found: dict[str, Panels], name: str, text: str, x: float, y: float
+) -> None:
+    mark = found[name][0].mark(text)
+    assert (mark.x, mark.y) == pytest.approx((x, y), rel=5e-3, abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
+def test_breakpoints_are_those_of_two_masses_on_two_springs(found: dict[str, Panels]) -> None:
+    lower, upper = (found["4.9"][0].line(label) for label in ("ω₁", "ω₂"))
     rotor = 0.0057 / 16.0 * 0.1129848
     for i in (20, 150, 280):
-        kc = numbers_.lower.x[i]
-        stiffness = np.array([[8.33, -14.0 * 8.33], [-14.0 * 8.33, K_TR + kc]])
+        stiffness = np.array([[8.33, -14.0 * 8.33], [-14.0 * 8.33, K_TR + lower.x[i]]])
         squares = np.sort(np.linalg.eigvals(np.linalg.solve(np.diag([rotor, INERTIA]), stiffness)).real)
-        assert [numbers_.lower.y[i], numbers_.upper.y[i]] == pytest.approx(np.sqrt(squares), rel=3e-3)
-    assert numbers_.matched == pytest.approx(105.96, abs=0.05)
-    assert numbers_.crossover == pytest.approx(8.27e5 * 0.1129848, rel=5e-3)
+        assert 2.0 * np.pi * np.array([lower.y[i], upper.y[i]]) == pytest.approx(np.sqrt(squares), rel=3e-3)
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_simple_responses_by_hand(found: dict[str, Any]) -> None:
-    simple = found["5.3"]
-    assert simple.steady_error == pytest.approx(20.0 / 4.0)  # G_P K = 3
-    assert simple.time_constant == pytest.approx(0.2)
-    assert np.interp(0.2, simple.integral.x, simple.integral.y) == pytest.approx(
-        20.0 * (1.0 - math.exp(-1.0)), abs=0.01
-    )
-
-
-@pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_stairs_are_as_high_as_5_8_says(found: dict[str, Any]) -> None:
-    stairs = found["5.5"]
+def test_stairs_are_as_high_as_5_8_says(found: dict[str, Panels]) -> None:
+    stairs = found["5.5"][0]
     zeta = 24.0 / (2.0 * math.sqrt((K_TR + K_C) * INERTIA))
     jump = (1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2))) * 3.0 * K_C / (K_TR + K_C)
-    heights = np.abs(np.diff(stairs.jumps[1]))
+    heights = np.abs(np.diff(stairs.line("no inertia (5.3), (5.8)").y))
     np.testing.assert_allclose(heights[heights > 0.0], jump, rtol=2e-3)
-    late = stairs.force.plant_y[len(stairs.force.plant_y) // 2 :]
-    assert np.ptp(late) == pytest.approx(jump, rel=0.03)  # the exact slip has the motor moving on
+    plant = stairs.line("exact").plant_y
+    assert np.ptp(plant[len(plant) // 2 :]) == pytest.approx(jump, rel=0.03)  # the exact slip has the motor moving on
     assert len(heights[heights > 0.0]) > 5
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_describing_function_is_the_transfer_of_the_state_equations(found: dict[str, Any]) -> None:
-    curves = found["5.7"]
-    for gamma, curve in zip((0.6, 1.5), curves.curves, strict=True):
+def test_describing_function_is_the_transfer_of_the_state_equations(found: dict[str, Panels]) -> None:
+    for gamma in (0.6, 1.5):
+        curve = found["5.7"][0].line(f"b G(jω), γ = {gamma:g}")
         a = np.array([[0.0, 1.0, 0.0], [-4.0, -1.0, 2.0], [-2.0 * gamma, 0.0, 0.0]])  # J = b = K = 1, k_tr = k_c = 2
         for omega in (0.6, 2.0, 2.5):
             value = np.linalg.solve(1j * omega * np.eye(3) - a, [0.0, 1.0, 0.0])[1]
-            away = np.abs(curve.x + 1j * curve.y - value).min()
-            assert away < 0.01, (gamma, omega)
-    assert curves.crossing == pytest.approx(-2.0)
+            assert np.abs(curve.x + 1j * curve.y - value).min() < 0.01, (gamma, omega)
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_bound_has_the_numbers_of_the_errata(found: dict[str, Any]) -> None:
-    map_ = found["5.8"]
-    heights = np.interp([1.1, 1.5, 2.0], map_.bound.x, map_.bound.y)
-    assert heights == pytest.approx([1 / 25.3, 1 / 3.45, 1 / 1.17], rel=5e-3)
-    assert (map_.gamma_3, map_.point_b) == pytest.approx((2.186, 1.356), abs=1e-3)
-    assert map_.bound.y[-1] == pytest.approx(1.356, rel=5e-3)
-    assert map_.with_stiction[0][-1] < map_.gamma_3  # point B moves to the left
+def test_point_b_moves_to_the_left_with_stiction(found: dict[str, Panels]) -> None:
+    (panel,) = found["5.8"]
+    assert panel.mark("B with").x < panel.mark("B").x
+    assert panel.lines[0][1].y[-1] == pytest.approx(1.356, rel=5e-3)
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_half_cycles_shrink_by_psi_and_the_motor_goes_on(found: dict[str, Any]) -> None:
-    response = found["5.9"]
-    force = response.force
+def test_half_cycles_shrink_by_psi_and_the_motor_goes_on(found: dict[str, Panels]) -> None:
+    force, motor = (panel.line("exact") for panel in found["5.9"])
     flat = force.y[1:][np.abs(np.diff(force.y)) < 1e-12]  # stuck
     levels = np.abs(flat[np.insert(np.abs(np.diff(flat)) > 1e-3, 0, True)] - 20.0)
     np.testing.assert_allclose(levels, 20.0 * 0.675704607 ** np.arange(levels.size), rtol=1e-6)
     assert levels.size > 5
     # (5.20), which the slip itself, with the motor moving on, still exceeds a little
-    late = response.motor.y[response.motor.x > 1.0]
-    assert np.ptp(late) == pytest.approx(2.0 * 18.5 / K_TR, rel=0.03)
-    assert found["5.11"].gamma == 1.5
+    assert np.ptp(motor.y[motor.x > 1.0]) == pytest.approx(2.0 * 18.5 / K_TR, rel=0.03)
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_lost_contact_closes_its_cycle(found: dict[str, Any]) -> None:
-    cycle = found["5.10"].cycle
+def test_lost_contact_closes_its_cycle(found: dict[str, Panels]) -> None:
+    cycle = found["5.10"][0].line("exact")
     assert cycle.x[0] == pytest.approx(cycle.x[-1], abs=1e-6 * np.ptp(cycle.x))
     assert cycle.y[0] == pytest.approx(cycle.y[-1], rel=1e-3)
     assert cycle.x.min() < -20.0 < 20.0 < cycle.x.max()
 
 
 @pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_cables_by_hand(found: dict[str, Any]) -> None:
-    efficiency, creep = found["6-efficiency"], found["6-creep"]
-    # section 6.4.5: 60 in-lb, two stages
-    assert np.interp(60.0 * 0.1129848, efficiency.testbed.x, efficiency.testbed.y) == pytest.approx(0.966, abs=1e-3)
-    assert efficiency.equal_stages[2, -1] == pytest.approx(0.97**3)
-    assert np.interp(creep.reversal, creep.creep.x, creep.creep.y) == pytest.approx(0.5 * creep.creep.y[-1], rel=1e-6)
+def test_half_of_the_creep_is_there_where_the_motor_reverses(found: dict[str, Panels]) -> None:
+    (panel,) = found["6-creep"]
+    line = panel.line("(6.19)")
+    assert np.interp(panel.mark("motor reverses").x, line.x, line.y) == pytest.approx(0.5 * line.y[-1], rel=1e-6)
 
 
 @pytest.mark.slow
-def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Any], tmp_path: Path) -> None:
+def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Panels], tmp_path: Path) -> None:
     page = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
     for name, values in found.items():
         kept = file_of(name, ROOT / "docs" / "figures")
         assert kept.is_file(), "run 'make docs'"
         assert f"figures/{kept.name}" in page
-        FIGURES[name].draw(values, file_of(name, tmp_path))
+        draw_panels(values, file_of(name, tmp_path))
         assert file_of(name, tmp_path).stat().st_size > 20_000
+        assert all(re.search(r"\[.+\]", axis) for panel in values for axis in (panel.x, panel.y)), name
     assert table(found).count("\n") > len(FIGURES)
 
 

@@ -4,6 +4,7 @@ import argparse
 
 from wam_cli.options import batch_of, take_batch, writable_directory
 from wam_studies.figures.catalogue import FIGURES, file_of, known, numbers, table
+from wam_studies.figures.panels import draw_panels
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,6 +21,6 @@ def run(given: argparse.Namespace) -> int:
         found = numbers(names, *batch)
     given.to.mkdir(parents=True, exist_ok=True)
     for name, values in found.items():
-        FIGURES[name].draw(values, file_of(name, given.to))
+        draw_panels(values, file_of(name, given.to))
     print(table(found), end="")
     return 0

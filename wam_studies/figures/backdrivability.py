@@ -1,6 +1,5 @@
 """Figure 3.2.6: backdriven inertia, its isotropy, the rotors' share and friction over the workspace."""
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +11,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.series import Numbers
-from wam_studies.figures.style import picture
+from wam_studies.figures.panels import Panels, ThesisPanel, line_only
 
 
 class Backdriven(NamedTuple):
@@ -31,18 +29,6 @@ class Backdriven(NamedTuple):
     rotor_share: float
     friction: float
     mass: tuple[float, float]
-
-
-class BackdrivabilityMap(NamedTuple):
-    """Maps over the angles of joints 2 and 4, (n, n), theta_3 = 0, with 2 kg; the same in random poses, (poses, 3)."""
-
-    pitch: Numbers
-    elbow: Numbers
-    isotropy: Numbers
-    rotor_share: Numbers
-    friction: Numbers
-    random: Numbers
-    random_unloaded: Numbers
 
 
 class Backdriving:
@@ -89,42 +75,37 @@ class Backdriving:
         return Backdriven(float(principal[0] / principal[-1]), share, pushed, masses)
 
 
-def backdrivability() -> BackdrivabilityMap:
-    """Maps with the parameters of config/wam.yaml."""
+PAYLOADS = {"none": 0.0, "2 kg": CASE.payload}
+QUANTITIES = (
+    ("least over greatest effective mass [-]", "{:.2g}"),
+    ("rotors' share of the effective mass [-]", "{:.2g}"),
+    ("push that moves no joint [N]", "{:.3g}"),
+)
+
+
+def backdrivability() -> Panels:
+    """Each quantity over random poses of config/wam.yaml, the least first, with and without payload."""
     arm = Configuration.load(packaged("wam")).shared.arm
     tip, low, high = Backdriving(arm), np.array(arm.joints.lower), np.array(arm.joints.upper)
-    pitch, elbow = (np.linspace(low[i], high[i], CASE.backdriven_grid) for i in (1, 3))
-    rows = np.array([[tip.at((0.0, a, 0.0, b), CASE.payload)[:3] for a in pitch] for b in elbow])
     poses = np.random.default_rng(CASE.backdriven_seed).uniform(low, high, (CASE.backdriven_poses, 4))
-    loaded, free = (np.array([tip.at(tuple(q), m)[:3] for q in poses], dtype=np.float64) for m in (CASE.payload, 0.0))
-    return BackdrivabilityMap(pitch, elbow, rows[..., 0], rows[..., 1], rows[..., 2], loaded, free)
+    part = (np.arange(CASE.backdriven_poses) + 0.5) / CASE.backdriven_poses
+    found = {name: np.array([tip.at(tuple(q), mass)[:3] for q in poses]) for name, mass in PAYLOADS.items()}
+    return tuple(
+        ThesisPanel(
+            f"{'abc'[i]})",
+            quantity,
+            "part of the poses [-]",
+            tuple((f"payload {name}", line_only(np.sort(values[:, i]), part)) for name, values in found.items()),
+        )
+        for i, (quantity, _) in enumerate(QUANTITIES)
+    )
 
 
-def table(numbers: BackdrivabilityMap) -> str:
+def table(found: Panels) -> str:
     """Quantiles over random poses as Markdown."""
     rows = []
-    for payload, values in (("none", numbers.random_unloaded), ("2 kg", numbers.random)):
-        for name, column, digits in (
-            ("least over greatest effective mass", 0, "{:.2g}"),
-            ("rotors' share of the effective mass", 1, "{:.2g}"),
-            ("push that moves no joint, N", 2, "{:.3g}"),
-        ):
-            quantiles = np.quantile(values[:, column], (0.1, 0.5, 0.9))
-            rows.append((name, payload, *(digits.format(value) for value in quantiles)))
+    for panel, (quantity, digits) in zip(found, QUANTITIES, strict=True):
+        for label, series in panel.lines:
+            quantiles = np.quantile(series.x, (0.1, 0.5, 0.9))
+            rows.append((quantity, label.removeprefix("payload "), *(digits.format(value) for value in quantiles)))
     return markdown(("at the tip", "payload", "a tenth of the poses below", "median", "a tenth above"), rows)
-
-
-def draw(numbers: BackdrivabilityMap, file: Path) -> None:
-    """Maps over the angles of joints 2 and 4."""
-    pitch, elbow = np.degrees(numbers.pitch), np.degrees(numbers.elbow)
-    with picture(file, 10.0, 3.2) as figure:
-        axes = figure.subplots(1, 3, sharey=True)
-        for place, title, values, levels in (
-            (axes[0], "a) least over greatest effective mass", numbers.isotropy, np.linspace(0.0, 0.6, 13)),
-            (axes[1], "b) rotors' share of the effective mass", numbers.rotor_share, np.linspace(0.0, 0.24, 13)),
-            (axes[2], "c) push that moves no joint [N]", numbers.friction, np.linspace(2.0, 6.0, 9)),
-        ):
-            drawn = place.contourf(pitch, elbow, values, levels=levels, cmap="viridis", extend="max")
-            figure.colorbar(drawn, ax=place)
-            place.set(title=title, xlabel=r"$\theta_2$ [°]")
-        axes[0].set_ylabel(r"$\theta_4$ [°]")

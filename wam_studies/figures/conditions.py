@@ -15,7 +15,7 @@ class FigureConditions:
     payload: float = 2.0  # kg, 7.2.2
     backdriven_poses: int = 1000  # drawn from the joints' ranges
     backdriven_directions: int = 200  # of the force at the tip
-    backdriven_grid: int = 61  # angles of each of two joints
+
     backdriven_seed: int = 7  # of poses and directions
 
     # 5.7, 5.8

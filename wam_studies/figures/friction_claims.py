@@ -1,14 +1,12 @@
-"""Numbers of figures 5.4, 5.5.1 and 5.5.2, in words in the thesis: closed forms as lines, exact events as points.
+"""Figures for 5.4, 5.5.1 and 5.5.2, in words in the thesis: closed forms as lines, exact events as points.
 
 The node has J_l = 1, k_tr + k_c = 4 and F_dynamic = 1, unless a stiffness is the abscissa.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
 from wam_theory.describing_function import predicted_unstable_cycle, unstable_cycle
 from wam_theory.guidelines import kept_contact_ratio
 from wam_theory.harmonics import harmonic_share
@@ -29,16 +27,8 @@ def gain_of(gamma: float, zeta: float) -> float:
     return gamma * float(routh_gain(1.0, 4.0 * zeta, CASE.stiffness, CASE.stiffness))
 
 
-class AsymmetricStart(NamedTuple):
-    """Asymmetry over D after each slip, and period over that of (5.9) after each cycle, one series for each zeta."""
-
-    number: float  # left side of (5.4)
-    asymmetry: tuple[Series, ...]
-    period: tuple[Series, ...]
-
-
-def asymmetric_start(number: float = 0.002, slips: int = 800) -> AsymmetricStart:
-    """A cycle that begins with an error of 0.9 D, slip by slip.
+def asymmetric_start(number: float = 0.002, slips: int = 800) -> Panels:
+    """Asymmetry over D after each slip, and period over that of (5.9) after each cycle, from an error of 0.9 D.
 
     Parameters
     ----------
@@ -53,12 +43,17 @@ def asymmetric_start(number: float = 0.002, slips: int = 800) -> AsymmetricStart
         keep = 1.0 - float(asymmetry_decay(number, zeta))
         measured = np.abs(errors[1:] + errors[:-1]) / 2.0 / jump
         n = np.arange(float(len(measured)))
-        asymmetry.append(Series(n, measured[0] * keep**n, n[::25], measured[::25]))
+        asymmetry.append((f"ζ = {zeta:g}", Series(n, measured[0] * keep**n, n[::25], measured[::25])))
         symmetric = float(stiction_cycle_period(gain, CASE.stiffness, CASE.stiffness, CASE.static_friction, 1.0, zeta))
         predicted = asymmetric_period_ratio(jump * (0.5 + measured[0] * keep**n), jump)[:-1]
         cycles = (times[2:] - times[:-2]) / symmetric
-        period.append(Series(n[:-1] / 2.0, predicted, (n[:-1] / 2.0)[::25], cycles[::25]))
-    return AsymmetricStart(number, tuple(asymmetry), tuple(period))
+        half = n[:-1] / 2.0
+        period.append((f"ζ = {zeta:g}", Series(half, predicted, half[::25], cycles[::25])))
+    over = "period over that of (5.9) [-]"
+    return (
+        ThesisPanel("a) asymmetry", "slips [-]", "asymmetry over D [-]", tuple(asymmetry), "y"),
+        ThesisPanel("b) period", "cycles [-]", over, tuple(period), limits=(0.0, 200.0, 0.95, np.nan)),
+    )
 
 
 def standstills(node: FrictionNode, gain: float, error: float, slips: int) -> tuple[Numbers, Numbers]:
@@ -79,42 +74,37 @@ def standstills(node: FrictionNode, gain: float, error: float, slips: int) -> tu
     return times, errors
 
 
-class HarmonicsOfFriction(NamedTuple):
-    """Shares of the harmonics over gamma, and sizes of the cycles, amplitude of F_c over F_dynamic.
+def harmonics_of_friction(zeta: float = 0.25) -> Panels:
+    """Harmonics that the describing function neglects, and the cycles, amplitude of F_c, that it has and has not.
 
-    `exact` is the unstable cycle; `stable` has the cycles that steps of 0.01 and of nine tenths of the largest
-    stable step settle in with stiction, where the describing function has none.
+    Points of harmonics: Fourier series of the periodic motion of the linear block.  Cycles with stiction: those that
+    steps of 0.01 and of F_dynamic settle in, where the describing function has none.
     """
-
-    zeta: float
-    gamma: Numbers
-    shares: tuple[Series, ...]  # points: Fourier series of the periodic motion of the linear block
-    predicted: Numbers
-    exact: Numbers
-    stable: tuple[Numbers, Numbers, Numbers]
-
-
-def harmonics_of_friction(zeta: float = 0.25) -> HarmonicsOfFriction:
-    """Harmonics that the describing function neglects, and the cycles it has and has not."""
     gamma = 1.0 + np.geomspace(0.02, float(gamma_3(zeta)) - 1.001, 60)
     gain = np.array([gain_of(value, zeta) for value in gamma])
     rest = (1.0, 4.0 * zeta, CASE.stiffness, CASE.stiffness)
     predicted = predicted_unstable_cycle(gain, *rest, 1.0)
     some = np.arange(3, 60, 8)
     spectra = [_spectrum(gain[i], zeta, float(predicted.frequency[i])) for i in some]
-    shares = tuple(
-        Series(
-            gamma,
-            harmonic_share(order, predicted.frequency, gain, *rest),
-            gamma[some],
-            np.array([spectrum[int(order)] / spectrum[1] for spectrum in spectra]),
-        )
-        for order in CASE.harmonics
-    )
+    shares = []
+    for order in CASE.harmonics:
+        line = harmonic_share(order, predicted.frequency, gain, *rest)
+        points = np.array([spectrum[int(order)] / spectrum[1] for spectrum in spectra])
+        shares.append((f"{order:g}.", Series(gamma, line, gamma[some], points).scaled(1.0, 100.0)))
     stable_gamma = np.array([0.3, 0.5, 0.7, 0.9, 1.05, 1.2])
     small, large = (np.array([_settled(value, zeta, step) for value in stable_gamma]) for step in (0.01, 1.0))
-    exact = unstable_cycle(gain, *rest, 1.0).force
-    return HarmonicsOfFriction(zeta, gamma, shares, predicted.force, exact, (stable_gamma, small, large))
+    cycles = (
+        ("unstable, SIDF (5.16)", line_only(gamma, predicted.force)),
+        ("unstable, exact", line_only(gamma, unstable_cycle(gain, *rest, 1.0).force)),
+        ("stiction, after a small step", line_only(stable_gamma, small)),
+        ("stiction, after a step of F", line_only(stable_gamma, large)),
+    )
+    amplitude, routh = "amplitude of F_c over F_dynamic [-]", Mark("Routh", 1.0)
+    over = "over the fundamental [%]"
+    return (
+        ThesisPanel("a) harmonics of the velocity", "γ [-]", over, tuple(shares), is_relative=True),
+        ThesisPanel("b) cycles", "γ [-]", amplitude, cycles, "", (routh,), (np.nan, np.nan, 0.0, 20.0)),
+    )
 
 
 def _settled(gamma: float, zeta: float, step: float) -> float:
@@ -142,23 +132,19 @@ def _spectrum(gain: float, zeta: float, frequency: float) -> Numbers:
     return spectrum
 
 
-class KeptContact(NamedTuple):
-    """Largest F_c before a step down over F_des with contact kept, over gamma, for each zeta."""
-
-    zetas: tuple[float, ...]
-    series: tuple[Series, ...]
-
-
-def kept_contact() -> KeptContact:
-    """Closed form, and bisection on the exact response."""
+def kept_contact() -> Panels:
+    """Largest F_c before a step down over F_des with contact kept: closed form, and bisection on the exact response."""
     series = []
     for zeta in CASE.zetas[1:]:
         last = float(gamma_3(zeta))
         gamma = np.linspace(0.75, 0.98 * last, 120)
         points = np.linspace(0.8, 0.95 * last, 7)
         found = np.array([_largest_step_down(value, zeta) for value in points])
-        series.append(Series(gamma, kept_contact_ratio(gamma, zeta), points, found))
-    return KeptContact(CASE.zetas[1:], tuple(series))
+        series.append((f"ζ = {zeta:g}", Series(gamma, kept_contact_ratio(gamma, zeta), points, found)))
+    shown = (0.7, np.nan, 1.0, 9.0)
+    return (
+        ThesisPanel("contact is lost above", "γ [-]", "F_0/F_des [-]", tuple(series), limits=shown, is_relative=True),
+    )
 
 
 def _largest_step_down(gamma: float, zeta: float) -> float:

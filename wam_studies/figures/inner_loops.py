@@ -15,8 +15,7 @@ from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Panels, ThesisPanel
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel
 from wam_studies.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
@@ -134,7 +133,7 @@ def _attenuation() -> ThesisPanel:
         for name, gain in gains.items()
     ]
     title = "a) disturbance at the motor, half of the largest gain"
-    return ThesisPanel(title, "frequency [Hz]", "part that reaches the contact", tuple(lines), "xy")
+    return ThesisPanel(title, "frequency [Hz]", "part that reaches the contact [-]", tuple(lines), "xy")
 
 
 def _largest_gains() -> ThesisPanel:
@@ -148,4 +147,6 @@ def _largest_gains() -> ThesisPanel:
         reference = float(np.interp(1.0, stiffness, line))
         lines.append((loop.name, Series(stiffness, line / reference, some, points / reference)))
     title = "b) largest stable gain, over that of the testbed"
-    return ThesisPanel(title, "stiffness of the cable, over that of the testbed", "", tuple(lines), "xy")
+    return ThesisPanel(
+        title, "stiffness of the cable over that of the testbed [-]", "largest gain over that [-]", tuple(lines), "xy"
+    )

@@ -15,10 +15,10 @@ from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Panels, ThesisPanel, line_only
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel, line_only
 from wam_studies.plant.ideal_testbed import EMPTY
 
+WORST = "worst by statics, "  # label of a bound
 Pushes = list[tuple[tuple[float, ...], Numbers]]
 
 
@@ -128,13 +128,12 @@ def open_loop() -> Panels:
         lines = []
         for share in CASE.force_shares:
             bounds, errors = (_sorted(of, pushes, share) for of in (arm.bound, arm.error))
-            lines.append((f"worst, {100 * share:g} % of that force", Series(bounds, _parts(), errors, _parts())))
+            lines.append((f"{100 * share:g} % of that force", line_only(errors, _parts())))
+            lines.append((f"{WORST}{100 * share:g} %", line_only(bounds, _parts())))
         panels.append(_panel(title, lines))
-    plain, known = (
-        lines[-1][1].plant_x,
-        _sorted(OpenLoopArm(False, CASE.fed_forward).error, pushes, CASE.force_shares[-1]),
-    )
-    both = [("0 % fed forward", line_only(plain, _parts())), ("90 % fed forward", line_only(known, _parts()))]
+    known = _sorted(OpenLoopArm(False, CASE.fed_forward).error, pushes, CASE.force_shares[-1])
+    plain = panels[-1].line(f"{100 * CASE.force_shares[-1]:g} % of that force")
+    both = [("0 % fed forward", plain), ("90 % fed forward", line_only(known, _parts()))]
     return (*panels, _panel("c) feed-forward, 10 % of that force", both))
 
 
@@ -150,15 +149,15 @@ def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, s
 
 
 def _panel(title: str, lines: list[tuple[str, Series]]) -> ThesisPanel:
-    return ThesisPanel(title, "error over the largest steady force [%]", "part of the poses", tuple(lines))
+    return ThesisPanel(title, "error over the largest steady force [%]", "part of the poses [-]", tuple(lines))
 
 
 def table(panels: Panels) -> str:
     """Median and largest error of each case as Markdown."""
     rows = [
-        (panel.title[3:], label.removeprefix("worst, "), *(f"{at(errors):.2g} %" for at in (np.median, np.max)))
+        (panel.title[3:], label, *(f"{at(series.x):.2g} %" for at in (np.median, np.max)))
         for panel in panels
         for label, series in panel.lines
-        for errors in [series.plant_x if len(series.plant_x) else series.x]
+        if not label.startswith(WORST)
     ]
     return markdown(("", "", "median error", "largest error"), rows)

@@ -1,12 +1,61 @@
-"""A figure as data: panels of lines with points of the plant, one function that draws them all."""
+"""A figure as data: panels of lines of theory with points of the plant, their distance, and how they are drawn."""
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike, NDArray
 
-from wam_studies.figures.series import Series
-from wam_studies.figures.style import SHADES, legend, picture, theory_and_plant
+from wam_studies.figures.style import GREY, SHADES, panels
+
+Numbers = NDArray[np.float64]
+
+
+class Series(NamedTuple):
+    """A line, arrays (n,), and the points of the plant that should lie on it, (m,)."""
+
+    x: Numbers
+    y: Numbers
+    plant_x: Numbers = np.zeros(0)
+    plant_y: Numbers = np.zeros(0)
+
+    @property
+    def distance(self) -> float:
+        """Greatest distance of a point from the line, relative to the line's extent in x and y.
+
+        Normal to the line, because on a steep part a small error in x would be a large one in y.
+        """
+        spans = np.array([np.ptp(self.x), np.ptp(self.y)])
+        line = np.transpose([self.x, self.y]) / spans
+        return float(max(_distance(line, point) for point in np.transpose([self.plant_x, self.plant_y]) / spans))
+
+    def relative_distance(self, is_logarithmic: bool) -> float:
+        """Greatest relative difference of a point from the line at its x, which is interpolated on its axis."""
+        plant_x, x = (np.log(self.plant_x), np.log(self.x)) if is_logarithmic else (self.plant_x, self.x)
+        line = np.exp(np.interp(plant_x, x, np.log(self.y)))
+        return float(np.abs(self.plant_y / line - 1.0).max())
+
+    def scaled(self, x: float, y: float) -> "Series":
+        """In other units."""
+        return Series(x * self.x, y * self.y, x * self.plant_x, y * self.plant_y)
+
+
+def _distance(line: Numbers, point: Numbers) -> float:
+    """Of a point from a polyline with corners (n, 2)."""
+    begin, along = line[:-1], np.diff(line, axis=0)
+    lengths = np.maximum(np.sum(along**2, axis=1), 1e-300)
+    fraction = np.clip(np.sum((point - begin) * along, axis=1) / lengths, 0.0, 1.0)
+    return float(np.min(np.linalg.norm(begin + fraction[:, np.newaxis] * along - point, axis=1)))
+
+
+class Mark(NamedTuple):
+    """A point with a name; of a NaN coordinate a line across the panel."""
+
+    text: str
+    x: float = math.nan
+    y: float = math.nan
 
 
 class ThesisPanel(NamedTuple):
@@ -15,8 +64,11 @@ class ThesisPanel(NamedTuple):
     Attributes
     ----------
     title, x, y : texts.
-    lines : label and numbers of each line; NaN or no points where nothing was measured.
+    lines : label and numbers of each line.
     logarithmic : of '', 'x', 'y', 'xy'.
+    marks : what is named in it.
+    limits : lowest and highest x and y that are shown; NaN for those of the lines.
+    is_relative : whether a distance is one over the value of the line; so it is where y is logarithmic.
     """
 
     title: str
@@ -24,41 +76,75 @@ class ThesisPanel(NamedTuple):
     y: str
     lines: tuple[tuple[str, Series], ...]
     logarithmic: str = ""
+    marks: tuple[Mark, ...] = ()
+    limits: tuple[float, float, float, float] = (math.nan,) * 4
+    is_relative: bool = False
 
     @property
     def distance(self) -> float:
-        """Greatest distance of a point from its line; relative to the line's value where y is logarithmic."""
+        """Greatest distance of a point from its line, NaN without points."""
         measured = [series for _, series in self.lines if len(series.plant_x)]
-        return max(_relative(s) if "y" in self.logarithmic else s.distance for s in measured)
+        if "y" in self.logarithmic or self.is_relative:
+            return max((s.relative_distance("x" in self.logarithmic) for s in measured), default=math.nan)
+        return max((series.distance for series in measured), default=math.nan)
 
+    def line(self, label: str) -> Series:
+        """The line of a label."""
+        return dict(self.lines)[label]
 
-def _relative(series: Series) -> float:
-    line = np.exp(np.interp(series.plant_x, series.x, np.log(series.y)))
-    return float(np.abs(series.plant_y / line - 1.0).max())
+    def mark(self, text: str) -> Mark:
+        """The first mark whose text begins so."""
+        return next(mark for mark in self.marks if mark.text.startswith(text))
 
 
 Panels = tuple[ThesisPanel, ...]
 
 
-def distances(panels: Panels) -> dict[str, float]:
+def distances(found: Panels) -> dict[str, float]:
     """Greatest distance of the plant from the lines of each panel that has points, by title."""
-    shown = [panel for panel in panels if any(len(series.plant_x) for _, series in panel.lines)]
-    return {panel.title: panel.distance for panel in shown}
+    return {panel.title: panel.distance for panel in found if not math.isnan(panel.distance)}
 
 
-def line_only(x: object, y: object) -> Series:
+def line_only(x: ArrayLike, y: ArrayLike) -> Series:
     """A line without points."""
-    none = np.zeros(0)
-    return Series(np.asarray(x, dtype=float), np.asarray(y, dtype=float), none, none)
+    return Series(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
 
 
-def draw_panels(panels: Panels, file: Path) -> None:
-    """Draw the panels in a row."""
-    with picture(file, 3.7 * len(panels), 3.0) as figure:
-        for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
-            for (label, series), colour in zip(panel.lines, SHADES[1:] + SHADES[:1], strict=False):
-                theory_and_plant(axes, series, colour, label)
-            axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
-            axes.set_xscale("log" if "x" in panel.logarithmic else "linear")
-            axes.set_yscale("log" if "y" in panel.logarithmic else "linear")
-            legend(axes)
+def draw_panels(found: Panels, file: Path, columns: int = 3) -> None:
+    """Draw the panels row by row."""
+    columns = min(columns, len(found))
+    rows = -(-len(found) // columns)
+    with panels(file, rows, columns, 3.7 * max(columns, 1.4), 2.9 * rows) as (_, axes):
+        for one, panel in zip(axes, found, strict=False):
+            _draw(one, panel)
+        for unused in axes[len(found) :]:
+            unused.set_axis_off()
+
+
+def _draw(axes: Axes, panel: ThesisPanel) -> None:
+    for i, (label, series) in enumerate(panel.lines):
+        colour = SHADES[i % len(SHADES)]
+        axes.plot(series.x, series.y, color=colour, label=label)
+        axes.plot(series.plant_x, series.plant_y, "o", color=colour, markersize=3.4, mfc="none", mew=0.9)
+    for mark in panel.marks:
+        _name(axes, mark)
+    axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
+    axes.set_xscale("log" if "x" in panel.logarithmic else "linear")
+    axes.set_yscale("log" if "y" in panel.logarithmic else "linear")
+    low_x, high_x, low_y, high_y = (None if math.isnan(limit) else limit for limit in panel.limits)
+    axes.set_xlim(low_x, high_x)
+    axes.set_ylim(low_y, high_y)
+    axes.legend()
+
+
+def _name(axes: Axes, mark: Mark) -> None:
+    if math.isnan(mark.y):
+        axes.axvline(mark.x, color=GREY, linewidth=0.7, linestyle=":")
+        across = axes.get_xaxis_transform()
+        axes.text(mark.x, 0.5, mark.text, transform=across, fontsize=7.5, color=GREY, rotation=90, ha="right")
+    elif math.isnan(mark.x):
+        axes.axhline(mark.y, color=GREY, linewidth=0.7, linestyle=":")
+        axes.text(0.6, mark.y, mark.text, transform=axes.get_yaxis_transform(), fontsize=7.5, color=GREY)
+    else:
+        axes.plot(mark.x, mark.y, "s", color=GREY, markersize=4)
+        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=7.5)

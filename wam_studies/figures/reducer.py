@@ -6,8 +6,7 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Panels, ThesisPanel
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel
 from wam_studies.plant.force_response import loop_plant
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
@@ -97,7 +96,9 @@ def _stiffness() -> ThesisPanel:
         line = unit * stiffness_with_reducer(cables.stage_ea[0], length, ratio, shares * length)
         measured = np.array([static_stiffness(line_of(ratio, share)) for share in some])
         lines.append((f"N = {ratio:g}", Series(shares, line, some, measured)))
-    return ThesisPanel("a) reducer part of the way (4.1)", "C/L", "stiffness at the joint [N m/rad]", tuple(lines), "y")
+    return ThesisPanel(
+        "a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", tuple(lines), "y"
+    )
 
 
 def _bandwidth() -> ThesisPanel:
@@ -110,7 +111,7 @@ def _bandwidth() -> ThesisPanel:
         ("at the joint, $N\\sqrt{k_{tr}/J_l}$", Series(ratios, HZ * at_joint, some, HZ * measured[0])),
         ("at the motor, same stress", Series(ratios, HZ * at_motor, some, HZ * measured[1])),
     )
-    return ThesisPanel("b) position bandwidth (4.2)", "ratio N", "[Hz]", lines, "xy")
+    return ThesisPanel("b) position bandwidth (4.2)", "ratio N [-]", "frequency [Hz]", lines, "xy")
 
 
 def _torque() -> ThesisPanel:
@@ -124,5 +125,5 @@ def _torque() -> ThesisPanel:
         measured = RATIO / force_amplitude(arm, some)
         lines.append((label, Series(HZ * frequency, line, HZ * some, measured)))
     return ThesisPanel(
-        "c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest", tuple(lines), "y"
+        "c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", tuple(lines), "y"
     )

@@ -1,15 +1,16 @@
-"""Numbers of figures 5.3, 5.5, 5.9, 5.10 and 5.11: responses to a step of the desired force, theory and plant.
+"""Figures 5.3, 5.5, 5.9, 5.10 and 5.11: responses to a step of the desired force, theory and plant.
 
 Theory is the closed form where there is one, else the exact event-driven motion; the plant is the testbed
 with an ideal motor, k_c = 1464 N m/rad as in section 5.6.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
 from wam_studies.plant.force_response import PlantResponse, force_step
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
 from wam_theory.friction_model import IntegralLoop
@@ -17,41 +18,8 @@ from wam_theory.linear_loop import integral_time_constant, proportional_error, r
 from wam_theory.regimes import gamma_3
 from wam_theory.stick_slip import Kind, Trajectory, inertialess_staircase, simulate
 
-
-class SimpleResponses(NamedTuple):
-    """Figure 5.3: F_c, N m, over time, s, under proportional and under integral control, without friction."""
-
-    proportional: Series
-    integral: Series
-    steady_error: float  # (5.1), N m
-    time_constant: float  # (5.2), s
-
-
-class StaircaseResponse(NamedTuple):
-    """Figure 5.5: F_c and k_tr x_m, N m, over time, s, with stiction; `jumps` is F_c of a node without inertia."""
-
-    force: Series
-    motor: Series
-    jumps: tuple[Numbers, Numbers]
-
-
-class CoulombResponse(NamedTuple):
-    """Figures 5.9 and 5.11: F_c, N m, and x_m, rad, over time, s; and the trajectory (x_m, F_c, velocity), (3, n)."""
-
-    force: Series
-    motor: Series
-    exact: Numbers
-    plant: Numbers
-    gamma: float
-    zeta: float
-
-
-class LostContact(NamedTuple):
-    """Figure 5.10: one period of the settled cycle, velocity, rad/s, over k_c x, N m: F_c above zero, free below."""
-
-    cycle: Series
-    gamma: float
-    zeta: float
+TIME, FORCE, MOTOR = "time [s]", "contact force F_c [N m]", "motor x_m at the joint [rad]"
+EVENLY = 2000  # times at which an exact motion is drawn
 
 
 def _stiffness() -> tuple[float, float, float]:
@@ -68,12 +36,12 @@ def _points(values: Numbers, count: int) -> Numbers:
 
 def _series(found: PlantResponse, plant: Numbers, exact: Trajectory, line: str, count: int) -> Series:
     """Points of the plant with the exact motion, which has a corner at each event."""
-    times = np.union1d(np.linspace(0.0, exact.until, 2000), [event.time for event in exact.events])
+    times = np.union1d(np.linspace(0.0, exact.until, EVENLY), [event.time for event in exact.events])
     return Series(times, getattr(exact.at(times), line), _points(found.time, count), _points(plant, count))
 
 
-def simple_responses() -> SimpleResponses:
-    """Step responses without friction; heavy damping and slow gains make the node nearly inertialess."""
+def simple_responses() -> Panels:
+    """Figure 5.3: no friction; heavy damping and slow gains make the node nearly inertialess."""
     inertia, ktr, natural = _stiffness()
     stiffness, seconds = float(series_stiffness(ktr, CASE.contact)), 1.5
     critical = 2.0 * inertia * natural
@@ -86,16 +54,20 @@ def simple_responses() -> SimpleResponses:
     times = np.linspace(0.0, seconds, 400)
     level = np.array([0.0, CASE.desired - error, CASE.desired - error])
     after = jump.time > 0.1  # s, transient of the inertia
-    return SimpleResponses(
-        Series(np.array([0.0, 0.0, seconds]), level, _points(jump.time[after], 20), _points(jump.force[after], 20)),
-        Series(times, CASE.desired * (1.0 - np.exp(-times / tau)), _points(slow.time, 24), _points(slow.force, 24)),
-        error,
-        tau,
+    corners = np.array([0.0, 0.0, seconds])
+    proportional = Series(corners, level, _points(jump.time[after], 20), _points(jump.force[after], 20))
+    line = CASE.desired * (1.0 - np.exp(-times / tau))
+    integral = Series(times, line, _points(slow.time, 24), _points(slow.force, 24))
+    desired, shown = Mark("F_des", y=CASE.desired), (np.nan, np.nan, 0.0, 1.12 * CASE.desired)
+    constant = Mark("τ = 1/(G_I K)", tau)
+    return (
+        ThesisPanel("a) proportional control", TIME, FORCE, (("(5.1)", proportional),), "", (desired,), shown),
+        ThesisPanel("b) integral control", TIME, FORCE, (("(5.2)", integral),), "", (desired, constant), shown),
     )
 
 
-def staircase() -> StaircaseResponse:
-    """Step response with stiction, with a nearly inertialess node."""
+def staircase() -> Panels:
+    """Figure 5.5: stiction, with a nearly inertialess node; the force of a node without inertia next to it."""
     gain, seconds, friction = 2e-3, 12.0, (6.0, 3.0)
     found = force_step(CASE.stairs, CASE.contact, gain, 24.0, friction, seconds)
     exact = simulate(found.node, IntegralLoop(gain), CASE.stairs, seconds)
@@ -104,45 +76,65 @@ def staircase() -> StaircaseResponse:
     times, forces = steps.times[shown], steps.contact_forces[shown]
     corners = np.concatenate([[0.0], np.repeat(times, 2), [seconds]])
     levels = np.repeat(np.concatenate([[0.0], forces]), 2)
-    ktr = found.node.transmission_stiffness
-    motor = _series(found, found.motor, exact, "x_m", 70)
-    return StaircaseResponse(
-        _series(found, found.force, exact, "contact_force", 70),
-        Series(motor.x, ktr * motor.y, motor.plant_x, ktr * motor.plant_y),
-        (corners, levels),
+    motor = _series(found, found.motor, exact, "x_m", 70).scaled(1.0, found.node.transmission_stiffness)
+    lines = (
+        ("exact", _series(found, found.force, exact, "contact_force", 70)),
+        ("no inertia (5.3), (5.8)", line_only(corners, levels)),
+    )
+    return (
+        ThesisPanel("a) contact force", TIME, FORCE, lines, marks=(Mark("F_des", y=CASE.stairs),)),
+        ThesisPanel("b) motor", TIME, "k_tr x_m [N m]", (("exact", motor),)),
     )
 
 
-def coulomb_response() -> CoulombResponse:
-    """Step response of the inertial node in domain II, friction-dominated: overshoot, stick, a cycle of the motor."""
+class Coulomb(NamedTuple):
+    """Response of figures 5.9 and 5.11, in domain II and friction-dominated: the node sticks after each half cycle."""
+
+    found: PlantResponse
+    exact: Trajectory
+    gamma: float
+    zeta: float
+    seconds: float
+
+
+@cache
+def _coulomb() -> Coulomb:
     gamma, zeta, seconds = 1.5, 0.25, 2.0
     inertia, ktr, natural = _stiffness()
     damping = 2.0 * zeta * inertia * natural
     gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
-    found = force_step(
-        CASE.desired,
-        CASE.contact,
-        gain,
-        damping,
-        (CASE.friction, CASE.friction),
-        seconds,
-        step=5e-5,
+    friction = CASE.friction, CASE.friction
+    found = force_step(CASE.desired, CASE.contact, gain, damping, friction, seconds, step=5e-5)
+    return Coulomb(found, simulate(found.node, IntegralLoop(gain), CASE.desired, seconds), gamma, zeta, seconds)
+
+
+def coulomb_response() -> Panels:
+    """Figure 5.9: overshoot, stick, a cycle of the motor."""
+    found, exact, gamma, zeta, _ = _coulomb()
+    force = ("exact", _series(found, found.force, exact, "contact_force", 90))
+    motor = ("exact", _series(found, found.motor, exact, "x_m", 90))
+    return (
+        ThesisPanel(f"a) γ = {gamma:g}, ζ = {zeta:g}", TIME, FORCE, (force,), marks=(Mark("F_des", y=CASE.desired),)),
+        ThesisPanel("b) motor", TIME, MOTOR, (motor,)),
     )
-    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
-    motion = exact.at(np.union1d(np.linspace(0.0, seconds, 4000), [event.time for event in exact.events]))
+
+
+def trajectory() -> Panels:
+    """Figure 5.11, which the thesis draws in space, as seen along two of its axes."""
+    found, exact, _, _, seconds = _coulomb()
+    motion = exact.at(np.union1d(np.linspace(0.0, seconds, 2 * EVENLY), [event.time for event in exact.events]))
     shown = np.unique(np.geomspace(100.0, len(found.time) - 1.0, 110).astype(int))  # sticking times grow
-    return CoulombResponse(
-        _series(found, found.force, exact, "contact_force", 90),
-        _series(found, found.motor, exact, "x_m", 90),
-        np.array([motion.x_m, motion.contact_force, motion.v]),
-        np.array([a[shown] for a in (found.motor, found.force, found.velocity)]),
-        gamma,
-        zeta,
+    force = Series(motion.x_m, motion.contact_force, found.motor[shown], found.force[shown]).scaled(1e3, 1.0)
+    speed = Series(motion.x_m, motion.v, found.motor[shown], found.velocity[shown]).scaled(1e3, 1.0)
+    motor = "motor x_m at the joint [mrad]"
+    return (
+        ThesisPanel("a) along the velocity", motor, FORCE, (("exact", force),)),
+        ThesisPanel("b) along the force", motor, "velocity of the link [rad/s]", (("exact", speed),)),
     )
 
 
-def lost_contact() -> LostContact:
-    """The limit cycle of an unstable loop whose environment cannot pull."""
+def lost_contact() -> Panels:
+    """Figure 5.10: one period of the settled cycle of an unstable loop whose environment cannot pull."""
     zeta = 0.25
     gamma = 1.15 * float(gamma_3(zeta))
     inertia, ktr, natural = _stiffness()
@@ -160,4 +152,6 @@ def lost_contact() -> LostContact:
         _points(CASE.contact * found.position[late], 60),
         _points(found.velocity[late], 60),
     )
-    return LostContact(cycle, gamma, zeta)
+    axes = "k_c x, above 0 the contact force [N m]", "velocity of the link [rad/s]"
+    marks = Mark("contact begins", 0.0), Mark("F_des", CASE.desired, 0.0)
+    return (ThesisPanel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, (("exact", cycle),), marks=marks),)

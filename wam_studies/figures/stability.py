@@ -1,15 +1,13 @@
-"""Numbers of figures 5.7 and 5.8: describing function and stability map, theory and plant.
+"""Figures 5.7 and 5.8: describing function and stability map, theory and plant.
 
 Dimensionless: frequency in sqrt((k_tr + k_c)/J_l), G times b, so that the figures hold for every node with
 their zeta and k_tr = k_c; the plant is the testbed with a contact and a damping for this zeta.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.series import Numbers, Series
+from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
 from wam_studies.plant.force_response import force_step, loop_arm, loop_node, loop_plant
 from wam_studies.plant.ideal_testbed import RATIO
 from wam_theory.describing_function import friction_to_velocity
@@ -19,33 +17,6 @@ from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 
 
-class DescribingFunction(NamedTuple):
-    """Figure 5.7: b G(j omega) in the complex plane, one for each gamma.
-
-    -1/N(A) is the negative real axis, b/N(A) = pi/4 b A/F_friction. `crossing` is the intersection of the
-    second curve with it; `frequency` has omega of the lines, `plant_frequency` that of the points.
-    """
-
-    gammas: tuple[float, ...]
-    curves: tuple[Series, ...]
-    crossing: float
-
-
-class StabilityBound(NamedTuple):
-    """Figure 5.8: F_friction/F_error of the bound over gamma, Coulomb and with stiction; points of the plant.
-
-    `predicted` is the bound by (5.16): F_error is that of the unstable cycle; `gamma_3` is the start of
-    domain III, `point_b` its ordinate.
-    """
-
-    zeta: float
-    bound: Series
-    with_stiction: tuple[Numbers, Numbers]
-    gamma_3: float
-    point_b: float
-    others: tuple[tuple[float, Numbers, Numbers], ...]  # zeta, gamma, F_friction/F_error
-
-
 def _testbed(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> FrictionNode:
     """Node of the testbed with k_c = k_tr and this zeta."""
     stiffness = loop_node(loop_arm(0.0, friction), 1.0).transmission_stiffness
@@ -53,19 +24,24 @@ def _testbed(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> Frictio
     return loop_node(loop_arm(2.0 * zeta * float(np.sqrt(2.0 * stiffness * bare.inertia)), friction), stiffness)
 
 
-def describing_function() -> DescribingFunction:
-    """Theory, and the plant's frequency response from its one-step map."""
+def describing_function() -> Panels:
+    """Figure 5.7: b G(j omega) in the complex plane, of theory and of the plant's one-step map.
+
+    -1/N(A) is the negative real axis, b/N(A) = pi/4 b A/F_friction.
+    """
     node = _testbed(CASE.unity_zeta)
     natural = float(np.sqrt(2.0 * node.contact_stiffness / node.inertia))
     omega, points = np.geomspace(0.05, 30.0, 4000), np.array([0.3, 0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0])
-    curves = []
+    curves = [("-b/N(A)", line_only([-4.4, 0.0], [0.0, 0.0]))]
     for gamma in CASE.gammas:
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
         gain = gamma * float(routh_gain(node.inertia, node.damping, ktr, kc))
         line = node.damping * friction_to_velocity(1j * natural * omega, gain, node.inertia, node.damping, ktr, kc)
         plant = node.damping * _measured_response(node, gain, natural * points)
-        curves.append(Series(line.real, line.imag, plant.real, plant.imag))
-    return DescribingFunction(CASE.gammas, tuple(curves), -1.0 / (CASE.gammas[1] - 1.0))
+        curves.append((f"b G(jω), γ = {gamma:g}", Series(line.real, line.imag, plant.real, plant.imag)))
+    cycle = Mark("unstable limit cycle (5.16)", -1.0 / (CASE.gammas[1] - 1.0), 0.0)
+    axes = "real part of b G [-]", "imaginary part of b G [-]"
+    return (ThesisPanel("ζ = 0.25", *axes, tuple(curves), marks=(cycle,), limits=(-4.4, 2.9, -2.1, 3.1)),)
 
 
 def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
@@ -88,27 +64,33 @@ def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbe
     return np.array(responses)
 
 
-def stability_bound() -> StabilityBound:
-    """The bound by exact events, and by bisection on the simulated plant."""
+def stability_bound() -> Panels:
+    """Figure 5.8: F_friction/F_error of the bound over gamma, by exact events and by bisection on the plant."""
     last = float(gamma_3(CASE.unity_zeta))
     gamma = 1.0 + np.geomspace(1e-3, last * (1.0 - 1e-6) - 1.0, 300)
     stiction_gamma = np.linspace(1.0005, last, 300)
     steps = largest_stable_steps(stiction_gamma, CASE.unity_zeta, 1.0, CASE.stiction)
     held = steps > 0.0
     plant = np.array([1.0 / plant_largest_step(value) for value in CASE.plant_gammas])
-    others = []
+    bound = Series(gamma, 1.0 / largest_stable_steps(gamma, CASE.unity_zeta), np.array(CASE.plant_gammas), plant)
+    stiction = line_only(stiction_gamma[held], 1.0 / steps[held])
+    lines = [
+        (f"ζ = {CASE.unity_zeta:g}, Coulomb friction", bound),
+        (f"the same, F_static = {CASE.stiction:g} F_dynamic", stiction),
+    ]
     for zeta in (0.15, 0.5, 1.0):
         end = float(gamma_3(zeta))
         along = 1.0 + np.geomspace(1e-3, end * (1.0 - 1e-6) - 1.0, 200)
-        others.append((zeta, along, 1.0 / largest_stable_steps(along, zeta)))
-    return StabilityBound(
-        CASE.unity_zeta,
-        Series(gamma, 1.0 / largest_stable_steps(gamma, CASE.unity_zeta), np.array(CASE.plant_gammas), plant),
-        (stiction_gamma[held], 1.0 / steps[held]),
-        last,
-        float(point_b(CASE.unity_zeta)),
-        tuple(others),
+        lines.append((f"ζ = {zeta:g}", line_only(along, 1.0 / largest_stable_steps(along, zeta))))
+    marks = (
+        Mark("Routh (5.15)", 1.0),
+        Mark("A", 1.0, 0.0),
+        Mark("B", last, float(point_b(CASE.unity_zeta))),
+        Mark("B with stiction", float(stiction.x[-1]), float(stiction.y[-1])),
     )
+    axes = "gain γ = J_l G_I K/b [-]", "F_friction/F_error [-]"
+    panel = ThesisPanel("k_tr = k_c", *axes, tuple(lines), "", marks, (0.2, 2.6, 0.0, 2.2), is_relative=True)
+    return (panel,)
 
 
 def plant_largest_step(gamma: float, zeta: float = CASE.unity_zeta, step: float = 6e-5) -> float:

@@ -6,7 +6,7 @@ has a rotor of practically infinite inertia.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -52,6 +52,11 @@ class PlantCurve(NamedTuple):
         return float(np.abs(self.plant - self.theory).max() / np.abs(self.theory).max())
 
 
+def level(plant: float, theory: float) -> PlantCurve:
+    """A single number."""
+    return PlantCurve(np.zeros(1), np.array([plant]), np.array([theory]))
+
+
 class Resonance(NamedTuple):
     """Both resonances over contact stiffness, for one transmission ratio, rad/s."""
 
@@ -66,31 +71,28 @@ def _run(plant: Plant, seconds: float) -> None:
 
 
 def slack() -> PlantCurve:
-    """Torque of a circuit over its stretch, beyond the slack of the loose strand."""
-    arm = ideal_testbed()
-    plant = released_plant(arm, slack=True)
-    (circuit,) = arm.circuits
+    """Torque of a circuit over its stretch, rad and N m, beyond the slack of the loose strand."""
+    (circuit,) = ideal_testbed().circuits
     stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
-    torques = []
-    for value in stretch:
-        plant.data.qpos[:] = (value, 0.0)
-        mujoco.mj_forward(plant.model, plant.data)
-        torques.append(plant.circuit_torque[0])
     theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
-    return PlantCurve(stretch, np.array(torques), theory)
+    return PlantCurve(stretch, _stretched(stretch, slack=True), theory)
 
 
 def backlash(play: float = 0.04) -> PlantCurve:
     """Torque of a circuit with backlash over its stretch, rad and N m."""
-    arm = ideal_testbed()
-    plant = released_plant(arm, backlash=(play,))
     stretch = np.linspace(-2.5, 2.5, 101) * play
-    torques = []
+    theory = play_torque(stretch, ideal_testbed().circuits[0].stiffness, play)
+    return PlantCurve(stretch, _stretched(stretch, backlash=(play,)), theory)
+
+
+def _stretched(stretch: Numbers, **effects: Any) -> Numbers:
+    """Torques of the circuit of a plant with these effects, N m, its link at rest."""
+    plant, torques = released_plant(ideal_testbed(), **effects), []
     for value in stretch:
         plant.data.qpos[:] = (value, 0.0)
         mujoco.mj_forward(plant.model, plant.data)
         torques.append(plant.circuit_torque[0])
-    return PlantCurve(stretch, np.array(torques), play_torque(stretch, arm.circuits[0].stiffness, play))
+    return np.array(torques)
 
 
 def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> PlantCurve:
@@ -240,40 +242,18 @@ def surface(hardening: float) -> PlantCurve:
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
 
 
-class ResponseComparison(NamedTuple):
-    """Step response of integral force control over time: force F_c and motor position, plant and exact."""
-
-    force: PlantCurve
-    motor: PlantCurve
-
-
-def step_response(friction: tuple[float, float], damping: float, gain: float, seconds: float) -> ResponseComparison:
-    """Response of the testbed to a step of 20 N m, and the exact motion.
-
-    The motor is an ideal velocity source, the loop is closed in every step.
-
-    Parameters
-    ----------
-    friction : static and dynamic, at the joint, N m.
-    damping : b at the joint, N m s/rad.
-    gain : G_I, rad/s/(N m).
-    seconds : duration.
-    """
-    found = force_step(20.0, 1464.28, gain, damping, friction, seconds)
-    exact = simulate(found.node, IntegralLoop(gain=gain), 20.0, seconds).at(found.time)
-    return ResponseComparison(
-        PlantCurve(found.time, found.force, exact.contact_force), PlantCurve(found.time, found.motor, exact.x_m)
-    )
-
-
 def stiction_cycle() -> PlantCurve:
     """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
-    return step_response((6.0, 4.0), damping=12.0, gain=2e-2, seconds=8.0).force
+    found = force_step(20.0, 1464.28, 2e-2, 12.0, (6.0, 4.0), 8.0)
+    exact = simulate(found.node, IntegralLoop(2e-2), 20.0, 8.0)
+    return PlantCurve(found.time, found.force, exact.at(found.time).contact_force)
 
 
 def actuator_cycle() -> PlantCurve:
     """Motor position of a force loop with Coulomb friction, (5.20), rad over s; domain I, above gamma_b."""
-    return step_response((6.0, 6.0), damping=18.7, gain=4.3e-2, seconds=6.0).motor
+    found = force_step(20.0, 1464.28, 4.3e-2, 18.7, (6.0, 6.0), 6.0)
+    exact = simulate(found.node, IntegralLoop(4.3e-2), 20.0, 6.0)
+    return PlantCurve(found.time, found.motor, exact.at(found.time).x_m)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:

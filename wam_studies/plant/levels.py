@@ -1,7 +1,6 @@
 """Single numbers of the plant's effects, measured on the simulated plant and computed from theory."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.sensors import Encoders
-from wam_studies.plant.effects import breakaway, torque_loop, torque_loop_response
+from wam_studies.plant.effects import PlantCurve, breakaway, level, torque_loop, torque_loop_response
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     STEP,
@@ -22,43 +21,31 @@ from wam_studies.plant.ideal_testbed import (
 from wam_theory.backlash_cycle import exact_cycle
 
 
-class MeasuredLevel(NamedTuple):
-    """One number of the plant, and of theory."""
-
-    plant: float
-    theory: float
-
-    @property
-    def error(self) -> float:
-        """Relative difference."""
-        return abs(self.plant / self.theory - 1.0)
-
-
-def tension_friction(coefficient: float = 1e-4) -> MeasuredLevel:
+def tension_friction(coefficient: float = 1e-4) -> PlantCurve:
     """Breakaway torque of the motor with friction proportional to the tension of both strands, c (T1 + T2), (6.5)."""
     arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
     plant = released_plant(arm, tension_friction=(coefficient,))
-    return MeasuredLevel(breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
+    return level(breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
 
 
-def added_friction() -> MeasuredLevel:
+def added_friction() -> PlantCurve:
     """Breakaway torque of the joint with an added Coulomb friction of 0.7 N m, motor free."""
     plant = released_plant(ideal_testbed(friction=(0.3, 0.3)))
     plant.set_added_friction((0.7,))
-    return MeasuredLevel(breakaway(plant, True, 0.9), 1.0)
+    return level(breakaway(plant, True, 0.9), 1.0)
 
 
-def circuit_damping() -> MeasuredLevel:
+def circuit_damping() -> PlantCurve:
     """Decay rate of the link against a motor at rest, s^-1: N^2 d/(2 J)."""
     damping = 0.02
     arm = ideal_testbed(rotor=IMMOVABLE, damping=damping)
     values = np.linalg.eigvals(one_step_map(released_plant(arm)))
     swinging = values[np.abs(values.imag) > 1e-6][0]
     inertia = link_inertia(arm)
-    return MeasuredLevel(-float(np.log(np.abs(swinging))) / STEP, 14.0**2 * damping / (2.0 * inertia))
+    return level(-float(np.log(np.abs(swinging))) / STEP, 14.0**2 * damping / (2.0 * inertia))
 
 
-def heating(overload: float = 2.0) -> MeasuredLevel:
+def heating(overload: float = 2.0) -> PlantCurve:
     """Time until an overload of the continuous torque is limited, s: T ln(r^2/(r^2 - 1))."""
     configuration = Configuration.load(packaged("testbed"))
     parameters = configuration.node("driver", DriverParameters).amplifier
@@ -66,22 +53,22 @@ def heating(overload: float = 2.0) -> MeasuredLevel:
     command, ticks = overload * amplifier.continuous[0], 0
     while amplifier.step([command], 1e-3)[0] == command:
         ticks += 1
-    return MeasuredLevel(ticks * 1e-3, parameters.thermal_time * float(np.log(overload**2 / (overload**2 - 1.0))))
+    return level(ticks * 1e-3, parameters.thermal_time * float(np.log(overload**2 / (overload**2 - 1.0))))
 
 
-def noise(sd: float = 1e-3) -> MeasuredLevel:
+def noise(sd: float = 1e-3) -> PlantCurve:
     """Standard deviation of 20 000 readings of a motor encoder, rad."""
     encoders = Encoders([0.0], [sd], np.random.default_rng(1))
     readings = [encoders.read([0.0], [0.0], 1e-3)[0][0] for _ in range(20_000)]
-    return MeasuredLevel(float(np.std(readings)), sd)
+    return level(float(np.std(readings)), sd)
 
 
-def torque_cycle(hertz: float = 477.0) -> MeasuredLevel:
+def torque_cycle(hertz: float = 477.0) -> PlantCurve:
     """Torque of the cycle by backlash in a torque loop, peak to peak, N m (2.2)."""
-    return MeasuredLevel(mean_cycle(*torque_loop_response(hertz)).peak_to_peak, exact_cycle(torque_loop(hertz)).torque)
+    return level(mean_cycle(*torque_loop_response(hertz)).peak_to_peak, exact_cycle(torque_loop(hertz)).torque)
 
 
-LEVELS: dict[str, Callable[[], MeasuredLevel]] = {
+LEVELS: dict[str, Callable[[], PlantCurve]] = {
     "friction by tension, breakaway": tension_friction,
     "added friction, breakaway": added_friction,
     "damping of the circuit, decay": circuit_damping,

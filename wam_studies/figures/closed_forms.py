@@ -1,0 +1,98 @@
+"""Figures of closed forms: 3.1, 4.9, efficiency (6.15) and creep (6.19) of chapter 6."""
+
+import numpy as np
+
+from wam_studies.figures.panels import Mark, Panels, Series, ThesisPanel, line_only
+from wam_studies.plant.effects import creep_out_and_back, efficiency_under_load, resonances
+from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
+from wam_theory.cable import efficiency, stage_loss
+from wam_theory.requisites import largest_cylinder, secure_angle, useful_length
+from wam_theory.resonance import (
+    best_contact_stiffness,
+    force_resonances,
+    hard_contact_bandwidth,
+    matched_ratio,
+    small_ratio_resonances,
+)
+from wam_theory.tension_element import equal_stages_efficiency
+
+HZ = 0.5 / np.pi
+
+
+def grasp() -> Panels:
+    """Useful length (3.2) and largest cylinder (3.3) over the aspect ratio, for coefficients of friction."""
+    ratio, aspect = np.geomspace(1.5, 40.0, 200), "aspect ratio L/W [-]"
+    length, diameter = [], []
+    for mu in (0.2, 0.4, 0.6):
+        length.append((f"μ = {mu:g}", line_only(ratio, useful_length(ratio, secure_angle(mu)))))
+        diameter.append((f"μ = {mu:g}", line_only(ratio, largest_cylinder(ratio, mu))))
+    return (
+        ThesisPanel("useful length of a link (3.2)", aspect, "L'/L [-]", tuple(length), "x"),
+        ThesisPanel("largest cylinder (3.3)", aspect, "D/L [-]", tuple(diameter), "x"),
+    )
+
+
+def breakpoints() -> Panels:
+    """Frequencies of (4.4) of the testbed of 4.3.2, those of the plant of its one-step map; limits; several N."""
+    arm = ideal_testbed()
+    inertias = float(arm.motors.inertia[0]), link_inertia(arm)
+    stiffness = arm.circuits[0].stiffness
+    crossover = float(best_contact_stiffness(*inertias, stiffness))
+    asymptote = float(hard_contact_bandwidth(inertias[0], stiffness))
+    lines, points = crossover * np.geomspace(1e-3, 1e2, 301), crossover * np.geomspace(1.2e-3, 10.0, 14)
+    both, measured = force_resonances(*inertias, stiffness, lines, RATIO), resonances(RATIO, points)
+    lower = Series(lines, both.lower, points, measured.lower.plant).scaled(1.0, HZ)
+    upper = Series(lines, both.upper, points, measured.upper.plant).scaled(1.0, HZ)
+    simple = small_ratio_resonances(*inertias, stiffness, lines)
+    limits = (
+        ("ω₁, N = 14 (4.4)", lower),
+        ("√(k_c/J_l) (4.7)", line_only(lines, HZ * simple.link_on_contact)),
+        ("√(k_tr/J_m) (4.7)", line_only(lines, HZ * simple.rotor_on_cable)),
+    )
+    matched, family = float(matched_ratio(*inertias)), []
+    for ratio in (RATIO / 4.0, RATIO, 0.4 * matched, matched, 3.0 * matched):
+        exact = force_resonances(*inertias, stiffness, lines, ratio).lower
+        plant = resonances(ratio, points).lower.plant
+        one = Series(lines, exact, points, plant).scaled(1.0 / crossover, 1.0 / asymptote)
+        family.append((f"N = {ratio / matched:.2g} N_m", one))
+    axes, shown = ("contact stiffness at the joint [N m/rad]", "frequency [Hz]"), (np.nan, np.nan, 1.0, 2e3)
+    marks = (Mark("(4.9)", crossover),)
+    return (
+        ThesisPanel("a) breakpoints (4.4)", *axes, (("ω₁", lower), ("ω₂", upper)), "xy", marks, shown),
+        ThesisPanel("b) the approximation for small N", *axes, limits, "xy", marks, shown),
+        ThesisPanel(
+            f"c) several N, N_m = {matched:.4g}",
+            "contact stiffness over that of (4.9) [-]",
+            "ω₁ over its asymptote (4.6) [-]",
+            tuple(family),
+            "xy",
+            limits=(np.nan, np.nan, 7e-3, 1.5),
+        ),
+    )
+
+
+def efficiencies() -> Panels:
+    """Upper bound (6.15): the testbed over torque and the plant in slow motion; equal stages over the tension."""
+    cables, found = ideal_testbed().cables, efficiency_under_load()
+    torques = np.linspace(0.0, 7.5, 60)
+    line = [
+        efficiency(stage_loss(t, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
+        for t in torques
+    ]
+    strain = np.linspace(0.0, 0.03, 60)
+    equal = [(f"n = {n}", line_only(1e2 * strain, equal_stages_efficiency(strain, 1.0, float(n)))) for n in range(1, 7)]
+    testbed, power = Series(torques, np.array(line), found.x, found.plant), "power out over power in [-]"
+    return (
+        ThesisPanel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
+        ThesisPanel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),
+    )
+
+
+def creep() -> Panels:
+    """Creep (6.19) under a constant load of 40 N m, the motor going out and back."""
+    found = creep_out_and_back()
+    each = max(1, len(found.x) // 30)
+    line = Series(found.x, found.theory, found.x[::each], found.plant[::each]).scaled(1.0, 1e3)
+    back = Mark("motor reverses", float(found.x[-1]) / 2.0)
+    axes = "absolute travel of the motor [rad]", "creep of the link [mrad]"
+    return (ThesisPanel("creep, out and back", *axes, (("(6.19)", line),), marks=(back,)),)
