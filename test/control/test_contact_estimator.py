@@ -21,7 +21,7 @@ from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State
+from wam_description.signals import ForceCommand, State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
@@ -489,10 +489,8 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
             for _ in range(SUBSTEPS):
                 arm.step(ZERO)
             sense(estimator, arm, ZERO)
-        found[name] = (estimator.estimate(), estimator.tare(), estimator.estimate())
-    before, reason, _ = found["none"]
-    assert before.in_contact
-    assert "observer.payload" in reason
+        found[name] = (estimator.estimate(), estimator.zero(), estimator.estimate())
+    assert found["none"][0].in_contact
     before, reason, after = found["declared"]
     assert not before.in_contact
     assert reason == ""
@@ -516,7 +514,7 @@ def test_from_the_motors_a_payload_is_tracked_and_not_tared() -> None:
         if tick % OUTER == 0:
             estimator.estimate()
     before = estimator.estimate()
-    assert "the payload is tracked while the arm moves: 0.3" in estimator.tare()
+    assert "the payload is tracked while the arm moves: 0.3" in estimator.zero()
     assert estimator.estimate().external_torques == before.external_torques
 
 
@@ -576,3 +574,21 @@ def test_the_analysis_of_a_bag_has_the_tracked_friction(tmp_path: Path) -> None:
         assert 0.5 * level < finding.measured < 1.5 * level
         assert "since the start" in finding.note
         assert f"joint4: friction in {way} motion" in found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+def test_as_a_force_begins_the_estimator_takes_the_zero_of_the_force_loop(feedback: str) -> None:
+    """What the loop measures by the estimate must not be zeroed twice."""
+    given = CONFIGURATION.with_values(
+        {"driver:mismatch.payload": 0.02, "force_loop:feedback": feedback, "force_loop:guard.mode": "warn"}
+    )
+    command = ForceCommand("base", (0.0, 0.0, 3.0))
+    run = Simulation(given, [ScenarioStep("release", 0.6, request="enable"), ScenarioStep("press", 0.2, force=command)])
+    while len(run.played) < 2:
+        run.step()
+    before = np.abs(run.estimate.external_torques).max()
+    run.play()
+    is_zeroed = feedback == "joint_sensors"
+    assert np.any(run.rows["external_torque_zero"][-1].values) == is_zeroed
+    assert (np.abs(run.estimate.external_torques).max() < 0.5 * before) == is_zeroed

@@ -1,6 +1,7 @@
 """The errors of the model: learned without contact, frozen in contact, their covariance that of the errors."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from wam_control.contact.model_errors import ModelErrors, Observation
 from wam_control.contact.model_prior import ModelPrior, model_prior
 from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.thresholds import CONTACT
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
 TRUE = np.array([0.3, -0.2, 0.1])
@@ -248,7 +251,53 @@ def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they
     least = np.diag([0.02**2] * 3 + [0.0] * 3)
     assert prior.covariance[np.ix_(at, at)] == pytest.approx(rows @ covariance @ rows.T + least)
     assert prior.errors[at] == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.0, 0.0])
-    others = np.delete(np.arange(len(prior.names)), at)
+    centres = [i for i, name in enumerate(prior.names) if name.startswith("centre")]
+    assert not prior.covariance[centres].any(), "they are identified with the torques"
+    others = np.delete(np.arange(len(prior.names)), at + centres)
     wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
     assert np.array_equal(prior.covariance[np.ix_(others, others)], wide.covariance[np.ix_(others, others)])
     assert not prior.covariance[np.ix_(at, others)].any()
+
+
+def rest_at(arm: Arm, observer: MomentumObserver, q: Sequence[float]) -> float:
+    """The detection statistic of an arm that rests without contact, by its joint sensors."""
+    observer.reset()
+    for _ in range(150):
+        observer.observe(State(list(q), [0.0] * 4, RigidBody(arm).gravity_torque(q).tolist()), 1e-3)
+    torques, covariance = observer.torques()
+    return float(torques @ np.linalg.solve(covariance, torques))
+
+
+def test_centres_of_mass_that_are_off_are_no_contact_and_a_zero_holds_in_other_poses() -> None:
+    """Of 24 poses of a free arm with centres off by 5 mm; without the prior a contact in most of them."""
+    own = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
+    random = np.random.default_rng(0)
+    centre = np.array(WAM.links.centre) + 0.005 * random.standard_normal(12)
+    arm = dataclasses.replace(WAM, links=dataclasses.replace(WAM.links, centre=tuple(centre.tolist())))
+    poses = random.uniform([-1.5, -1.6, -1.5, 0.2], [1.5, 1.2, 1.5, 2.4], (24, 4))
+    exact = dataclasses.replace(own.observer, mass_scale=(1.0,) * 4)
+    found, sds = {}, {}
+    for name, sd in (("prior", 0.005), ("none", 0.0)):
+        observer = MomentumObserver(WAM, dataclasses.replace(exact, centre_uncertainty=sd), True)
+        found[name] = [rest_at(arm, observer, q) > own.detect for q in poses]
+        sds[name] = observer.torques()[1].trace()
+    assert sum(found["prior"]) == 0
+    assert sum(found["none"]) > 5
+    zeroed = MomentumObserver(WAM, exact, True)
+    rest_at(arm, zeroed, poses[0])
+    assert [zeroed.zero(), zeroed.zero()] == ["", ""]
+    assert [rest_at(arm, zeroed, q) > own.detect for q in poses] == [False] * 24
+    assert sds["none"] < zeroed.torques()[1].trace() < 0.9 * sds["prior"], "a zero makes what is left more certain"
+
+
+def test_a_zero_in_the_same_pose_takes_the_place_of_the_one_before() -> None:
+    own = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+    once, often = (MomentumObserver(WAM, own, True) for _ in range(2))
+    for observer, times in ((once, 1), (often, 20)):
+        rest_at(WAM, observer, (0.2, -1.05, 0.3, 0.5))
+        for _ in range(times):
+            assert observer.zero() == ""
+    np.testing.assert_array_equal(once.torques()[1], often.torques()[1])
+    moving = State([0.2, -1.05, 0.3, 0.5], [0.1, 0.0, 0.0, 0.0], [0.0] * 4)
+    once.observe(moving, 1e-3)
+    assert "the arm moves" in once.zero()

@@ -24,6 +24,7 @@ EXACT = dataclasses.replace(NOMINAL, mass_scale=(1.0,) * 4, friction_scale=1.0, 
 KNOWN = dataclasses.replace(
     EXACT,
     mass_uncertainty=0.0,
+    centre_uncertainty=0.0,
     moving_uncertainty=0.0,
     asymmetry_uncertainty=0.0,
     load_uncertainty=0.0,

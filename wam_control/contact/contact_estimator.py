@@ -152,9 +152,9 @@ class ContactEstimator:
         """Set whether brakes hold the motors, whose torques then carry no information."""
         self._is_blind = on and not self._parameters.use_joint_sensors
 
-    def tare(self) -> str:
-        """Identify the payload, within the declared range, from the present torques; '' or why that is not possible."""
-        return self._observer.identify_payload()
+    def zero(self) -> str:
+        """Take the present torques of joint sensors as those of an arm at rest that nothing touches; '' or why not."""
+        return self._observer.zero()
 
     def reset(self) -> None:
         """Forget all samples."""

@@ -1,5 +1,6 @@
 """Node `contact_estimator`: what touches the arm, where, how hard, with what uncertainty."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
@@ -41,7 +42,9 @@ class ContactEstimatorNode:
         self._warned = ""
         self._doubted, self._second = 0.0, -1
         commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
-        self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors"})
+        zero = "external_torque_zero"  # of joint sensors, which show the weight of the arm
+        self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors", zero})
+        self._zero: Sequence[float] = ()
         self.estimate = self._estimator.estimate()
 
     @reaction(
@@ -49,6 +52,7 @@ class ContactEstimatorNode:
         Input("joint_sensors", absent="zero"),
         Input("force_command", age="command", answers=True),
         Input("task_command", age="command", answers=True),
+        Input("external_torque_zero", "effort", answers=True),
         outputs=(
             "external_joint_torques",
             "external_joint_torques_sd",
@@ -66,6 +70,7 @@ class ContactEstimatorNode:
         if not self._timing.is_outer(inputs.stamp):
             return {}
         self._observe()
+        self._follow_zero(inputs["external_torque_zero"])
         self.estimate = estimate = self._estimator.estimate(_is_pressing(inputs))
         frame = estimate.link or BASE
         outputs: dict[str, Any] = {
@@ -92,6 +97,12 @@ class ContactEstimatorNode:
             outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)
         return outputs
 
+    def _follow_zero(self, zero: State | None) -> None:
+        """Zero as the force loop does: as it is tared, and as a force begins at rest."""
+        if zero is not None and any(zero.effort) and zero.effort != self._zero:
+            self._zero = zero.effort
+            self._estimator.zero()
+
     def _observe(self) -> None:
         """Observe the samples since the last time: together a third faster than one by one between other nodes."""
         for motor, sensors, dt in self._samples:
@@ -112,10 +123,10 @@ class ContactEstimatorNode:
             self._estimator.brake((status.mode or ENABLED) != ENABLED)
 
     def tare(self) -> Answer:
-        """Identify the payload from the present external torques."""
+        """Take the present torques as those of an arm at rest that nothing touches."""
         self._observe()
-        reason = self._estimator.tare()
-        return Answer(not reason, reason or "the payload has been identified from the present external torques")
+        reason = self._estimator.zero()
+        return Answer(not reason, reason or "masses, centres of mass and payload are known better from these torques")
 
 
 def _is_pressing(inputs: Inputs) -> bool:

@@ -104,6 +104,27 @@ class ModelErrors:
         covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + self._noise_of(seen)
         return seen.residual - effects.dot(self.errors), covariance
 
+    def zero(self, seen: Observation) -> None:
+        """Take a moment at rest as one of an arm that nothing touches.
+
+        Another one in the same pose has the same errors of the gauges: it takes the place of the one before.
+        """
+        if self._elsewhere is None or np.abs(seen.pose - self._at).max() > CONTACT.pose_change:
+            self._elsewhere = self.errors, self.covariance
+        self.errors, self.covariance = self._elsewhere
+        self._at = seen.pose
+        innovation, covariance = self.corrected(seen)
+        self._take(innovation, covariance, seen)
+
+    def _take(self, innovation: Array, covariance: Array, seen: Observation) -> None:
+        """Learn from an innovation, (n,), N m, by its covariance, (n, n)."""
+        gain_torques = self.covariance @ seen.effects.T
+        gain = np.linalg.solve(covariance, gain_torques.T).T
+        self.errors = self.errors + gain @ innovation
+        corrected = self.covariance - gain @ gain_torques.T
+        self.covariance = 0.5 * (corrected + corrected.T)
+        self.beyond = self._beyond()
+
     def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
@@ -185,13 +206,8 @@ class ModelErrors:
         # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
         self.noise += rate * seen.moving * (at_motors * at_motors - known - self.noise)
         self.noise = np.maximum(0.0, self.noise)
-        gain_torques = self.covariance @ seen.effects.T
-        coloured = covariance + (CONTACT.correlated - 1.0) * (covariance - seen.effects @ gain_torques)
-        gain = np.linalg.solve(coloured, gain_torques.T).T
-        self.errors += gain @ innovation
-        self.covariance -= gain @ gain_torques.T
-        self.covariance = 0.5 * (self.covariance + self.covariance.T)
-        self.beyond = self._beyond()
+        rest = covariance - seen.effects @ (self.covariance @ seen.effects.T)
+        self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
 
     def _beyond(self) -> list[str]:
         excess = np.abs(self.errors) - CONTACT.sure * np.sqrt(self.covariance.diagonal())

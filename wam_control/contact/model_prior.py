@@ -16,14 +16,14 @@ WAYS = ("positive", "negative")
 
 
 class ModelPrior(NamedTuple):
-    """Errors of the model: friction in positive, then in negative motion; masses; load; constants; delay; payload.
+    """Errors: friction in positive, then in negative motion; masses; load; constants; centres; delay; payload.
 
     Friction and its share of the load are those of motors, then joints.
 
     Attributes
     ----------
     names : of the k errors.
-    errors : (k,), friction per dynamic friction, delay in s, payload in kg, the others per torque.
+    errors : (k,), friction per dynamic friction, centres in m, delay in s, payload in kg, the others per torque.
     covariance : (k, k).
     limit : (k,), largest variances.
     tolerable : (k,), errors above which the model is off.
@@ -60,6 +60,7 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
                 *[given.load_uncertainty] * n,
                 *np.where(driven_by > 1, given.load_uncertainty, 0.0),
                 *[given.torque_scale_uncertainty] * n,
+                *[given.centre_uncertainty] * (3 * n),
                 given.torque_delay_uncertainty,
                 payload_sd,
             ]
@@ -73,13 +74,34 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
     shafts = [*motors, *joints]
     names = (
         *(friction_error(name, way) for way in WAYS for name in shafts),
-        *(f"masses at {name}" for name in joints),
+        *_masses(arm),
         *map(load_error, shafts),
         *(f"torque constant of {name}" for name in motors),
+        *_centres(arm),
         "delay of the torques",
         "payload",
     )
-    return ModelPrior(names, errors, covariance, limit, np.repeat(CONTACT.tolerable, [4 * n, n, 2 * n, n, 1, 1]))
+    return ModelPrior(names, errors, covariance, limit, np.repeat(CONTACT.tolerable, [4 * n, n, 2 * n, n, 3 * n, 1, 1]))
+
+
+def weight_prior(arm: Arm, given: ObserverParameters, payload_sd: float) -> ModelPrior:
+    """The errors of the model that joint sensors show: masses, centres of mass, and a payload in kg."""
+    n = len(arm.joints.names)
+    counts = [n, 3 * n, 1]
+    sds = np.repeat([given.mass_uncertainty, given.centre_uncertainty, payload_sd], counts)
+    _, masses, _, _, centres, _, payload = CONTACT.tolerable
+    payload += given.payload[1] - given.payload[0]
+    names = (*_masses(arm), *_centres(arm), "payload")
+    tolerable = np.repeat([masses, centres, payload], counts)
+    return ModelPrior(names, np.zeros(len(sds)), np.diag(sds**2), sds**2, tolerable)
+
+
+def _masses(arm: Arm) -> list[str]:
+    return [f"masses at {name}" for name in arm.joints.names]
+
+
+def _centres(arm: Arm) -> list[str]:
+    return [f"centre of mass of {name} along {axis}" for name in arm.links.names for axis in "xyz"]
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
@@ -109,6 +131,8 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
         add(5 * n + j, f"motors.load_positive.{motor}", 0.5)
         add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
         add(6 * n + j, f"joints.load.{joint}", 1.0)
+    if any(name.startswith("links.torque.") for name in known):  # with the torques, the centres are identified
+        covariance[8 * n : 11 * n] = 0.0
     errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
     errors[6 * n : 7 * n] = model.joints.load
     rows = np.flatnonzero(mixing.any(axis=1))

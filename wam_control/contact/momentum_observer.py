@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
-from wam_control.contact.error_effects import ErrorEffects
+from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
-from wam_control.contact.model_prior import model_prior
+from wam_control.contact.model_prior import model_prior, weight_prior
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.shaft_friction import ShaftFriction
 from wam_control.contact.thresholds import CONTACT
@@ -63,7 +63,7 @@ class MomentumObserver:
     ----------
     age : s, since the first sample.
     is_ready : whether enough samples came.
-    seen : the moment of which torques were last given; from joint sensors the effects are those of one sd.
+    seen : the moment of which torques were last given.
     """
 
     def __init__(
@@ -95,14 +95,20 @@ class MomentumObserver:
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not self._cycle:
             times.append(fast)
         self._load: ToolLoad | None = None
-        payload_sd = 0.0
-        if self._is_payload_declared or (parameters.payload_uncertainty > 0.0 and not use_joint_sensors):
-            self._load = ToolLoad(arm, parameters.payload)
-            payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
-        gauges = np.diag(np.full(n, parameters.joint_torque_sd**2))
-        self._gauges = gauges, np.zeros(n), np.sqrt(gauges)  # covariance, motion and lasting errors
-        self._effects = ErrorEffects(self._map, parameters, self._motors, self._joints, times, self._cycle > 0)
-        prior = model_prior(arm, parameters, payload_sd, model)
+        low, high = parameters.payload
+        # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
+        payload_sd = (high - low) / math.sqrt(3.0)
+        if not high and not use_joint_sensors:
+            payload_sd = parameters.payload_uncertainty
+        if payload_sd > 0.0 or high > 0.0:
+            self._load = ToolLoad(arm)
+        centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
+        self._gauges = GaugeEffects(n, parameters.joint_torque_sd, centres)
+        self._effects = ErrorEffects(self._map, parameters, self._motors, self._joints, times, self._cycle > 0, centres)
+        if use_joint_sensors:
+            prior = weight_prior(arm, parameters, payload_sd)
+        else:
+            prior = model_prior(arm, parameters, payload_sd, model)
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self._filters = _Filters(n, times, self._cycle)
@@ -129,16 +135,10 @@ class MomentumObserver:
         """Joint angles of the last sample, (n,), rad."""
         return self._last.q
 
-    @property
-    def _is_payload_declared(self) -> bool:
-        return self._parameters.payload[1] > 0.0
-
     def learn(self, other: "MomentumObserver") -> None:
         """Take over what another one of the same parameters has learned and keeps at a reset."""
         self._errors.learn(other._errors)
         self._velocity.learn(other._velocity)
-        if self._load is not None and other._load is not None:
-            self._load.mass, self._load.sd = other._load.mass, other._load.sd
         self._motors.learn(other._motors)
         self._joints.learn(other._joints)
 
@@ -225,7 +225,7 @@ class MomentumObserver:
         keep = self._filters.take(external + model + q, signals, span, is_first, span > self._parameters.time_constant)
         if self._load is not None:
             self._load.observe(q, qd, span, keep)
-        self._last, self._gap = _Sample(q, momentum, inertia, known, bias), 0.0
+        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, max(map(abs, qd))), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
@@ -236,8 +236,7 @@ class MomentumObserver:
     def torques(self) -> tuple[list[float], Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
-        With joint sensors S = diag(sd^2) + diag((u tau_model)^2) + (u_load tau_load)(...)^T: strain gauges, the mass
-        uncertainty u of the model torque, the payload.  From the motors see `ModelErrors`.
+        See `ModelErrors`; from joint sensors its errors are those of masses, centres of mass and payload.
         """
         if not self._link_side:
             sd = self._velocity.sd
@@ -246,45 +245,27 @@ class MomentumObserver:
             self.seen = self._observation()
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), self._errors.size * covariance
-        parameters, load, n = self._parameters, self._load, self._n
-        filtered = self._filters.of_links
-        residual, sizes = filtered[:n], [parameters.mass_uncertainty * torque for torque in filtered[n : 2 * n]]
-        covariance, effects = np.zeros((n, n)), np.zeros((n, n))
-        diagonal = slice(None, None, n + 1)
-        covariance.ravel()[diagonal] = [parameters.joint_torque_sd**2 + size**2 for size in sizes]
-        effects.ravel()[diagonal] = sizes
-        if load is not None:
-            residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
-            sized = (np.array(load.torque) * load.sd)[:, None]
-            covariance = covariance + sized * sized.T
-            effects = np.concatenate((effects, sized), axis=1)
-        own, motion, lasting = self._gauges
-        self.seen = Observation(np.array(residual), effects, own, motion, np.array(filtered[2 * n :]), lasting)
-        return residual, covariance
+        self.seen = self._gauges.observation(self._filters.of_links, self._load, self._parameters.payload[0])
+        torques, covariance = self._errors.corrected(self.seen)
+        return torques.tolist(), covariance
 
     def moment(self) -> Torques:
         """The external torques last given, with what is known of their errors."""
         seen = self.seen
         if seen is None:
             raise RuntimeError("nothing has been observed")
-        if not self._link_side:
-            return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
-        effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
+        return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
 
     def change(self, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""
         if self.seen is None:
             raise RuntimeError("nothing has been observed")
-        if not self._link_side:
-            torques, covariance = self._errors.change(self.seen, then)
-            return torques, self._errors.size * covariance
-        effects = self.seen.effects - then.effects
-        return self.seen.residual - then.residual, effects.dot(effects.T) + CONTACT.alike * (self.seen.rest + then.rest)
+        torques, covariance = self._errors.change(self.seen, then)
+        return torques, self._errors.size * covariance
 
     def corrected(self, then: Observation) -> Array:
         """External torques, (n,), N m, of a mean of what was `seen`, with the present errors of the model."""
-        return then.residual if self._link_side else then.residual - then.effects.dot(self._errors.errors)
+        return then.residual - then.effects.dot(self._errors.errors)
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
@@ -317,7 +298,7 @@ class MomentumObserver:
     @property
     def warning(self) -> str:
         """Which part of the model is off, '' for none."""
-        beyond = [] if self._link_side else self._errors.beyond
+        beyond = self._errors.beyond
         return f"the model is off: {beyond[0]}; see /diagnostics, run 'wam identify'" if beyond else ""
 
     def _observation(self, which: int = 0) -> Observation:
@@ -325,17 +306,23 @@ class MomentumObserver:
         means, load = self._filters.means(which), self._load
         return self._effects.observation(means, load, self._last.inertia, self._velocity.sd, which)
 
-    def identify_payload(self) -> str:
-        """Identify the payload from the torques of joint sensors; '' or why that is not possible."""
-        if self._load is None or (self._link_side and not self._is_payload_declared):
-            return "no payload is declared; set observer.payload to the smallest and the largest mass"
+    def zero(self) -> str:
+        """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
+
+        Masses, centres of mass and payload are known better then, in other poses, too.
+        """
         if not self._link_side:
-            mass, sd = self._load.mass + self._errors.errors[-1], math.sqrt(self._errors.covariance[-1, -1])
-            return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {sd:.2f} kg now"
+            error = self._errors.by_name["payload"]
+            mass = self._parameters.payload[0] + error.value
+            return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
         if not self.is_ready:
             return "too few samples yet"
-        torques, covariance = self.torques()
-        return self._load.identify_payload(torques, covariance)
+        if self._last.speed > CONTACT.at_rest:
+            return "the arm moves: let it come to rest"
+        self.torques()
+        if self.seen is not None:
+            self._errors.zero(self.seen)
+        return ""
 
 
 class _Sample(NamedTuple):
@@ -348,6 +335,7 @@ class _Sample(NamedTuple):
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
+    speed : of the fastest joint, rad/s.
     """
 
     q: list[float]
@@ -355,6 +343,7 @@ class _Sample(NamedTuple):
     inertia: Array
     known: list[float]
     bias: list[float]
+    speed: float = math.inf
 
 
 class _Filters:

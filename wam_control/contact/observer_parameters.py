@@ -21,6 +21,9 @@ class ObserverParameters:
     )
     friction_scale: float = parameter("nominal friction per configured friction", low=0.0, high=10.0)
     mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", low=0.0, high=1.0)
+    centre_uncertainty: float = parameter(
+        "sd of each coordinate of the centre of mass of each link", "m", low=0.0, high=1.0
+    )
     moving_uncertainty: float = parameter(
         "sd of the friction of a moving shaft before any motion, per dynamic friction", low=0.0, high=10.0
     )

@@ -89,10 +89,12 @@ class ContactThresholds:
     alike: float = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
     least_variance: float = 1e-30  # variance: avoids a division by zero for errors that are none
     sure: float = 2.0  # sd of an error that it must have beyond what is tolerable
-    # friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
-    tolerable: tuple[float, ...] = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
+    # friction, masses, load friction and torque constants per torque; centres, m; delay, s; payload, kg: beyond, a
+    # warning
+    tolerable: tuple[float, ...] = (0.2, 0.04, 0.05, 0.05, 0.02, 3e-3, 0.05)
     # sd of an identified friction, per friction: what changes from the identification to the use
     identified_friction_sd: float = 0.02
+    at_rest: float = 0.02  # rad/s, of every joint, below which torques show the weights of the arm
     # friction of shafts
     slow: float = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
     steep_shape: float = 2.0  # of `shape_uncertainty`, just after a reversal (presliding): the part that decays slowly

@@ -162,6 +162,11 @@ class ForceLoop:
         return self._supervision.report
 
     @property
+    def free_torques(self) -> list[float]:
+        """Torques of the joint sensors (n,), N m, that count as those of a free arm; zeros with estimated torques."""
+        return [0.0] * self._n if self.parameters.is_estimated else self._measurement.free
+
+    @property
     def is_stopping(self) -> bool:
         """Whether the arm still comes to rest from a motion in which the force began; then its reason is another."""
         return self._is_fast

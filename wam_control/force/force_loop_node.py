@@ -60,6 +60,7 @@ class ForceLoopNode:
             "force_error_limited",
             "force_axis",
             "task_axes",
+            "external_torque_zero",
         ),
     )
     def step(self, inputs: Inputs) -> Outputs:
@@ -93,6 +94,7 @@ class ForceLoopNode:
             "force_measured": Wrench(out.frame, out.measured, ZERO),
             "force_error": Wrench(out.frame, out.error, ZERO),
             "force_error_limited": Wrench(out.frame, out.limited, ZERO),
+            "external_torque_zero": State([], [], self._loop.free_torques),
             **self._force_axis(out, inputs.stamp),
             **self._status(command, torque, task),
         }

@@ -36,6 +36,11 @@ class ForceMeasurement:
         self._tare = list(map(add, self._tare, self.external))
 
     @property
+    def free(self) -> list[float]:
+        """Torques of the world on the joints (n,), N m, that count as those of a free arm: the tare and the zero."""
+        return list(map(add, self._tare, self._zero))
+
+    @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._steady.value
