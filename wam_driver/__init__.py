@@ -21,6 +21,7 @@
 - reach: whether anything can be touched at all, and that nothing is inside a link at power-up
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
+- bus: the driver of a real WAM on its CAN bus, and a simulator of that bus
 - thresholds: what counts as stuck, touching and stable; when the driver warns and waits
 - pusher: hands that follow a moving link and press on it
 """

@@ -1,0 +1,109 @@
+"""Frames of the arm's CAN bus: requests to motor controllers and safety module, packed torques, and their replies.
+
+An identifier is a group bit, the sender and the receiver.  Source: libbarrett (`puck.h`, `motor_puck.cpp`), LGPL; facts
+only.
+"""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+HOST: Final = 0
+SAFETY_MODULE: Final = 10
+TORQUE_GROUPS: Final = (1, 2)  # controllers 1 to 4 and 5 to 7
+ALL_MOTORS: Final = 4
+POSITION_GROUP, VALUE_GROUP = 3, 6  # that replies are sent to
+GROUP, WRITE = 0x400, 0x80
+LARGEST_TORQUE: Final = 8191  # counts, of 14 bits
+
+
+class Frame(NamedTuple):
+    """A classic CAN frame: 11 bits of identifier, up to 8 bytes."""
+
+    identifier: int
+    data: bytes
+
+    @property
+    def sender(self) -> int:
+        """Node that sends it, 0 is the host."""
+        return self.identifier >> 5 & 31
+
+    @property
+    def receiver(self) -> int:
+        """Node or, with the group bit, group that takes it."""
+        return self.identifier & 31
+
+    @property
+    def is_to_group(self) -> bool:
+        """Whether the receiver is a group."""
+        return bool(self.identifier & GROUP)
+
+
+class Value(NamedTuple):
+    """A property of a node, as it was read, or as it is to be written."""
+
+    node: int
+    number: int
+    value: int
+
+
+class Position(NamedTuple):
+    """Motor encoder of a controller, counts, and its joint encoder where there is one."""
+
+    node: int
+    motor: int
+    joint: int | None
+
+
+def get(receiver: int, number: int, group: int = 0) -> Frame:
+    """Ask a node for a property, or all nodes of a group with `group=GROUP`."""
+    return Frame(group | receiver, bytes([number]))
+
+
+def put(receiver: int, number: int, value: int, group: int = 0) -> Frame:
+    """Write a property of a node, signed 32 bits; nobody acknowledges it."""
+    return Frame(group | receiver, bytes([WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
+
+
+def reply(node: int, number: int, value: int) -> Frame:
+    """The answer of a node to `get`."""
+    return put(VALUE_GROUP, number, value, GROUP | node << 5)
+
+
+def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
+    """Torques of up to four controllers in counts of 14 bits; `number` of the property T."""
+    packed = 0
+    for count in counts:
+        packed = packed << 14 | count & 0x3FFF
+    packed <<= 14 * (4 - len(counts))
+    return Frame(GROUP | group, bytes([WRITE | number]) + packed.to_bytes(7, "big"))
+
+
+def read_torques(frame: Frame) -> list[int]:
+    """The four counts of `torques`."""
+    packed = int.from_bytes(frame.data[1:], "big")
+    return [_signed(packed >> shift, 14) for shift in (42, 28, 14, 0)]
+
+
+def position(node: int, motor: int, joint: int | None = None) -> Frame:
+    """The answer of a controller to `get` of its position."""
+    counts = [motor] if joint is None else [motor, joint]
+    data = b"".join((count & 0x3FFFFF).to_bytes(3, "big") for count in counts)
+    return Frame(GROUP | node << 5 | POSITION_GROUP, data)
+
+
+def read(frame: Frame) -> Value | Position | None:
+    """What a node has answered; None for any other frame."""
+    data, size = frame.data, len(frame.data)
+    to = frame.identifier & (GROUP | 31)
+    if to == GROUP | POSITION_GROUP and size in (3, 6):
+        counts = [_signed(int.from_bytes(data[at : at + 3], "big"), 22) for at in range(0, size, 3)]
+        return Position(frame.sender, counts[0], counts[1] if size > 3 else None)
+    if to == GROUP | VALUE_GROUP and size in (4, 6) and data[0] & WRITE:
+        return Value(frame.sender, data[0] & ~WRITE, int.from_bytes(data[2:], "little", signed=True))
+    return None
+
+
+def _signed(value: int, bits: int) -> int:
+    """The lowest bits of a value as two's complement."""
+    sign = 1 << bits - 1
+    return (value & 2 * sign - 1 ^ sign) - sign
