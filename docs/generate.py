@@ -40,10 +40,11 @@ from wam_studies.contact import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers
 from wam_studies.figures.catalogue import table as figures_table
-from wam_studies.figures.panels import Panels, draw_panels
+from wam_studies.figures.panels import Panels, distances, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant.figure import figure
+from wam_studies.plant.figure import table as plant_table
 from wam_studies.scorecard import report as scorecard
 from wam_studies.tasks.pictures import save as save_task
 from wam_studies.thesis import claims
@@ -249,14 +250,14 @@ def listing(name: str) -> str:
 
 
 @cache
-def plant_study() -> str:
+def plant_study() -> dict[str, float]:
     """Differences between plant and theory; also draws docs/plant.png."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
         picture = Path(folder) / "plant.png"
-        text = figure(picture)
+        errors = figure(picture)
         if WRITES_PICTURES:
             shutil.copyfile(picture, ROOT / "docs" / "plant.png")
-    return text
+    return errors
 
 
 @cache
@@ -287,7 +288,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, printed": lambda: constants(ARM_PRINTED),
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
-        "plant": plant_study,
+        "plant": lambda: plant_table(plant_study()),
         "resting pushes": resting_pushes,
         "steps of a scenario": lambda: markdown(
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
@@ -305,6 +306,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},
+        "claims, count": lambda: claims.count(itertools.chain(*claims.load(CLAIMS).values())),
         **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
         "verdict of the demonstration": verdict,
         "joints of barrett-wam7": joints_of_today,
@@ -317,13 +319,9 @@ def blocks() -> dict[str, Callable[[], str]]:
 
 
 def claims_of(rows: tuple[claims.Claim, ...]) -> str:
-    """Claims of a chapter, with the distances that figures, effects and experiments have now."""
-    measured = {
-        "figure": claims.distances_in(figures()),
-        "effect": claims.distances_in(plant_study()),
-        "experiment": claims.deviations_in((ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")),
-    }
-    return claims.table(rows, measured)
+    """Items of a chapter, with the distances that figures and effects have now."""
+    found = {name: max(distances(panels).values(), default=math.nan) for name, panels in found_figures().items()}
+    return claims.table(rows, {"figure": found, "effect": plant_study()})
 
 
 def verdict() -> str:

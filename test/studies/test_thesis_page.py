@@ -1,14 +1,15 @@
-"""docs/thesis.md: every row leads to what shows it, or says why nothing does; no section is left out."""
+"""docs/thesis.md: every item leads to what shows it, or says why nothing does; no section is left out."""
 
 import re
 from pathlib import Path
 
 import pytest
 
-from wam_studies.thesis.claims import Claim, deviations_in, distances_in, load, near_of, unresolved
+from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, table, unresolved
 
 ROOT = Path(__file__).resolve().parents[2]
 CLAIMS = [claim for rows in load(ROOT / "docs" / "thesis.yaml").values() for claim in rows]
+# those that claim something
 SECTIONS = [
     "1.1.1",
     "2.1.1",
@@ -55,7 +56,7 @@ SECTIONS = [
     "7.2.1",
     "7.2.2",
     "7.3",
-]  # those that claim something
+]
 
 
 def test_every_reference_leads_somewhere() -> None:
@@ -87,34 +88,41 @@ def test_a_reference_that_leads_nowhere_is_named(reference: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("row", "message"), [('[5.2, text, "", "", ""]', "no reason"), ("[5.2, text, a]", "has 3 cells")]
+    ("row", "message"),
+    [
+        ("{section: 5.2, claim: text, status: plant}", "give it 'shown'"),
+        ("{section: 5.2, claim: text, status: plant, shown: [docs/a.md]}", "give it 'shown'"),
+        ("{section: 5.2, claim: text, status: not shown}", "'open' must say why"),
+        ("{section: 5.2, claim: text, status: perhaps}", "perhaps"),
+        ("{section: 5.2, claim: text, status: plant, near: 1 %}", "near"),
+        ("{section: 5.2, claim: text, status: plant, shown: docs/a.md}", "must be a list"),
+    ],
 )
-def test_a_row_without_reference_and_reason_is_refused(tmp_path: Path, row: str, message: str) -> None:
+def test_an_item_without_what_its_status_needs_is_refused(tmp_path: Path, row: str, message: str) -> None:
     file = tmp_path / "claims.yaml"
     file.write_text(f"Chapter:\n- {row}\n", encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         load(file)
 
 
-def test_references_are_separated_by_semicolons(tmp_path: Path) -> None:
-    file = tmp_path / "claims.yaml"
-    file.write_text("Chapter:\n- [5.2, text, docs/a.md; figure 5.8, 1 %, why]\n", encoding="utf-8")
-    assert load(file)["Chapter"] == (Claim("5.2", "text", ("docs/a.md", "figure 5.8"), "1 %", "why"),)
+def test_every_distance_that_an_item_gives_is_that_of_something_it_shows() -> None:
+    """The plant or an own computation; what is theory or was put in has no recording."""
+    for claim in CLAIMS:
+        for kind, name in PLACE.findall(claim.agreement):
+            assert f"{kind} {name}" in claim.shown, claim
+        kinds = {reference.partition(" ")[0] for reference in claim.shown}
+        assert not (claim.status is Status.THEORY and "experiment" in kinds), claim
+        of_plant = {"experiment", "task", "figure", "effect", "test"} & kinds or "wam_studies" in str(claim.shown)
+        assert claim.status is not Status.PLANT or of_plant, claim
 
 
-def test_every_distance_that_a_row_gives_is_that_of_something_it_shows() -> None:
-    figures = distances_in((ROOT / "docs" / "figures.md").read_text(encoding="utf-8"))
-    effects = distances_in((ROOT / "docs" / "plant.md").read_text(encoding="utf-8"))
-    experiments = deviations_in((ROOT / "docs" / "experiments.md").read_text(encoding="utf-8"))
-    measured = {"figure": figures, "effect": effects, "experiment": experiments}
-    assert sum(near_of(claim, measured) != claim.near for claim in CLAIMS) > 20
-
-
-def test_the_greatest_distance_counts() -> None:
-    claim = Claim("5.2", "text", ("figure a", "figure b", "effect a"), "{figure} and {effect}", "")
-    figures = distances_in("| a | x | 0.1 % |\n| a | y | 2 % |\n| b | z | below 0.5 % |\n| c | z | 9 % |")
-    assert near_of(claim, {"figure": figures, "effect": {"a": "3 %"}}) == "2 % and 3 %"
-    page = "<!-- experiment: e -->\n| q | 1 | 2 | N | -0.30 % | 2 % | |\n| r | 1 | 2 | N | +9 % |  | |\n<!-- end -->"
-    assert deviations_in(page) == {"e": "0.30 %"}
-    with pytest.raises(ValueError, match="no experiment that it shows"):
-        near_of(claim._replace(near="{experiment}"), {"experiment": {}})
+def test_the_table_has_links_and_distances_and_no_tests() -> None:
+    shown = ("figure a", "experiment e", "test test_a.test_b", "docs/a.md")
+    claim = Claim("5.2", "text", Status.PLANT, "plant with law: {figure a}", shown)
+    text = table([claim], {"figure": {"a": 0.0212}})
+    assert "plant with law: 2.1 %" in text
+    assert "figure [a](figures.md); experiment [e](experiments.md); tests; `docs/a.md`" in text
+    assert "test_b" not in text
+    assert "| plant | 1 |" in count([claim])
+    with pytest.raises(KeyError):
+        table([claim], {"figure": {}})

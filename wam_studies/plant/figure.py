@@ -1,5 +1,6 @@
 """The plant's effects as one figure and one table."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +30,18 @@ SHOWN = {
 }
 
 
-def figure(file: Path) -> str:
-    """Draw the figure; returns the table of errors (Markdown).
+EFFECTS = (
+    *(name for name in STUDIES if name != "stiction cycle"),
+    "stiction cycle, peak to peak",
+    "stiction cycle, period",
+    "lower resonance",
+    "upper resonance",
+    *LEVELS,
+)
+
+
+def figure(file: Path) -> dict[str, float]:
+    """Draw the figure; returns the greatest difference from theory of each of `EFFECTS`.
 
     Parameters
     ----------
@@ -42,12 +53,19 @@ def figure(file: Path) -> str:
     shown = [ThesisPanel(*SHOWN[name][:3], (("theory", _series(curves[name], SHOWN[name][3])),)) for name in SHOWN]
     for side, of_ratios in both.items():
         lines = tuple((f"N = {n:g}", _series(curve, HZ)) for n, curve in zip(RATIOS, of_ratios, strict=True))
-        shown.append(
-            ThesisPanel(f"{side} resonance (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", lines, "xy")
-        )
+        axes = "contact stiffness [N m/rad]", "frequency [Hz]"
+        shown.append(ThesisPanel(f"{side} resonance (4.4)", *axes, lines, "xy"))
     draw_panels(tuple(shown), file, 4)
-    worst = {f"{side} resonance": max(map(_relative, of_ratios)) for side, of_ratios in both.items()}
-    return _table(curves, worst)
+    stiction = curves.pop("stiction cycle")
+    plant, exact = mean_cycle(stiction.x, stiction.plant), mean_cycle(stiction.x, stiction.theory)
+    errors = (
+        *(curve.error for curve in curves.values()),
+        abs(plant.peak_to_peak / exact.peak_to_peak - 1.0),
+        abs(plant.period / exact.period - 1.0),
+        *(max(map(_relative, of_ratios)) for of_ratios in both.values()),
+        *(level().error for level in LEVELS.values()),
+    )
+    return dict(zip(EFFECTS, errors, strict=True))
 
 
 def _series(curve: PlantCurve, scale: float) -> Series:
@@ -59,18 +77,7 @@ def _relative(curve: PlantCurve) -> float:
     return float(np.abs(curve.plant / curve.theory - 1.0).max())
 
 
-def _table(curves: dict[str, PlantCurve], worst: dict[str, float]) -> str:
-    stiction = curves["stiction cycle"]
-    plant, exact = mean_cycle(stiction.x, stiction.plant), mean_cycle(stiction.x, stiction.theory)
-    errors = {
-        **{name: curve.error for name, curve in curves.items() if name != "stiction cycle"},
-        "stiction cycle, peak to peak": abs(plant.peak_to_peak / exact.peak_to_peak - 1.0),
-        "stiction cycle, period": abs(plant.period / exact.period - 1.0),
-        **worst,
-        **{name: level().error for name, level in LEVELS.items()},
-    }
-    return markdown(("effect", "greatest difference from theory"), [(n, _percent(e)) for n, e in errors.items()])
-
-
-def _percent(error: float) -> str:
-    return "below 0.001 %" if error < 1e-5 else f"{100.0 * error:.2g} %"
+def table(errors: Mapping[str, float]) -> str:
+    """Those differences as Markdown."""
+    rows = [(n, "below 0.001 %" if e < 1e-5 else f"{100.0 * e:.2g} %") for n, e in errors.items()]
+    return markdown(("effect", "greatest difference from theory"), rows)

@@ -108,6 +108,14 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
                 Comparison(
                     f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", BOUNDS.force_along_link * force, "", True
                 ),
+                Comparison(
+                    f"{label}, estimated",
+                    float(true.mean()),
+                    float(found.estimated[late].mean()),
+                    "N",
+                    math.nan,
+                    "true",
+                ),
             ]
         panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
     return Result(rows, panels)

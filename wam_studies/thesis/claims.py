@@ -1,8 +1,10 @@
-"""What the thesis claims and where it is shown: rows of docs/thesis.yaml, checked, and as tables."""
+"""What the thesis claims and what shows it: items of docs/thesis.yaml, checked, and as tables."""
 
 import importlib
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,50 +12,68 @@ import yaml
 
 from wam_analysis.table import markdown
 from wam_studies.figures.catalogue import FIGURES
-from wam_studies.plant.effects import STUDIES
+from wam_studies.plant.figure import EFFECTS
 
-PLACE = re.compile(r"\{(figure|effect|experiment)\}")
+PLACE = re.compile(r"\{(figure|effect) ([^}]+)\}")
+PAGES = {"experiment": "experiments.md", "task": "tasks.md", "figure": "figures.md", "effect": "plant.md"}
+
+
+class Status(StrEnum):
+    """How an item is shown."""
+
+    PLANT = "plant"
+    THEORY = "theory"
+    CONSTRUCTION = "construction"
+    NOT_SHOWN = "not shown"
 
 
 class Claim(NamedTuple):
-    """One claim of the thesis.
+    """One item of the thesis.
 
     Attributes
     ----------
     section : of the thesis.
-    text : what is claimed.
-    shown : references, see `unresolved`; none if nothing shows it.
-    near : agreement with the thesis, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest
-        distance that was measured for those that `shown` names, see `near_of`.
-    missing : what is not shown, and why; empty if nothing is missing.
+    claim : in plain words.
+    status : how it is shown.
+    agreement : of what with what; `{figure NAME}` or `{effect NAME}` is the greatest distance that was measured.
+    shown : references, see `unresolved`.
+    open : what is not shown, and why; empty if nothing is missing.
     """
 
     section: str
-    text: str
-    shown: tuple[str, ...]
-    near: str
-    missing: str
+    claim: str
+    status: Status
+    agreement: str = ""
+    shown: tuple[str, ...] = ()
+    open: str = ""
 
 
 def load(file: Path) -> dict[str, tuple[Claim, ...]]:
-    """Claims of each chapter.
+    """Items of each chapter.
 
     Raises
     ------
     ValueError
-        if a row has not five cells, or neither shows anything nor states why not.
+        if an item has an unknown field or status, is shown by nothing, or is not shown without a reason.
     """
-    chapters: Mapping[str, list[list[object]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
-    return {title: tuple(_claim(row) for row in rows) for title, rows in chapters.items()}
+    chapters: Mapping[str, list[dict[str, object]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    return {title: tuple(map(_claim, rows)) for title, rows in chapters.items()}
 
 
-def _claim(row: list[object]) -> Claim:
-    if len(row) != 5:
-        raise ValueError(f"{row} has {len(row)} cells; a claim has section, text, shown, near and missing")
-    section, text, shown, near, missing = map(str, row)
-    claim = Claim(section, text, tuple(filter(None, (name.strip() for name in shown.split(";")))), near, missing)
-    if not claim.shown and not missing:
-        raise ValueError(f"{section}, '{text}': it names nothing that shows it and no reason")
+def _claim(row: dict[str, object]) -> Claim:
+    unknown = set(row) - set(Claim._fields)
+    if unknown:
+        raise ValueError(f"{row} has {', '.join(sorted(unknown))}; an item has {', '.join(Claim._fields)}")
+    shown = row.get("shown") or []
+    if not isinstance(shown, list):
+        raise ValueError(f"{row}: 'shown' must be a list")
+    texts = {key: str(value) for key, value in row.items() if key not in ("shown", "status")}
+    claim = Claim(**texts, status=Status(str(row["status"])), shown=tuple(map(str, shown)))
+    is_shown = claim.status is not Status.NOT_SHOWN
+    if is_shown and not (claim.shown and claim.agreement):
+        raise ValueError(f"{claim.section}, '{claim.claim}': give it 'shown' and 'agreement', or status 'not shown'")
+    if not is_shown and not claim.open:
+        raise ValueError(f"{claim.section}, '{claim.claim}': it is not shown; 'open' must say why")
     return claim
 
 
@@ -71,20 +91,19 @@ def unresolved(reference: str, root: Path) -> str:
         "experiment": (root / "config" / "experiments" / f"{name}.yaml").is_file(),
         "task": (root / "config" / "tasks" / f"{name}.yaml").is_file(),
         "figure": name in FIGURES,
-        "effect": name in STUDIES,
+        "effect": name in EFFECTS,
+        "test": _is_test(root, *name.partition(".")[::2]),
     }
     if kind in known:
         return "" if known[kind] else f"there is no {kind} '{name}'"
-    if kind == "test":
-        file, _, test = name.partition(".")
-        path = next(root.glob(f"test/*/{file}.py"), None)
-        there = path is not None and re.search(
-            rf"^def {re.escape(test)}\(", path.read_text(encoding="utf-8"), re.MULTILINE
-        )
-        return "" if there else f"there is no test '{name}'"
     if "/" in reference:
         return "" if (root / reference).is_file() else f"there is no file '{reference}'"
     return "" if _importable(reference) else f"'{reference}' cannot be imported"
+
+
+def _is_test(root: Path, file: str, test: str) -> bool:
+    path = next(root.glob(f"test/*/{file}.py"), None) if file else None
+    return path is not None and f"\ndef {test}(" in path.read_text(encoding="utf-8")
 
 
 def _importable(name: str) -> bool:
@@ -96,68 +115,43 @@ def _importable(name: str) -> bool:
         return False
 
 
-def near_of(claim: Claim, measured: Mapping[str, Mapping[str, str]]) -> str:
-    """How near, with the measured distances in their places.
+def count(claims: Iterable[Claim]) -> str:
+    """How many items have each status, as Markdown."""
+    found = Counter(claim.status for claim in claims)
+    rows = [(status.value, str(found[status])) for status in Status]
+    return markdown(("status", "items"), [*rows, ("all", str(found.total()))])
+
+
+def table(claims: Iterable[Claim], measured: Mapping[str, Mapping[str, float]]) -> str:
+    """Items as Markdown.
 
     Parameters
     ----------
-    claim : of the page.
-    measured : of each kind, figure, effect and experiment, the greatest distance of each name, as "0.3 %".
+    claims : of a chapter.
+    measured : the greatest distance of each figure and of each effect.
 
     Raises
     ------
-    ValueError
-        if nothing of the kind is shown, or it has no distance.
+    KeyError
+        for a place of a name that has no distance.
     """
-
-    def worst(kind: re.Match[str]) -> str:
-        names = [name for found, _, name in (one.partition(" ") for one in claim.shown) if found == kind[1]]
-        texts = [measured[kind[1]][name] for name in names if name in measured[kind[1]]]
-        if not texts:
-            raise ValueError(f"{claim.section}, '{claim.text}': no {kind[1]} that it shows has a distance")
-        return max(texts, key=percent)
-
-    return PLACE.sub(worst, claim.near)
-
-
-def percent(text: str) -> float:
-    """The number of a distance, as 0.3 of "0.3 %" or "below 0.3 %"."""
-    return abs(float(text.split()[-2]))
-
-
-def distances_in(table_text: str) -> dict[str, str]:
-    """Greatest distance of each name in a Markdown table, names in its first column and distances in its last."""
-    found: dict[str, str] = {}
-    for line in table_text.splitlines():
-        cells = [cell.strip() for cell in line.strip("| ").split("|")]
-        if cells[-1].endswith("%"):
-            found[cells[0]] = max(found.get(cells[0], cells[-1]), cells[-1], key=percent)
-    return found
-
-
-def deviations_in(page: str) -> dict[str, str]:
-    """Greatest deviation with a bound of each experiment on docs/experiments.md."""
-    found = {}
-    for name, block in re.findall(r"<!-- experiment: (\S+) -->\n(.*?)<!-- end -->", page, re.DOTALL):
-        rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in block.splitlines()]
-        bounded = [
-            row[4].lstrip("+-") for row in rows if len(row) > 5 and row[4].endswith("%") and row[5].endswith("%")
-        ]
-        if bounded:
-            found[name] = max(bounded, key=percent)
-    return found
-
-
-def table(claims: tuple[Claim, ...], measured: Mapping[str, Mapping[str, str]]) -> str:
-    """Claims as Markdown, with the distances that were measured, see `near_of`."""
-    head = ("section", "claimed", "shown by", "agreement", "not shown, because")
-    rows = [(c.section, c.text, "; ".join(map(_cell, c.shown)), near_of(c, measured), c.missing) for c in claims]
+    head = ("section", "claimed", "status", "agreement", "shown by", "not shown")
+    rows = []
+    for c in claims:
+        agreement = PLACE.sub(lambda place: _percent(measured[place[1]][place[2]]), c.agreement)
+        rows.append((c.section, c.claim, c.status, agreement, _links(c), c.open))
     return markdown(head, rows)
 
 
-def _cell(reference: str) -> str:
-    kind, _, name = reference.partition(" ")
-    where = {"experiment": f"experiments.md#{name}", "task": "tasks.md", "figure": "figures.md", "effect": "plant.md"}
-    if kind in where:
-        return f"{kind} [{name}]({where[kind].split('#')[0]})"
-    return f"`{name if kind == 'test' else reference}`"
+def _links(claim: Claim) -> str:
+    """Links to what shows an item; names of tests are not of interest to a reader."""
+    named = dict.fromkeys("tests" if name.startswith("test ") else name for name in claim.shown)
+    cells = (reference.partition(" ") for reference in named)
+    return "; ".join(
+        f"{kind} [{name}]({PAGES[kind]})" if kind in PAGES else "tests" if kind == "tests" else f"`{kind}`"
+        for kind, _, name in cells
+    )
+
+
+def _percent(distance: float) -> str:
+    return "below 0.01 %" if distance < 1e-4 else f"{100.0 * distance:.2g} %"

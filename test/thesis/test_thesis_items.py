@@ -1,0 +1,294 @@
+"""Forty items of the thesis: the product's numbers next to those of `own_thesis`, which imports nothing of it.
+
+Within 1 % of what the thesis prints, within 1e-9 where it has an equation, 1e-6 where a search in steps finds it.
+"""
+
+import ast
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import own_thesis as own
+import pytest
+from own_thesis import INCH, INCH_POUND, OUNCE_INCH_SECOND2, POUND, Node
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_theory import cable, describing_function, linear_loop, regimes, requisites, resonance, stiction
+from wam_theory import tension_element as element
+from wam_theory.guidelines import kept_contact_ratio
+from wam_theory.planar_contact import planar_contact
+from wam_theory.pulley_slip import torque_of_full_slip
+
+EQUATION, PRINTED, SEARCH = 1e-9, 0.01, 1e-6
+N, CONTACT = 14.0, 1464.28  # of 5.6
+ROTOR, LINK = 0.0057 * OUNCE_INCH_SECOND2, 64.0 * OUNCE_INCH_SECOND2  # 4.3.2
+K_TR = 2.0 * 262.0 * POUND / INCH * (0.375 * INCH) ** 2  # of its two strands, at the motor
+TWO = ROTOR, LINK, K_TR, CONTACT, N
+UNIT = Node(1.0, 1.0, 2.0, 2.0, 1.0, 1.0)  # J = b = K = 1, k_tr = k_c: figure 5.7
+ZETA = 0.25  # of UNIT
+STICKY = Node(1.0, 0.5, 2.0, 2.0, 1.0, 1.4)
+OMEGA = 1.0 + math.exp(-math.pi * 0.125 / math.sqrt(1.0 - 0.125**2))  # (5.10) of it
+SLOW = 1e-3  # G_I, so that (5.11) is far below 1
+TESTBED = Node(0.4519, 0.05 * 2.0 * math.sqrt(0.4519 * 3096.1), 1631.8, 1464.3)  # 5.6, zeta 0.05
+POSE = (0.3, -0.7, 0.5, 0.9)
+STRAIN = 60.0 / 0.375 / 9500.0  # 6.4.5: (T2 - T1)/EA at the peak torque of 60 in-lb
+ARM = Configuration.load(packaged("wam")).shared.arm
+
+
+def psi(gamma: float) -> float:
+    (_, first), (_, second) = own.breakaways(UNIT, gamma, 1.0, 2)
+    return -second / first
+
+
+def overshoot() -> float:
+    """Travel of a slip with the motor at rest over that to its equilibrium."""
+    _, x, _ = own.slip(STICKY, 1e-15, 0.0, STICKY.static / STICKY.k_tr, 1.0)
+    return x * (STICKY.k_tr + STICKY.k_c) / (STICKY.static - STICKY.dynamic)
+
+
+def stiction_period() -> float:
+    """Two waits of a symmetric cycle: from the spring that a slip leaves to the opposite friction."""
+    left = STICKY.static - OMEGA * (STICKY.static - STICKY.dynamic)
+    error = 0.5 * OMEGA * (STICKY.static - STICKY.dynamic) * STICKY.k_c / (STICKY.k_tr + STICKY.k_c)
+    return 2.0 * (STICKY.static + left) / (STICKY.k_tr * SLOW * error)
+
+
+def predicted_cycle() -> float:
+    """(5.16): the damping that friction must add at gamma 1.5, as amplitude of F_c."""
+    damping = own.bisect(lambda b: own.marginal_gain(UNIT._replace(damping=b)) > 1.5, 1.0, 3.0)
+    speed = own.square_wave_gain(damping - UNIT.damping)
+    frequency = np.abs(np.linalg.eigvals(own.loop(UNIT._replace(damping=damping), 1.5)).imag).max()
+    return float(UNIT.k_c * speed / frequency)
+
+
+def jacobian() -> Any:
+    """Of the tip, m/rad, by central differences."""
+    steps = 1e-6 * np.eye(4)
+    return np.transpose([(own.wam_tip(POSE + d) - own.wam_tip(POSE - d)) * INCH / 2e-6 for d in steps])
+
+
+def efficiency_of_testbed() -> float:
+    """Of its two stages, in pounds and inches."""
+    return cable.efficiency(cable.stage_loss(60.0, 0.375, [9500.0, 9500.0 * 3.74166], 1.0, [1.0, 3.74166]))
+
+
+def full_slip() -> float:
+    """Torque at which the arc of slip is the whole of pi, by bisection."""
+
+    def is_beyond(d: float) -> bool:
+        return math.log((100.0 + d) / (100.0 - d)) > 0.2 * math.pi
+
+    return 2.0 * 0.01 * own.bisect(is_beyond, 0.0, 99.0)
+
+
+# section and what; the own number; that of the product; how near
+ITEMS: list[tuple[str, Callable[[], Any], Callable[[], Any], float]] = [
+    (
+        "1.1.1 frequency of two masses",
+        lambda: own.two_masses(1.0, 3.0, 2.0, 5.0, 1.0)[0],
+        lambda: resonance.force_resonances(1.0, 3.0, 2.0, 5.0, 1.0).lower,
+        EQUATION,
+    ),
+    (
+        "2.1.1 (2.1) force",
+        lambda: 7.0,
+        lambda: planar_contact(7.0 * (0.5 * math.cos(1.0) + 0.2), 1.4, 0.5, 1.0).force,
+        EQUATION,
+    ),
+    ("2.1.1 (2.2) position", lambda: 0.2, lambda: planar_contact(7.0 * (0.5 + 0.2), 1.4, 0.5, 0.0).position, EQUATION),
+    (
+        "3.2.2 (3.1) by energy",
+        lambda: math.sqrt(2.0 * 900.0 * 0.5 * 3.0 * 0.4**2),
+        lambda: requisites.impact_force(0.4, 3.0, 900.0),
+        EQUATION,
+    ),
+    (
+        "3.2.4 (3.2) two bars",
+        lambda: 1.0 - 0.05 / 0.4,
+        lambda: requisites.useful_length(10.0, requisites.secure_angle(0.4)),
+        EQUATION,
+    ),
+    (
+        "3.2.4 (3.3) cylinder",
+        lambda: 2.0 * 0.4 * (1.0 - 0.05 / 0.4),
+        lambda: requisites.largest_cylinder(10.0, 0.4),
+        EQUATION,
+    ),
+    (
+        "4.1.2 (4.1) two lines in series",
+        lambda: 1.0 / (0.3 / (N**2 * 5.0) + 0.7 / (N * 5.0)),
+        lambda: cable.stiffness_with_reducer(5.0, 1.0, N, 0.3),
+        EQUATION,
+    ),
+    ("4.1.2 N_m, 104 in print", lambda: 105.96, lambda: resonance.matched_ratio(ROTOR, LINK), PRINTED),
+    ("4.2 (4.2)", lambda: math.sqrt(N**2 * K_TR / LINK), lambda: resonance.position_bandwidth(LINK, K_TR, N), EQUATION),
+    (
+        "4.3.1 (4.3) at 20 Hz",
+        lambda: own.force_for_torque(20.0, *TWO),
+        lambda: abs(resonance.force_transfer(40j * math.pi, *TWO)),
+        EQUATION,
+    ),
+    ("4.3.1 (4.4) both", lambda: own.two_masses(*TWO), lambda: resonance.force_resonances(*TWO), EQUATION),
+    (
+        "4.3.1 (4.6)",
+        lambda: own.two_masses(ROTOR, LINK, K_TR, 1e12, N)[0],
+        lambda: resonance.hard_contact_bandwidth(ROTOR, K_TR),
+        SEARCH,
+    ),
+    (
+        "4.3.2 (4.9), 638 lb/in",
+        lambda: 638.0 * POUND * INCH * 36.0**2,
+        lambda: resonance.best_contact_stiffness(ROTOR, LINK, K_TR),
+        PRINTED,
+    ),
+    (
+        "4.4 (4.10) where the asymptotes cross",
+        lambda: own.bisect(lambda k: k / ROTOR > CONTACT / LINK, 1e-6, 1e3),
+        lambda: resonance.best_transmission_stiffness(ROTOR, LINK, CONTACT),
+        EQUATION,
+    ),
+    ("5.3 (5.1)", lambda: 20.0 / (1.0 + 3.0), lambda: linear_loop.proportional_error(20.0, 3.0 / 7.0, 7.0), EQUATION),
+    (
+        "5.3 (5.2)",
+        lambda: -1.0 / math.log(own.exponential(np.array([[-0.4 * 7.0]]), 1.0)[0, 0]),
+        lambda: linear_loop.integral_time_constant(0.4, 7.0),
+        EQUATION,
+    ),
+    ("5.4 (5.3)", lambda: 1.5 / (0.4 * 2.0 * 3.0), lambda: stiction.breakaway_delay(0.4, 2.0, 1.5, 3.0), EQUATION),
+    (
+        "5.4 (5.8)",
+        lambda: OMEGA * 0.4 * 0.5,
+        lambda: stiction.stiction_cycle_force(2.0, 2.0, 1.4, 1.0, 0.125),
+        EQUATION,
+    ),
+    ("5.4 (5.9)", stiction_period, lambda: stiction.stiction_cycle_period(SLOW, 2.0, 2.0, 1.4, 1.0, 0.125), EQUATION),
+    ("5.4 (5.10)", overshoot, lambda: stiction.slip_overshoot(0.125), SEARCH),
+    ("5.5 (5.15)", lambda: own.marginal_gain(UNIT), lambda: linear_loop.routh_gain(*UNIT[:4]), EQUATION),
+    (
+        "5.5.1 N(A)",
+        lambda: own.square_wave_gain(0.7),
+        lambda: describing_function.coulomb_describing_function(1.0, 0.7),
+        SEARCH,
+    ),
+    (
+        "5.5.1 (5.16)",
+        predicted_cycle,
+        lambda: describing_function.predicted_unstable_cycle(1.5, *UNIT[:4], 1.0).force,
+        SEARCH,
+    ),
+    ("5.5.2 (5.18) Psi", lambda: psi(1.5), lambda: regimes.psi(1.5, ZETA), SEARCH),
+    ("5.5.2 Psi in domain I", lambda: psi(0.9), lambda: regimes.psi(0.9, ZETA), SEARCH),
+    ("5.5.2 gamma_III", lambda: own.bisect(lambda g: psi(g) > 1.0, 1.5, 3.0), lambda: regimes.gamma_3(ZETA), SEARCH),
+    ("5.5.2 contact kept", lambda: 1.0 + 1.0 / psi(1.5), lambda: kept_contact_ratio(1.5, ZETA), SEARCH),
+    ("5.5.3 (5.20)", lambda: (1.5 - -1.5) / 2.0, lambda: regimes.actuator_cycle(1.5, 2.0, 0.9, ZETA), EQUATION),
+    ("5.5.3 (5.21)", lambda: 0.5 * 2.0 * (1.5 / 2.0) ** 2, lambda: regimes.actuator_cycle_work(1.5, 2.0), EQUATION),
+    (
+        "5.5.3 (5.22)",
+        lambda: 0.5625 / (2.0 * 1.5 / (0.4 * 2.0 * 3.0)),
+        lambda: regimes.actuator_cycle_power(0.4, 3.0, 1.5),
+        EQUATION,
+    ),
+    ("5.6 (5.15) of the testbed", lambda: 1.21e-3 / INCH_POUND, lambda: linear_loop.routh_gain(*TESTBED[:4]), PRINTED),
+    (
+        "5.6 sampled at 50 Hz",
+        lambda: own.sampled_margin(TESTBED, 0.02, False),
+        lambda: linear_loop.sampled_margin(*TESTBED[:4], 0.02).gain,
+        SEARCH,
+    ),
+    (
+        "5.6 one sample later",
+        lambda: own.sampled_margin(TESTBED, 0.02, True),
+        lambda: linear_loop.sampled_margin(*TESTBED[:4], 0.02, 1).gain,
+        SEARCH,
+    ),
+    (
+        "5.7 (5.23)",
+        lambda: 1.0 / (1.0 / (1.0 / 2.0 + 1.0 / 2.0 + 0.5)),
+        lambda: linear_loop.routh_gain(*UNIT[:4], 0.5),
+        EQUATION,
+    ),
+    ("6.2.4 (6.15)", lambda: (1.0 - STRAIN) ** 2, efficiency_of_testbed, EQUATION),
+    ("6.4.5 two stages, 0.966 in print", lambda: 0.966, efficiency_of_testbed, PRINTED),
+    ("6.4.5 one stage, 0.983 in print", lambda: 0.983, lambda: cable.efficiency([STRAIN]), PRINTED),
+    ("6.2.5 (6.16)", lambda: own.arc_of_slip(100.0, 150.0, 0.2), lambda: element.slip_arc(100.0, 150.0, 0.2), 1e-4),
+    ("6.2.5 the whole arc slips", full_slip, lambda: torque_of_full_slip(math.pi, 100.0, 0.01, 0.2), EQUATION),
+    (
+        "6.3.1 (6.19) out and back",
+        lambda: 2.0 * 5.0 * 3.0 / 0.01 / 4e4,
+        lambda: cable.creep(10.0, 3.0, 0.01, 4e4),
+        EQUATION,
+    ),
+    (
+        "6.4.4 (6.22) of a pulley",
+        lambda: 0.5 * (3.0 / 0.01) ** 2 / 4e4 * 0.01,
+        lambda: element.coulomb_like_torque(3.0, 0.01, 4e4),
+        EQUATION,
+    ),
+    (
+        "6.5 (6.23), 2 in-lb in print",
+        lambda: 2.0,
+        lambda: np.ptp(cable.eccentric_ripple(0.01, 50.0, np.linspace(0.0, 6.3, 1000))),
+        PRINTED,
+    ),
+    ("A (A.3) tip", lambda: own.wam_tip(POSE) * INCH, lambda: RigidBody(ARM).tool_pose(POSE).position, EQUATION),
+    (
+        "A (A.6) differential",
+        lambda: [[-30.4, -15.2], [30.4, -15.2]],
+        lambda: TransmissionMap.of(ARM).motor_from_joint[1:3, 1:3],
+        EQUATION,
+    ),
+    ("A (A.7) Jacobian", jacobian, lambda: RigidBody(ARM).tool_jacobian(POSE), SEARCH),
+]
+
+
+@pytest.mark.parametrize(
+    ("own_number", "of_product", "within"), [row[1:] for row in ITEMS], ids=[row[0] for row in ITEMS]
+)
+def test_item_is_that_of_an_own_computation(
+    own_number: Callable[[], Any], of_product: Callable[[], Any], within: float
+) -> None:
+    np.testing.assert_allclose(of_product(), own_number(), rtol=within, atol=1e-2 * within)
+
+
+def test_own_computation_imports_nothing_of_the_product() -> None:
+    tree = ast.parse(Path(own.__file__).read_text(encoding="utf-8"))
+    modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    modules |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+    assert {str(module).partition(".")[0] for module in modules} <= sys.stdlib_module_names | {"numpy"}
+
+
+def test_margin_falls_with_the_stiffness_of_the_environment() -> None:
+    gains = [own.marginal_gain(UNIT._replace(k_c=k)) for k in (0.5, 2.0, 8.0, 32.0)]
+    assert gains == sorted(gains, reverse=True)
+    assert gains == pytest.approx(linear_loop.routh_gain(1.0, 1.0, 2.0, [0.5, 2.0, 8.0, 32.0]), rel=EQUATION)
+
+
+def test_a_tenth_of_the_stiffness_costs_6_9_times_the_torque_at_50_hz() -> None:
+    stiff, soft = (own.force_for_torque(50.0, ROTOR, LINK, k, CONTACT, N) for k in (K_TR, 0.1 * K_TR))
+    assert stiff / soft == pytest.approx(6.94, rel=0.01)
+
+
+def test_cycle_is_larger_than_5_8_where_5_11_is_near_one() -> None:
+    sizes = []
+    for number in (0.01, 0.98):
+        errors = [e for _, e in own.breakaways(STICKY, 2.0 * number * math.sqrt(1.0 - 0.125**2), 2.0, 400)[-2:]]
+        sizes.append(abs(errors[1] - errors[0]) / (OMEGA * 0.4 * 0.5))
+    assert sizes[0] == pytest.approx(1.0, abs=0.03)
+    assert sizes[1] > 1.5
+
+
+def test_a_higher_gain_costs_power_and_margin_and_saves_delay() -> None:
+    gains = np.array([0.3, 0.6])
+    delay, power = stiction.breakaway_delay(gains, 2.0, 1.5, 3.0), regimes.actuator_cycle_power(gains, 3.0, 1.5)
+    of_margin = linear_loop.gain_ratio(gains, *UNIT[:4])
+    assert [values[1] / values[0] for values in (delay, power, of_margin)] == pytest.approx([0.5, 2.0, 2.0])
+
+
+def test_loss_of_a_stage_goes_with_its_tension() -> None:
+    """6.4.1: the same power at twice the speed has half of the tension."""
+    assert cable.stage_loss([6.0, 3.0], 0.01, 4e4, 1.0, 1.0) == pytest.approx([6.0 / 0.01 / 4e4, 3.0 / 0.01 / 4e4])
