@@ -194,6 +194,8 @@ class IdentificationThresholds:
     centre: float = 0.05  # m
     inertia: float = 0.5  # of the present inertia of the link
     least_sd: float = 1e-6  # of everything whose present value is 0
+    least_motion: float = 2.0  # s of motion of a motor, with less of which its torques show nothing
+    kept_weight: float = 1e-3  # N m, sd of the weight at a joint that the motion does not show
     # the fit
     parts: int = 20  # of the motion
     iterations: int = 5  # the load on friction and the links' inertia are not linear in the parameters
@@ -211,6 +213,14 @@ class IdentificationThresholds:
     least_inertia: float = 1e-6  # kg m^2; an inertia that came out negative
     least_column: float = 1e-12  # size of a column that the motion does not show
     least_variance: float = 1e-30  # variance of a combination that has none
+    # a motion that contradicts the configured arm
+    contradicted: float = 0.25  # rms that stays unexplained, per Coulomb friction: it is not that of a free arm
+    least_friction: float = 1e-4  # N m of a motor, for a ratio to it
+    heavier: float = 1.4  # weight per configured weight, that no configured arm is wrong by
+    least_share: float = 0.05  # of the configured friction, below which none is left
+    misfit: float = 0.15  # rms of the recorded torques beyond those of the configured arm, per torque
+    scaled: float = 1.4  # torques per torque of the configured arm, from which their unit is in doubt
+    better: float = 0.5  # of that, what a mistake leaves that explains it
     # combinations that gravity depends on
     poses: int = 100  # random ones, in which the columns are compared
     seed: int = 1  # of these poses

@@ -14,6 +14,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state, wrench
 
 from wam_analysis.identification.base_set import gravity_base_set
+from wam_analysis.identification.contradictions import Mistake, contradictions
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import evenly, motion, recorded_motion
 from wam_analysis.identification.overlay import HEADING, estimator_values, model_values, write_overlay
@@ -55,7 +56,13 @@ class Planted:
     arm = true_arm(WAM, ModelMismatch((1.0, 1.02, 0.97, 1.05), (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.1, (1.0,) * 4))
 
     def __init__(
-        self, seconds: float, seed: int, noise: float = 0.0, speed: float = 1.0, joint_load: Array | None = None
+        self,
+        seconds: float,
+        seed: int,
+        noise: float = 0.0,
+        speed: float = 1.0,
+        joint_load: Array | None = None,
+        moving: tuple[int, ...] = (0, 1, 2, 3),
     ) -> None:
         """`joint_load`: friction of each joint per torque, (2, n), in positive and in negative motion."""
         self.joint_load = np.zeros((2, 4)) if joint_load is None else joint_load
@@ -63,6 +70,7 @@ class Planted:
         self.time = np.arange(0.001, seconds, 0.001)
         rates = speed * random.uniform(0.5, 3.0, (4, 3))
         sizes, phases = random.uniform(0.1, 0.4, (4, 3)), random.uniform(0.0, 6.3, (4, 3))
+        sizes *= np.isin(range(4), moving)[:, None]
         turns = self.time[:, None, None] * rates + phases
         q = np.array(WAM.joints.start) + (sizes * np.sin(turns)).sum(2)
         qd = (sizes * rates * np.cos(turns)).sum(2)
@@ -276,12 +284,73 @@ def test_a_wrong_model_is_refused_by_name(values: dict[str, Any], text: str) -> 
         CONFIGURATION.with_values(values).shared  # noqa: B018
 
 
+def pressed(planted: Planted, force: tuple[float, float, float], share: float = 1.0) -> Array:
+    """Torques of the motors while a force, N, acts on the outer link in the first part of each 2 s."""
+    body, matrix = RigidBody(WAM), TransmissionMap.of(WAM).joint_from_motor
+    joints = planted.theta @ matrix.T
+    pushes = [body.point_jacobian(q, "outer_link", (0.3, 0.0, 0.0)).T @ np.array(force) for q in joints]
+    acts = planted.time % 2.0 < 2.0 * share
+    found: Array = planted.torque - np.array(pushes) @ matrix * acts[:, None]
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "mistake", "about"),
+    [
+        ("amperes", Mistake.SCALED, ()),
+        ("other sign", Mistake.SCALED, ()),
+        ("sign of one", Mistake.SCALED_MOTOR, ("motor2",)),
+        ("constant of one", Mistake.SCALED_MOTOR, ("motor3",)),
+        ("names of two", Mistake.SWAPPED, ("motor2", "motor3")),
+        ("pressed all the time", Mistake.UNEXPLAINED, None),
+        ("pressed half of the time", Mistake.UNEXPLAINED, None),
+        ("lifted all the time", Mistake.SCALED, ()),
+        ("nothing", None, ()),
+    ],
+)
+def test_a_recording_that_contradicts_the_configured_arm_is_refused_with_its_likely_cause(
+    what: str, mistake: Mistake | None, about: tuple[str, ...] | None
+) -> None:
+    planted = Planted(30.0, 3, noise=0.001)
+    order, scale = [0, 1, 2, 3], {"amperes": 4.0, "other sign": -1.0, "sign of one": [1, -1, 1, 1]}
+    if what == "names of two":
+        order = [0, 2, 1, 3]
+    torque = {
+        "pressed all the time": lambda: pressed(planted, (0.0, 5.0, -6.2)),
+        "pressed half of the time": lambda: pressed(planted, (8.0, 5.0, 10.0), 0.5),
+        "lifted all the time": lambda: pressed(planted, (0.0, 0.0, -10.0)),
+        "constant of one": lambda: planted.torque * [1.0, 1.0, 0.25, 1.0],
+    }.get(what, lambda: planted.torque * scale.get(what, 1.0))()
+    recorded = motion(evenly(planted.time, planted.theta[:, order], torque[:, order]))
+    found = contradictions(SHARED, recorded, identify(SHARED, recorded))
+    assert [one.mistake for one in found[:1]] == ([] if mistake is None else [mistake])
+    assert about is None or [one.about for one in found[:1]] == ([] if mistake is None else [about])
+
+
+@pytest.mark.slow
+def test_what_a_motion_of_one_joint_does_not_show_stays_as_configured() -> None:
+    """The weight at joint 2 was 19 N m in place of 12, with a standard error of nothing."""
+    planted = Planted(30.0, 3, noise=0.001, moving=(0,))
+    found = planted.identify()
+    poses = np.random.Generator(np.random.PCG64(5)).uniform(-1.0, 1.0, (20, 4))
+    model = RigidBody(overlaid(found).shared.model_arm)
+    for q in poses:
+        assert model.gravity_torque(q) == pytest.approx(RigidBody(WAM).gravity_torque(q), abs=0.02)
+    assert set(found.tracked.names) == {
+        f"motors.{what}_{way}.motor1" for what in ("coulomb", "load") for way in WAYS
+    } | {"links.torque.joint1"}
+    assert np.linalg.eigvalsh(found.tracked.covariance).min() > 0.0
+
+
 @pytest.mark.slow
 def test_too_little_motion_is_refused_and_a_slow_one_is_warned_about() -> None:
     short = Planted(6.0, 1)
     with pytest.raises(ValueError, match=r"over 6 s; identification needs 10 s or more"):
         short.identify()
-    slow = Planted(15.0, 1, speed=0.02)
+    with pytest.raises(ValueError, match="no joint turns freely for 2 s"):
+        Planted(15.0, 1, speed=0.02).identify()
+    slow = Planted(15.0, 1, speed=0.1)
     text = report(SHARED, slow.identify(), "bag")
     assert "warning: motor1 turns freely for" in text
 
@@ -297,6 +366,34 @@ def test_states_that_are_missing_or_braked_are_not_used() -> None:
     assert not ((samples.time > 8.95) & (samples.time < 9.55)).any()
 
 
+def write_bag(bag: Path, planted: Planted, torques: Array, pushed_after: float = math.inf) -> None:
+    """A bag of the motion with other torques, which states a push after a time, s."""
+    names = list(WAM.motors.names)
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/wam/motor_states", "sensor_msgs/msg/JointState", typestore=STORE)
+        push = writer.add_connection("/wam/sim/disturbance", "geometry_msgs/msg/WrenchStamped", typestore=STORE)
+        for time, theta, torque in zip(planted.time, planted.theta.tolist(), torques.tolist(), strict=True):
+            stamp = round(1e9 * time)
+            writer.write(topic, stamp, joint_state(stamp, names, theta, [0.0] * 4, torque))
+            if time > pushed_after:
+                writer.write(push, stamp, wrench(stamp, "inner_link", 0.0, 3.0, 0.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.slow
+def test_a_model_that_contradicts_the_configured_arm_is_written_by_force_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planted, bag, model = Planted(25.0, 5), tmp_path / "bag", tmp_path / "model.yaml"
+    write_bag(bag, planted, 1.6 * planted.torque)
+    for more, code in ((["--force"], 0), ([], 1)):
+        model.unlink(missing_ok=True)
+        with pytest.raises(SystemExit) as ended:
+            main(["identify", str(bag), "--write", str(model), *more])
+        assert ended.value.code == code
+        assert model.exists() is (code == 0)
+    assert re.search(r"all torques are 1\.\d times those of the configuration: amperes", capsys.readouterr().err)
+
+
 @pytest.mark.slow
 def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_have(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -307,15 +404,8 @@ def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_h
     """
     planted = Planted(14.0, 5)
     pushed = planted.torque - [0.3, 0.0, 0.0, 0.0] * np.sign(np.gradient(planted.theta, axis=0))
-    bag, model, names = tmp_path / "bag", tmp_path / "model.yaml", [f"motor{i}" for i in (1, 2, 3, 4)]
-    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        topic = writer.add_connection("/wam/motor_states", "sensor_msgs/msg/JointState", typestore=STORE)
-        push = writer.add_connection("/wam/sim/disturbance", "geometry_msgs/msg/WrenchStamped", typestore=STORE)
-        for time, theta, torque in zip(planted.time, planted.theta.tolist(), pushed.tolist(), strict=True):
-            stamp = round(1e9 * time)
-            writer.write(topic, stamp, joint_state(stamp, names, theta, [0.0] * 4, torque))
-            if time > 7.0:
-                writer.write(push, stamp, wrench(stamp, "inner_link", 0.0, 3.0, 0.0, 0.0, 0.0, 0.0))
+    bag, model = tmp_path / "bag", tmp_path / "model.yaml"
+    write_bag(bag, planted, pushed, 7.0)
     with pytest.raises(SystemExit) as ended:
         main(["identify", str(bag), "--write", str(model)])
     assert ended.value.code == 1

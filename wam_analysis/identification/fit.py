@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns
+from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns, with_kept_weight
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_analysis.identification.tracked_errors import TrackedErrors, tracked_errors
@@ -121,6 +121,11 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     ----------
     shared : the arm and its present model, which is the prior.
     motion : free motion, without contacts.
+
+    Raises
+    ------
+    ValueError
+        if no motor turns in one direction for long enough.
     """
     sought = unknowns(shared)
     present = np.array(shared.model.motors.stribeck_velocity)
@@ -128,6 +133,13 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     def estimate(velocity: Array, start: Array | None = None) -> _Estimate:
         return _estimate(Regressor(shared, sought, motion, velocity), sought, start)
 
+    still = _still(shared, Regressor(shared, sought, motion, present).equations(sought.present))
+    if len(still) == len(present):
+        raise ValueError(
+            f"no joint turns freely for {IDENTIFY.least_motion:g} s: let each motor turn, faster than "
+            f"{IDENTIFY.slowest_motor:g} rad/s, in both directions"
+        )
+    sought = with_kept_weight(sought, shared, still)
     first = estimate(present)
     tried = [estimate(np.full(len(present), velocity), first.values) for velocity in VELOCITIES]
     chosen = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
@@ -140,8 +152,15 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
     uncertainty = _uncertainty(sought, best, _through(shared), regressor.asymmetric_loads(best.values))
-    tracked = tracked_errors(regressor, shared.arm.joints.names, best.values, uncertainty)
+    tracked = tracked_errors(regressor, shared.arm.joints.names, still, best.values, uncertainty)
     return _result(sought, best, chosen.velocity, uncertainty, tracked)
+
+
+def _still(shared: Shared, equations: Equations) -> list[int]:
+    """Joints of which a motor does not move enough to show their torques."""
+    seconds = equations.is_used.sum(0) * float(np.median(np.diff(equations.time)))
+    matrix = TransmissionMap.of(shared.arm).joint_from_motor
+    return [j for j, row in enumerate(matrix) if (seconds[row != 0.0] < IDENTIFY.least_motion).any()]
 
 
 def _through(shared: Shared) -> Array:
@@ -163,14 +182,17 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None
     for _ in range(IDENTIFY.iterations if start is None else IDENTIFY.warm_iterations):
         equations = regressor.equations(values)
         normal = _normal(equations, part, values)
-        prior = prior_sd**-2
+        prior = sought._replace(prior_sd=prior_sd).prior
         values = _solve(normal.information.sum(0), normal.vector.sum(0), prior, centre)
         below = values < least
         prior_sd[below], centre[below] = IDENTIFY.pinned * sought.prior_sd[below], least[below]
         values = np.maximum(values, least)
     information, vector = normal.information.sum(0), normal.vector.sum(0)
     without = np.array(
-        [_solve(information - i, vector - v, prior_sd**-2, centre) for i, v in zip(*normal, strict=True)]
+        [
+            _solve(information - i, vector - v, sought._replace(prior_sd=prior_sd).prior, centre)
+            for i, v in zip(*normal, strict=True)
+        ]
     )
     left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
     squares = left**2 * equations.is_used
@@ -214,7 +236,7 @@ def _deviation(residuals: Array) -> float:
 
 
 def _solve(information: Array, vector: Array, prior: Array, centre: Array) -> Array:
-    return np.asarray(np.linalg.solve(information + np.diag(prior), vector + prior * centre), np.float64)
+    return np.asarray(np.linalg.solve(information + prior, vector + prior @ centre), np.float64)
 
 
 def _rms(left: Array, is_used: NDArray[np.bool_]) -> Array:
@@ -230,16 +252,16 @@ def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: 
         # the friction of a joint adds to the load of its motor's friction or takes from it, by the way of the load
         by_joint = best.values[load] * through / np.sqrt(3.0)
         variance[coulomb] = (IDENTIFY.law * best.values[coulomb]) ** 2 + by_joint**2
-    white = np.linalg.inv(best.normal.information.sum(0) + np.diag(sought.prior_sd**-2))
+    white = np.linalg.inv(best.normal.information.sum(0) + sought.prior)
     # what the estimate takes for other friction, were there one sd of the asymmetry
     weighted = equations.columns * _weights(equations, best.values)[..., None]
     size = IDENTIFY.asymmetry * best.values[sought.places("joints.load")]
     taken = white @ np.einsum("knp,knj->pj", weighted, asymmetric * size)
-    moved = _moved_by_averaging(best)
+    moved = _moved_by_averaging(best, sought._replace(prior_sd=best.prior_sd).prior)
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
 
 
-def _moved_by_averaging(best: _Estimate) -> Array:
+def _moved_by_averaging(best: _Estimate, prior: Array) -> Array:
     """By how much the estimate differs, (p,), where neighbouring equations are averaged, from that of the same ones.
 
     Of a right model it would not.  Torque ripple accelerates the rotors within a window, the cables give way to it and
@@ -259,7 +281,7 @@ def _moved_by_averaging(best: _Estimate) -> Array:
     def solved(torque: Array, columns: Array) -> Array:
         weighted = columns * (weights[middle] * whole)[..., None]
         information = np.einsum("knp,knq->pq", weighted, columns, optimize=True)
-        return _solve(information, np.einsum("knp,kn->p", weighted, torque), best.prior_sd**-2, best.values)
+        return _solve(information, np.einsum("knp,kn->p", weighted, torque), prior, best.values)
 
     averaged = [
         np.asarray(sliding_window_view(each, IDENTIFY.averaged, 0) @ (bell / bell.sum()), np.float64)

@@ -91,7 +91,7 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     source : the recording.
     """
     try:
-        _ = configuration.with_values(values).shared
+        _ = configuration.with_values(values).shared.model_arm
     except ParameterError as error:
         reason = str(error).removeprefix(f"{configuration.path}, section '{SHARED}': ")
         return (

@@ -7,6 +7,7 @@ is off cannot be separated from friction and masses, which are all those of the 
 by between motors that move the same joints, as no masses do.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.thresholds import IDENTIFY
 from wam_description.arm import Shared
+from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
@@ -33,6 +35,7 @@ class Unknowns(NamedTuple):
     prior_sd : (p,).
     joints : indices of the joints whose friction is estimated.
     sharing : indices of the motors that move these joints together.
+    kept : (p, p), information that keeps the weight at joints that the motion does not show.
     """
 
     names: tuple[str, ...]
@@ -40,6 +43,13 @@ class Unknowns(NamedTuple):
     prior_sd: Array
     joints: tuple[int, ...]
     sharing: tuple[int, ...]
+    kept: Array
+
+    @property
+    def prior(self) -> Array:
+        """(p, p), information before the motion."""
+        found: Array = np.diag(self.prior_sd**-2) + self.kept
+        return found
 
     def places(self, group: str) -> list[int]:
         """Where the parameters of a group are, as 'motors.viscous'."""
@@ -116,4 +126,18 @@ def unknowns(shared: Shared) -> Unknowns:
         add(f"links.moment_{axis}", of_links, mass * centre[:, i], IDENTIFY.centre * mass)
     for i, axis in enumerate(AXES):
         add(f"links.inertia_{axis}", of_links, inertia[:, i], IDENTIFY.inertia * inertia[:, i])
-    return Unknowns(tuple(names), np.array(present), np.array(sd), joints, tuple(sharing))
+    kept = np.zeros((len(names), len(names)))
+    return Unknowns(tuple(names), np.array(present), np.array(sd), joints, tuple(sharing), kept)
+
+
+def with_kept_weight(sought: Unknowns, shared: Shared, still: Sequence[int]) -> Unknowns:
+    """The same where the weight of the links at some joints stays as configured: the motion does not show it."""
+    arm, rest = shared.arm, np.zeros(len(shared.arm.joints.names))
+    random = np.random.Generator(np.random.PCG64(IDENTIFY.seed))
+    poses = random.uniform(arm.joints.lower, arm.joints.upper, (IDENTIFY.poses, len(rest)))
+    body, groups = RigidBody(arm), ("links.mass", *(f"links.moment_{axis}" for axis in AXES))
+    rows = np.zeros((len(poses) * len(still), len(sought.names)))
+    torques = np.concatenate([body.inverse_dynamics_regressor(q, rest, rest)[list(still)] for q in poses])
+    for i, group in enumerate(groups):
+        rows[:, sought.places(group)] = torques[:, i::10]
+    return sought._replace(kept=rows.T @ rows / IDENTIFY.kept_weight**2)

@@ -6,6 +6,7 @@ counted as those tracked errors whose torques are nearest to its own in the moti
 small, and `left`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ class TrackedErrors(NamedTuple):
 
     Attributes
     ----------
-    names : t, those of identified parameters; links.torque.J is the torque of links, pulleys and rotors at a joint.
+    names : t, those that the motion shows; links.torque.J is the torque of links, pulleys and rotors at a joint.
     covariance : (t, t), of friction in N m, load friction and torque of the inertias per torque.
     left : (n,), standard deviation of each motor's torque by errors that are no tracked ones, N m.
     """
@@ -37,20 +38,25 @@ class TrackedErrors(NamedTuple):
 
 
 def tracked_errors(
-    regressor: Regressor, joints: tuple[str, ...], values: Array, uncertainty: Uncertainty
+    regressor: Regressor, joints: Sequence[str], still: Sequence[int], values: Array, uncertainty: Uncertainty
 ) -> TrackedErrors:
     """Express the covariance of what was identified in tracked errors.
+
+    What the motion does not show has no row: the estimator keeps what it knows of it.
 
     Parameters
     ----------
     regressor : of the motion.
     joints : names of all joints.
+    still : those, by index, whose torques the motion does not show.
     values : (p,), of all parameters.
     uncertainty : of them.
     """
     equations, names = regressor.equations(values), regressor.unknowns.names
-    own = [i for i, name in enumerate(names) if name.startswith(THEMSELVES)]
-    every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)), axis=2)
+    shown = np.abs(equations.columns[equations.is_used]).max(axis=0) > IDENTIFY.least_column
+    own = [i for i, name in enumerate(names) if name.startswith(THEMSELVES) and shown[i]]
+    moved = [j for j in range(len(joints)) if j not in still]
+    every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)[:, :, moved]), axis=2)
     tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
     columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
     size = np.maximum(np.linalg.norm(tracked, axis=0), IDENTIFY.least_column)
@@ -61,7 +67,7 @@ def tracked_errors(
         for i, used in enumerate(equations.is_used.T)
     ]
     return TrackedErrors(
-        (*(names[i] for i in own), *(f"links.torque.{joint}" for joint in joints)),
+        (*(names[i] for i in own), *(f"links.torque.{joints[j]}" for j in moved)),
         uncertainty.covariance(nearest),
         np.array(rms),
     )

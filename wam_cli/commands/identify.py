@@ -5,10 +5,12 @@ import os
 import shlex
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
+from wam_analysis.identification.contradictions import contradictions, sentence
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import LOADS, loaded, recorded_motion
 from wam_analysis.identification.overlay import HEADING as MODEL_HEADING
@@ -59,6 +61,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
     parser.add_argument("--directory", type=writable_directory, help="with --excite: of the bag, default bags")
     parser.add_argument("--write", type=MODEL, metavar="YAML", help="configuration to write, for --config or base:")
+    parser.add_argument(
+        "--force", action="store_true", help="with --write: write also a model that contradicts the configured arm"
+    )
     take_arm(parser)
     take_configuration(parser)
 
@@ -81,27 +86,41 @@ def run(given: argparse.Namespace) -> int:
         print(f"{run_in_bag.others}\n", flush=True)
     shared = configuration.shared
     _refuse_other_arm(run_in_bag, shared)
-    found = identify(shared, recorded_motion(run_in_bag, shared.arm))
+    motion = recorded_motion(run_in_bag, shared.arm)
+    found = identify(shared, motion)
+    against = [sentence(one) for one in contradictions(shared, motion, found)]
     values = model_values(shared, found, bag.name) | estimator_values(configuration)
     impossible = impossibility(configuration, values, str(bag))
     if impossible:
         print(f"NOT POSSIBLE: {impossible}\n")  # before a report of many lines, and as the last line
     print(report(shared, found, str(bag)), flush=True)
-    if run_in_bag.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
-        print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
-    if loads := " and ".join(loaded(run_in_bag)):
-        print(
-            f"warning: {loads} of the recording: what acted on the arm is in the values above, and not in their "
-            "standard errors; identify from free motion. A contact where nothing was comes from a model that is off, "
-            "as before an identification"
-        )
+    _warn(run_in_bag, against)
     if impossible:
         raise ParameterError(impossible)
+    if against and not given.force:
+        raise ValueError(
+            f"{bag} contradicts the configuration, so no model is written: {against[0]} Correct the recording or the "
+            "configuration; --force writes the model all the same"
+        )
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         write_overlay(given.write, _base(given), values, command)
         print(f"written: {given.write}; use it with --config {given.write}, or as base: of a configuration of yours")
     return 0
+
+
+def _warn(run: RecordedRun, against: Sequence[str]) -> None:
+    """Print what is wrong with a recording."""
+    for text in against:
+        print(f"CONTRADICTS the configuration: {text}")
+    if run.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
+        print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
+    if loads := " and ".join(loaded(run)):
+        print(
+            f"warning: {loads} of the recording: what acted on the arm is in the values above, and not in their "
+            "standard errors; identify from free motion. A contact where nothing was comes from a model that is off, "
+            "as before an identification"
+        )
 
 
 def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:

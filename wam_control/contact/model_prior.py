@@ -131,7 +131,7 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
         add(5 * n + j, f"motors.load_positive.{motor}", 0.5)
         add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
         add(6 * n + j, f"joints.load.{joint}", 1.0)
-    if any(name.startswith("links.torque.") for name in known):  # with the torques, the centres are identified
+    if all(f"links.torque.{joint}" in known for joint in joints):  # with the torques, the centres are identified
         covariance[8 * n : 11 * n] = 0.0
     errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
     errors[6 * n : 7 * n] = model.joints.load

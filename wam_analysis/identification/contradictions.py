@@ -1,0 +1,145 @@
+"""Where a motion contradicts the configured arm, so that a model identified from it would be a wrong one.
+
+Torques of the configured arm are compared with the recorded ones, as recorded and with each mistake that a recording
+may have: the mistake that explains them much better is the likely cause.
+"""
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.fit import Identification
+from wam_analysis.identification.motion import MotionSamples
+from wam_analysis.identification.parameters import DIRECTIONS
+from wam_analysis.identification.regressor import Regressor
+from wam_analysis.thresholds import IDENTIFY
+from wam_description.arm import Shared
+
+Array = NDArray[np.float64]
+
+
+class Mistake(StrEnum):
+    """What is wrong with a recording."""
+
+    SCALED = "scaled"  # all torques are larger or smaller than those of the configured arm
+    SCALED_MOTOR = "scaled_motor"  # those of one motor are, or have the other sign
+    SWAPPED = "swapped"  # two motors have each other's name
+    UNEXPLAINED = "unexplained"  # the torques of a motor are not those of any arm: something touches it
+    WEIGHT = "weight"  # the links seem to weigh much more or less than configured
+    NO_FRICTION = "no_friction"  # friction of a shaft is identified as none
+
+
+class Contradiction(NamedTuple):
+    """A mistake, the motors or joints that it is about, and its size."""
+
+    mistake: Mistake
+    about: tuple[str, ...]
+    size: float
+
+
+SENTENCES: Mapping[Mistake, str] = {
+    Mistake.SCALED: "all torques are {size:.2g} times those of the configuration: amperes, the other sign, or a load?",
+    Mistake.SCALED_MOTOR: "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or "
+    "torque constant?",
+    Mistake.SWAPPED: "the torques are those of an arm whose motors {about} have each other's name",
+    Mistake.UNEXPLAINED: "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm?",
+    Mistake.WEIGHT: "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, or "
+    "a contact that lasts?",
+    Mistake.NO_FRICTION: "no friction is left at {about}: did something push the arm along its motion?",
+}
+
+
+def sentence(found: Contradiction) -> str:
+    """The contradiction and its likely cause in words."""
+    return SENTENCES[found.mistake].format(about=" and ".join(found.about), size=found.size)
+
+
+def contradictions(shared: Shared, motion: MotionSamples, found: Identification) -> list[Contradiction]:
+    """What contradicts the configured arm, the likely cause first; empty where the identified model may be used."""
+    cause = _cause(shared, motion, found)
+    return [*([cause] if cause else []), *_symptoms(shared, motion, found)]
+
+
+def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> Iterator[Contradiction]:
+    unknowns, motors = found.unknowns, shared.arm.motors.names
+    level = np.mean([found.values[unknowns.places(f"motors.coulomb_{way}")] for way in DIRECTIONS], axis=0)
+    for name, left, friction in zip(motors, found.residual, level, strict=True):
+        share = float(left / max(friction, IDENTIFY.least_friction))
+        if share > IDENTIFY.contradicted:
+            yield Contradiction(Mistake.UNEXPLAINED, (name,), share)
+    regressor = Regressor(shared, unknowns, motion, found.stribeck_velocity)
+    before, now = (np.abs(regressor.inertial_torques(each).sum(2)).sum() for each in (unknowns.present, found.values))
+    if not 1.0 / IDENTIFY.heavier < now / before < IDENTIFY.heavier:
+        yield Contradiction(Mistake.WEIGHT, (), float(now / before))
+    present = unknowns.present
+    for i, name in enumerate(unknowns.names):
+        is_friction = name.startswith(("motors.coulomb_", "joints.coulomb."))
+        if is_friction and found.is_identified[i] and found.values[i] < IDENTIFY.least_share * present[i]:
+            yield Contradiction(Mistake.NO_FRICTION, (name.rpartition(".")[2],), float(found.values[i]))
+
+
+def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Contradiction | None:
+    """The one mistake that explains the recorded torques much better than none; None where none does."""
+    motors = shared.arm.motors.names
+    fit = _Fit(shared, found)
+    model, torque, used = fit.torques(motion)
+    as_recorded = fit.misfit(model, torque, used)
+    tried: list[tuple[float, Contradiction]] = []
+    scale = _ratio(model, torque, used)
+    tried.append((fit.misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale)))
+    for i, name in enumerate(motors):
+        one = np.ones(len(motors))
+        one[i] = _ratio(model[:, [i]], torque[:, [i]], used[:, [i]])
+        mistake = Contradiction(Mistake.SCALED_MOTOR, (name,), float(one[i]))
+        tried.append((fit.misfit(model, torque / one, used), mistake))
+    for pair in combinations(range(len(motors)), 2):
+        mistake = Contradiction(Mistake.SWAPPED, tuple(motors[i] for i in pair), 1.0)
+        tried.append((fit.misfit(*fit.torques(_swapped(motion, *pair))), mistake))
+    least, cause = min((one for one in tried if _is_mistake(one[1])), key=lambda one: one[0])
+    is_clear = as_recorded > IDENTIFY.misfit and least < IDENTIFY.better * as_recorded
+    return cause if is_clear else None
+
+
+class _Fit:
+    """Torques of the configured arm for a motion, and how far recorded ones are from them."""
+
+    def __init__(self, shared: Shared, found: Identification) -> None:
+        self._shared, self._unknowns = shared, found.unknowns
+        self._stribeck = np.array(shared.model.motors.stribeck_velocity)
+
+    def torques(self, motion: MotionSamples) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Of the configured arm and as recorded, N m, and where they count, (k, n) each."""
+        equations = Regressor(self._shared, self._unknowns, motion, self._stribeck).equations(self._unknowns.present)
+        model = equations.columns @ self._unknowns.present + motion.torque - equations.torque
+        return model, motion.torque, equations.is_used
+
+    @staticmethod
+    def misfit(model: Array, torque: Array, used: NDArray[np.bool_]) -> float:
+        """Rms difference per rms torque of the model, the mean over motors."""
+        counts = np.maximum(used.sum(0), 1)
+        left, size = (np.sqrt((each**2 * used).sum(0) / counts) for each in (torque - model, model))
+        moved = used.any(0)
+        return float(np.mean(left[moved] / np.maximum(size[moved], IDENTIFY.least_friction))) if moved.any() else 0.0
+
+
+def _ratio(model: Array, torque: Array, used: NDArray[np.bool_]) -> float:
+    """How many times the torques of the model the recorded ones are; 1 where that is not known."""
+    product, square = float((model * torque * used).sum()), float((model**2 * used).sum())
+    return product / square if square and product else 1.0
+
+
+def _is_mistake(found: Contradiction) -> bool:
+    """Whether a factor is one that no torque constant or mass is wrong by."""
+    return found.mistake is Mistake.SWAPPED or not 1.0 / IDENTIFY.scaled < found.size < IDENTIFY.scaled
+
+
+def _swapped(motion: MotionSamples, i: int, j: int) -> MotionSamples:
+    """The motion with two motors in each other's place."""
+    order = np.arange(motion.theta.shape[1])
+    order[[i, j]] = j, i
+    values = {name: value[..., order] for name, value in motion._asdict().items() if value.ndim > 1}
+    return motion._replace(**values)
