@@ -43,8 +43,7 @@ from wam_studies.figures.catalogue import table as figures_table
 from wam_studies.figures.panels import Panels, distances, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
-from wam_studies.plant.figure import figure
-from wam_studies.plant.figure import table as plant_table
+from wam_studies.plant import table as plant_table
 from wam_studies.scorecard import report as scorecard
 from wam_studies.tasks.pictures import save as save_task
 from wam_studies.thesis import claims
@@ -249,15 +248,7 @@ def listing(name: str) -> str:
     return f"```python\n{(ROOT / name).read_text(encoding='utf-8')}```\n"
 
 
-@cache
-def plant_study() -> dict[str, float]:
-    """Differences between plant and theory; also draws docs/plant.png."""
-    with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
-        picture = Path(folder) / "plant.png"
-        errors = figure(picture)
-        if WRITES_PICTURES:
-            shutil.copyfile(picture, ROOT / "docs" / "plant.png")
-    return errors
+plant_study = cache(plant_table.errors)
 
 
 @cache
@@ -288,7 +279,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, printed": lambda: constants(ARM_PRINTED),
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
-        "plant": lambda: plant_table(plant_study()),
+        "plant": lambda: plant_table.table(plant_study()),
         "resting pushes": resting_pushes,
         "steps of a scenario": lambda: markdown(
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]

@@ -4,8 +4,8 @@ One link on one motor, the testbed of section 5.6 with one effect at a time.  A 
 has a rotor of practically infinite inertia.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -242,6 +242,7 @@ def surface(hardening: float) -> PlantCurve:
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
 
 
+@cache
 def stiction_cycle() -> PlantCurve:
     """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
     found = force_step(20.0, 1464.28, 2e-2, 12.0, (6.0, 4.0), 8.0)
@@ -379,21 +380,3 @@ def breakaway(plant: Plant, at_joint: bool, start: float) -> float:
             plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
         plant.step([0.0 if at_joint else torque])
     return torque
-
-
-STUDIES: dict[str, Callable[[], PlantCurve]] = {
-    "slack": slack,
-    "backlash": backlash,
-    "creep": creep_out_and_back,
-    "efficiency": efficiency_under_load,
-    "torque control": coulomb_like,
-    "pretension": pretension,
-    "ripple": ripple,
-    "linear surface": lambda: surface(0.0),
-    "hardening surface": lambda: surface(50.0),
-    "impact": impact,
-    "actuator cycle": actuator_cycle,
-    "backlash in the loop": actuator_cycle_with_backlash,
-    "backlash in a torque loop": backlash_in_a_torque_loop,
-    "stiction cycle": stiction_cycle,
-}

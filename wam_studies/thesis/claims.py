@@ -12,7 +12,7 @@ import yaml
 
 from wam_analysis.table import markdown
 from wam_studies.figures.catalogue import FIGURES
-from wam_studies.plant.figure import EFFECTS
+from wam_studies.plant.table import EFFECTS
 
 PLACE = re.compile(r"\{(figure|effect) ([^}]+)\}")
 PAGES = {"experiment": "experiments.md", "task": "tasks.md", "figure": "figures.md", "effect": "plant.md"}
