@@ -18,6 +18,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_description.units import si
+from wam_studies.figures.panels import Panel
 from wam_studies.thesis import (
     arm_forces,
     cables,
@@ -34,7 +35,7 @@ from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.one_link import growth, one_link
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
-from wam_studies.thesis.rows import Comparison, Panel, Result, markdown, plain
+from wam_studies.thesis.rows import Comparison, Result, markdown, plain
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from wam_cli.options import PAGE, writable_directory
 from wam_ros.process_signals import Stop
 from wam_studies.experiment_runs import record
+from wam_studies.figures.panels import draw_panels
 from wam_studies.thesis.definition import Experiment, Run, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
-from wam_studies.thesis.figure import draw
 from wam_studies.thesis.page import write
 from wam_studies.thesis.rows import Result
 from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
@@ -76,7 +76,7 @@ def run(given: argparse.Namespace) -> int:
         drawn = ""
         if result.panels:
             picture.parent.mkdir(parents=True, exist_ok=True)
-            draw(experiment, result, picture)
+            draw_panels(result.panels, picture, 2, f"{experiment.title} (section {experiment.section})")
             drawn = f"picture  {picture}\n"
         print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         results[experiment.name] = (experiment, result, picture)

@@ -11,7 +11,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Panels, ThesisPanel, line_only
+from wam_studies.figures.panels import Panel, Panels, line_only
 
 
 class Backdriven(NamedTuple):
@@ -91,7 +91,7 @@ def backdrivability() -> Panels:
     part = (np.arange(CASE.backdriven_poses) + 0.5) / CASE.backdriven_poses
     found = {name: np.array([tip.at(tuple(q), mass)[:3] for q in poses]) for name, mass in PAYLOADS.items()}
     return tuple(
-        ThesisPanel(
+        Panel(
             f"{'abc'[i]})",
             quantity,
             "part of the poses [-]",

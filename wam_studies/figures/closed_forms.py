@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wam_studies.figures.panels import Mark, Panels, Series, ThesisPanel, line_only
+from wam_studies.figures.panels import Mark, Panel, Panels, Series, line_only
 from wam_studies.plant.effects import creep_out_and_back, efficiency_under_load, resonances
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
 from wam_theory.cable import efficiency, stage_loss
@@ -27,8 +27,8 @@ def grasp() -> Panels:
         length.append((f"μ = {mu:g}", line_only(ratio, useful_length(ratio, secure_angle(mu)))))
         diameter.append((f"μ = {mu:g}", line_only(ratio, largest_cylinder(ratio, mu))))
     return (
-        ThesisPanel("useful length of a link (3.2)", aspect, "L'/L [-]", tuple(length), "x"),
-        ThesisPanel("largest cylinder (3.3)", aspect, "D/L [-]", tuple(diameter), "x"),
+        Panel("useful length of a link (3.2)", aspect, "L'/L [-]", tuple(length), "x"),
+        Panel("largest cylinder (3.3)", aspect, "D/L [-]", tuple(diameter), "x"),
     )
 
 
@@ -58,9 +58,9 @@ def breakpoints() -> Panels:
     axes, shown = ("contact stiffness at the joint [N m/rad]", "frequency [Hz]"), (np.nan, np.nan, 1.0, 2e3)
     marks = (Mark("(4.9)", crossover),)
     return (
-        ThesisPanel("a) breakpoints (4.4)", *axes, (("ω₁", lower), ("ω₂", upper)), "xy", marks, shown),
-        ThesisPanel("b) the approximation for small N", *axes, limits, "xy", marks, shown),
-        ThesisPanel(
+        Panel("a) breakpoints (4.4)", *axes, (("ω₁", lower), ("ω₂", upper)), "xy", marks, shown),
+        Panel("b) the approximation for small N", *axes, limits, "xy", marks, shown),
+        Panel(
             f"c) several N, N_m = {matched:.4g}",
             "contact stiffness over that of (4.9) [-]",
             "ω₁ over its asymptote (4.6) [-]",
@@ -83,8 +83,8 @@ def efficiencies() -> Panels:
     equal = [(f"n = {n}", line_only(1e2 * strain, equal_stages_efficiency(strain, 1.0, float(n)))) for n in range(1, 7)]
     testbed, power = Series(torques, np.array(line), found.x, found.plant), "power out over power in [-]"
     return (
-        ThesisPanel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
-        ThesisPanel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),
+        Panel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
+        Panel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),
     )
 
 
@@ -95,4 +95,4 @@ def creep() -> Panels:
     line = Series(found.x, found.theory, found.x[::each], found.plant[::each]).scaled(1.0, 1e3)
     back = Mark("motor reverses", float(found.x[-1]) / 2.0)
     axes = "absolute travel of the motor [rad]", "creep of the link [mrad]"
-    return (ThesisPanel("creep, out and back", *axes, (("(6.19)", line),), marks=(back,)),)
+    return (Panel("creep, out and back", *axes, (("(6.19)", line),), marks=(back,)),)

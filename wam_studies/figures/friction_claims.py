@@ -6,7 +6,7 @@ The node has J_l = 1, k_tr + k_c = 4 and F_dynamic = 1, unless a stiffness is th
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
+from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
 from wam_theory.describing_function import predicted_unstable_cycle, unstable_cycle
 from wam_theory.guidelines import kept_contact_ratio
 from wam_theory.harmonics import harmonic_share
@@ -51,8 +51,8 @@ def asymmetric_start(number: float = 0.002, slips: int = 800) -> Panels:
         period.append((f"ζ = {zeta:g}", Series(half, predicted, half[::25], cycles[::25])))
     over = "period over that of (5.9) [-]"
     return (
-        ThesisPanel("a) asymmetry", "slips [-]", "asymmetry over D [-]", tuple(asymmetry), "y"),
-        ThesisPanel("b) period", "cycles [-]", over, tuple(period), limits=(0.0, 200.0, 0.95, np.nan)),
+        Panel("a) asymmetry", "slips [-]", "asymmetry over D [-]", tuple(asymmetry), "y"),
+        Panel("b) period", "cycles [-]", over, tuple(period), limits=(0.0, 200.0, 0.95, np.nan)),
     )
 
 
@@ -102,8 +102,8 @@ def harmonics_of_friction(zeta: float = 0.25) -> Panels:
     amplitude, routh = "amplitude of F_c over F_dynamic [-]", Mark("Routh", 1.0)
     over = "over the fundamental [%]"
     return (
-        ThesisPanel("a) harmonics of the velocity", "γ [-]", over, tuple(shares), is_relative=True),
-        ThesisPanel("b) cycles", "γ [-]", amplitude, cycles, "", (routh,), (np.nan, np.nan, 0.0, 20.0)),
+        Panel("a) harmonics of the velocity", "γ [-]", over, tuple(shares), is_relative=True),
+        Panel("b) cycles", "γ [-]", amplitude, cycles, "", (routh,), (np.nan, np.nan, 0.0, 20.0)),
     )
 
 
@@ -142,9 +142,7 @@ def kept_contact() -> Panels:
         found = np.array([_largest_step_down(value, zeta) for value in points])
         series.append((f"ζ = {zeta:g}", Series(gamma, kept_contact_ratio(gamma, zeta), points, found)))
     shown = (0.7, np.nan, 1.0, 9.0)
-    return (
-        ThesisPanel("contact is lost above", "γ [-]", "F_0/F_des [-]", tuple(series), limits=shown, is_relative=True),
-    )
+    return (Panel("contact is lost above", "γ [-]", "F_0/F_des [-]", tuple(series), limits=shown, is_relative=True),)
 
 
 def _largest_step_down(gamma: float, zeta: float) -> float:

@@ -15,7 +15,7 @@ from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel
+from wam_studies.figures.panels import Numbers, Panel, Panels, Series
 from wam_studies.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
@@ -113,7 +113,7 @@ def inner_loops() -> Panels:
     return _attenuation(), _largest_gains()
 
 
-def _attenuation() -> ThesisPanel:
+def _attenuation() -> Panel:
     arm = damped_testbed()
     theory, plant = period_map(arm), plant_period_map(arm)
     frequency, some = np.geomspace(0.3, 100.0, 400), np.array([0.5, 2.0, 5.0, 20.0, 50.0])
@@ -133,10 +133,10 @@ def _attenuation() -> ThesisPanel:
         for name, gain in gains.items()
     ]
     title = "a) disturbance at the motor, half of the largest gain"
-    return ThesisPanel(title, "frequency [Hz]", "part that reaches the contact [-]", tuple(lines), "xy")
+    return Panel(title, "frequency [Hz]", "part that reaches the contact [-]", tuple(lines), "xy")
 
 
-def _largest_gains() -> ThesisPanel:
+def _largest_gains() -> Panel:
     stiffness, some = np.geomspace(0.5, 3.0, 60), np.array([0.6, 1.0, 1.5, 2.5])
     lines = []
     for loop in LOOPS:
@@ -147,6 +147,6 @@ def _largest_gains() -> ThesisPanel:
         reference = float(np.interp(1.0, stiffness, line))
         lines.append((loop.name, Series(stiffness, line / reference, some, points / reference)))
     title = "b) largest stable gain, over that of the testbed"
-    return ThesisPanel(
+    return Panel(
         title, "stiffness of the cable over that of the testbed [-]", "largest gain over that [-]", tuple(lines), "xy"
     )

@@ -15,7 +15,7 @@ from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel, line_only
+from wam_studies.figures.panels import Numbers, Panel, Panels, Series, line_only
 from wam_studies.plant.ideal_testbed import EMPTY
 
 WORST = "worst by statics, "  # label of a bound
@@ -148,8 +148,8 @@ def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, s
     return found
 
 
-def _panel(title: str, lines: list[tuple[str, Series]]) -> ThesisPanel:
-    return ThesisPanel(title, "error over the largest steady force [%]", "part of the poses [-]", tuple(lines))
+def _panel(title: str, lines: list[tuple[str, Series]]) -> Panel:
+    return Panel(title, "error over the largest steady force [%]", "part of the poses [-]", tuple(lines))
 
 
 def table(panels: Panels) -> str:

@@ -1,16 +1,21 @@
 """A figure as data: panels of lines of theory with points of the plant, their distance, and how they are drawn."""
 
 import math
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
+from wam_analysis.drawing import COLOURS, PREDICTED, widen_flat
 from wam_studies.figures.style import GREY, SHADES, panels
 
 Numbers = NDArray[np.float64]
+FEW = 130  # points, up to which each is drawn as a circle
+MOST_POINTS = 2000  # of a recording, drawn
 
 
 class Series(NamedTuple):
@@ -50,6 +55,9 @@ def _distance(line: Numbers, point: Numbers) -> float:
     return float(np.min(np.linalg.norm(begin + fraction[:, np.newaxis] * along - point, axis=1)))
 
 
+Line = tuple[str, Series]  # with its label
+
+
 class Mark(NamedTuple):
     """A point with a name; of a NaN coordinate a line across the panel."""
 
@@ -58,7 +66,7 @@ class Mark(NamedTuple):
     y: float = math.nan
 
 
-class ThesisPanel(NamedTuple):
+class Panel(NamedTuple):
     """One pair of axes.
 
     Attributes
@@ -74,7 +82,7 @@ class ThesisPanel(NamedTuple):
     title: str
     x: str
     y: str
-    lines: tuple[tuple[str, Series], ...]
+    lines: Sequence[Line]
     logarithmic: str = ""
     marks: tuple[Mark, ...] = ()
     limits: tuple[float, float, float, float] = (math.nan,) * 4
@@ -97,7 +105,7 @@ class ThesisPanel(NamedTuple):
         return next(mark for mark in self.marks if mark.text.startswith(text))
 
 
-Panels = tuple[ThesisPanel, ...]
+Panels = tuple[Panel, ...]
 
 
 def distances(found: Panels) -> dict[str, float]:
@@ -110,22 +118,36 @@ def line_only(x: ArrayLike, y: ArrayLike) -> Series:
     return Series(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
 
 
-def draw_panels(found: Panels, file: Path, columns: int = 3) -> None:
-    """Draw the panels row by row."""
+def measured(x: ArrayLike, y: ArrayLike) -> Series:
+    """What was measured, without a line."""
+    return Series(np.zeros(0), np.zeros(0), np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+
+
+def draw_panels(found: Sequence[Panel], file: Path, columns: int = 3, title: str = "") -> None:
+    """Draw the panels row by row; the suffix of the file is its format."""
     columns = min(columns, len(found))
     rows = -(-len(found) // columns)
-    with panels(file, rows, columns, 3.7 * max(columns, 1.4), 2.9 * rows) as (_, axes):
+    with panels(file, rows, columns, 3.7 * max(columns, 1.4), 2.9 * rows) as (figure, axes):
         for one, panel in zip(axes, found, strict=False):
-            _draw(one, panel)
+            draw_panel(one, panel)
         for unused in axes[len(found) :]:
             unused.set_axis_off()
+        if title:
+            figure.suptitle("\n".join(textwrap.wrap(title, 60 * columns)), fontsize=9)
 
 
-def _draw(axes: Axes, panel: ThesisPanel) -> None:
-    for i, (label, series) in enumerate(panel.lines):
-        colour = SHADES[i % len(SHADES)]
-        axes.plot(series.x, series.y, color=colour, label=label)
-        axes.plot(series.plant_x, series.plant_y, "o", color=colour, markersize=3.4, mfc="none", mew=0.9)
+def draw_panel(axes: Axes, panel: Panel) -> None:
+    """Draw a panel: few points as circles, a recording as a line with what is predicted dashed."""
+    is_recorded = any(len(series.plant_x) > FEW for _, series in panel.lines)
+    unnamed = iter(SHADES * 9)
+    for label, series in panel.lines:
+        is_line = len(series.x) > 0
+        colour = COLOURS.get(label) or (PREDICTED if is_recorded and is_line else next(unnamed))
+        axes.plot(series.x, series.y, "--" if is_recorded else "-", color=colour, label=label if is_line else None)
+        each = slice(None, None, max(1, len(series.plant_x) // MOST_POINTS))
+        style: dict[str, Any] = {} if len(series.plant_x) > FEW else {"ls": "", "marker": "o", "ms": 3.4, "mfc": "none"}
+        name = None if is_line else label
+        axes.plot(series.plant_x[each], series.plant_y[each], color=colour, label=name, **style)
     for mark in panel.marks:
         _name(axes, mark)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
@@ -134,7 +156,12 @@ def _draw(axes: Axes, panel: ThesisPanel) -> None:
     low_x, high_x, low_y, high_y = (None if math.isnan(limit) else limit for limit in panel.limits)
     axes.set_xlim(low_x, high_x)
     axes.set_ylim(low_y, high_y)
-    axes.legend()
+    if not panel.logarithmic:
+        widen_flat(axes)
+    handles, labels = axes.get_legend_handles_labels()
+    if any(labels):
+        once = dict(zip(labels, handles, strict=True))
+        axes.legend(once.values(), once)
 
 
 def _name(axes: Axes, mark: Mark) -> None:

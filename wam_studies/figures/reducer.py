@@ -6,7 +6,7 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Numbers, Panels, Series, ThesisPanel
+from wam_studies.figures.panels import Numbers, Panel, Panels, Series
 from wam_studies.plant.force_response import loop_plant
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
@@ -86,7 +86,7 @@ def reducer() -> Panels:
     return _stiffness(), _bandwidth(), _torque()
 
 
-def _stiffness() -> ThesisPanel:
+def _stiffness() -> Panel:
     arm = ideal_testbed()
     cables, shares, some = arm.cables, np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 7)
     lines = []
@@ -96,12 +96,10 @@ def _stiffness() -> ThesisPanel:
         line = unit * stiffness_with_reducer(cables.stage_ea[0], length, ratio, shares * length)
         measured = np.array([static_stiffness(line_of(ratio, share)) for share in some])
         lines.append((f"N = {ratio:g}", Series(shares, line, some, measured)))
-    return ThesisPanel(
-        "a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", tuple(lines), "y"
-    )
+    return Panel("a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", tuple(lines), "y")
 
 
-def _bandwidth() -> ThesisPanel:
+def _bandwidth() -> Panel:
     ratios, some = np.geomspace(1.0, 40.0, 60), np.array([1.5, 4.0, 10.0, 30.0])
     arm = line_of(RATIO, 1.0)
     at_joint = position_bandwidth(link_inertia(arm), arm.circuits[0].stiffness, ratios)
@@ -111,10 +109,10 @@ def _bandwidth() -> ThesisPanel:
         ("at the joint, $N\\sqrt{k_{tr}/J_l}$", Series(ratios, HZ * at_joint, some, HZ * measured[0])),
         ("at the motor, same stress", Series(ratios, HZ * at_motor, some, HZ * measured[1])),
     )
-    return ThesisPanel("b) position bandwidth (4.2)", "ratio N [-]", "frequency [Hz]", lines, "xy")
+    return Panel("b) position bandwidth (4.2)", "ratio N [-]", "frequency [Hz]", lines, "xy")
 
 
-def _torque() -> ThesisPanel:
+def _torque() -> Panel:
     some = 2.0 * np.pi * np.array([1.0, 3.0, 6.0, 10.0, 20.0, 35.0, 50.0])
     lines = []
     for thinner, label in ((1.0, "cable of the testbed"), (0.1, "a tenth of its stiffness")):
@@ -124,6 +122,6 @@ def _torque() -> ThesisPanel:
         line = torque_amplification(1j * frequency, *own)
         measured = RATIO / force_amplitude(arm, some)
         lines.append((label, Series(HZ * frequency, line, HZ * some, measured)))
-    return ThesisPanel(
+    return Panel(
         "c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", tuple(lines), "y"
     )

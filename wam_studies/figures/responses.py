@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
+from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
 from wam_studies.plant.force_response import PlantResponse, force_step
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
 from wam_theory.friction_model import IntegralLoop
@@ -61,8 +61,8 @@ def simple_responses() -> Panels:
     desired, shown = Mark("F_des", y=CASE.desired), (np.nan, np.nan, 0.0, 1.12 * CASE.desired)
     constant = Mark("τ = 1/(G_I K)", tau)
     return (
-        ThesisPanel("a) proportional control", TIME, FORCE, (("(5.1)", proportional),), "", (desired,), shown),
-        ThesisPanel("b) integral control", TIME, FORCE, (("(5.2)", integral),), "", (desired, constant), shown),
+        Panel("a) proportional control", TIME, FORCE, (("(5.1)", proportional),), "", (desired,), shown),
+        Panel("b) integral control", TIME, FORCE, (("(5.2)", integral),), "", (desired, constant), shown),
     )
 
 
@@ -82,8 +82,8 @@ def staircase() -> Panels:
         ("no inertia (5.3), (5.8)", line_only(corners, levels)),
     )
     return (
-        ThesisPanel("a) contact force", TIME, FORCE, lines, marks=(Mark("F_des", y=CASE.stairs),)),
-        ThesisPanel("b) motor", TIME, "k_tr x_m [N m]", (("exact", motor),)),
+        Panel("a) contact force", TIME, FORCE, lines, marks=(Mark("F_des", y=CASE.stairs),)),
+        Panel("b) motor", TIME, "k_tr x_m [N m]", (("exact", motor),)),
     )
 
 
@@ -114,8 +114,8 @@ def coulomb_response() -> Panels:
     force = ("exact", _series(found, found.force, exact, "contact_force", 90))
     motor = ("exact", _series(found, found.motor, exact, "x_m", 90))
     return (
-        ThesisPanel(f"a) γ = {gamma:g}, ζ = {zeta:g}", TIME, FORCE, (force,), marks=(Mark("F_des", y=CASE.desired),)),
-        ThesisPanel("b) motor", TIME, MOTOR, (motor,)),
+        Panel(f"a) γ = {gamma:g}, ζ = {zeta:g}", TIME, FORCE, (force,), marks=(Mark("F_des", y=CASE.desired),)),
+        Panel("b) motor", TIME, MOTOR, (motor,)),
     )
 
 
@@ -128,8 +128,8 @@ def trajectory() -> Panels:
     speed = Series(motion.x_m, motion.v, found.motor[shown], found.velocity[shown]).scaled(1e3, 1.0)
     motor = "motor x_m at the joint [mrad]"
     return (
-        ThesisPanel("a) along the velocity", motor, FORCE, (("exact", force),)),
-        ThesisPanel("b) along the force", motor, "velocity of the link [rad/s]", (("exact", speed),)),
+        Panel("a) along the velocity", motor, FORCE, (("exact", force),)),
+        Panel("b) along the force", motor, "velocity of the link [rad/s]", (("exact", speed),)),
     )
 
 
@@ -154,4 +154,4 @@ def lost_contact() -> Panels:
     )
     axes = "k_c x, above 0 the contact force [N m]", "velocity of the link [rad/s]"
     marks = Mark("contact begins", 0.0), Mark("F_des", CASE.desired, 0.0)
-    return (ThesisPanel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, (("exact", cycle),), marks=marks),)
+    return (Panel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, (("exact", cycle),), marks=marks),)

@@ -7,7 +7,7 @@ their zeta and k_tr = k_c; the plant is the testbed with a contact and a damping
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Mark, Numbers, Panels, Series, ThesisPanel, line_only
+from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
 from wam_studies.plant.force_response import force_step, loop_arm, loop_node, loop_plant
 from wam_studies.plant.ideal_testbed import RATIO
 from wam_theory.describing_function import friction_to_velocity
@@ -41,7 +41,7 @@ def describing_function() -> Panels:
         curves.append((f"b G(jω), γ = {gamma:g}", Series(line.real, line.imag, plant.real, plant.imag)))
     cycle = Mark("unstable limit cycle (5.16)", -1.0 / (CASE.gammas[1] - 1.0), 0.0)
     axes = "real part of b G [-]", "imaginary part of b G [-]"
-    return (ThesisPanel("ζ = 0.25", *axes, tuple(curves), marks=(cycle,), limits=(-4.4, 2.9, -2.1, 3.1)),)
+    return (Panel("ζ = 0.25", *axes, tuple(curves), marks=(cycle,), limits=(-4.4, 2.9, -2.1, 3.1)),)
 
 
 def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
@@ -89,7 +89,7 @@ def stability_bound() -> Panels:
         Mark("B with stiction", float(stiction.x[-1]), float(stiction.y[-1])),
     )
     axes = "gain γ = J_l G_I K/b [-]", "F_friction/F_error [-]"
-    panel = ThesisPanel("k_tr = k_c", *axes, tuple(lines), "", marks, (0.2, 2.6, 0.0, 2.2), is_relative=True)
+    panel = Panel("k_tr = k_c", *axes, tuple(lines), "", marks, (0.2, 2.6, 0.0, 2.2), is_relative=True)
     return (panel,)
 
 

@@ -17,7 +17,7 @@ from wam_driver.driver import DriverParameters
 from wam_driver.friction import FrictionParameters
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Panels, Series, ThesisPanel
+from wam_studies.figures.panels import Panel, Panels, Series
 from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, against_spring, link_inertia, one_step_map
 from wam_theory.cable import efficiency, stage_loss
 from wam_theory.resonance import force_resonances
@@ -238,8 +238,8 @@ def transmissions() -> Panels:
         angle = 1e3 * (torque / by.stiffness + 0.5 * by.play)
         springs.append((kind, Series(torque, angle, steps, 1e3 * np.array([_deflection(it, t) for t in steps]))))
     return (
-        ThesisPanel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", tuple(lines), "xy"),
-        ThesisPanel("b) motor held", "torque on the link [N m]", "deflection [mrad]", tuple(springs)),
+        Panel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", tuple(lines), "xy"),
+        Panel("b) motor held", "torque on the link [N m]", "deflection [mrad]", tuple(springs)),
     )
 
 

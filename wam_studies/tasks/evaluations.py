@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.tasks.object_traces import ObjectTrace, object_traces, world_of
 from wam_studies.thesis.recording import Forces, Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 
 NO_CLAIM = math.nan
 
@@ -128,11 +129,11 @@ def opening(runs: Runs) -> Result:
         *_estimate(run, step),
     ]
     curves = [
-        Curve("measured", "true", open_.time, torque),
-        Curve("predicted", "equation of motion", open_.time, predicted),
+        ("true", measured(open_.time, torque)),
+        ("equation of motion", line_only(open_.time, predicted)),
     ]
     panel = Panel("torque of the arm on the hinge", "time [s]", "torque [N m]", curves)
-    angle = Panel("door", "time [s]", "angle [rad]", [Curve("measured", "", door.time, door.angle)])
+    angle = Panel("door", "time [s]", "angle [rad]", [("", measured(door.time, door.angle))])
     return Result(rows, [panel, angle])
 
 
@@ -237,18 +238,18 @@ def _forces(run: Recording, begin: float, end: float) -> Panel:
     for topic, label in (("contact/wrench", "estimated"), ("sim/contact/wrench", "true")):
         forces = run.forces(topic)
         there = (forces.time >= begin) & (forces.time < end)
-        curves.append(Curve("measured", label, forces.time[there], _along(forces, begin, end)))
+        curves.append((label, measured(forces.time[there], _along(forces, begin, end))))
     commanded = run.forces("force_command")
     there = (commanded.time >= begin) & (commanded.time < end)
     size = np.linalg.norm(commanded.force[there], axis=1)
     if np.any(size):
-        curves.append(Curve("predicted", "commanded", commanded.time[there], size))
+        curves.append(("commanded", line_only(commanded.time[there], size)))
     return Panel("force across the link", "time [s]", "force [N]", curves)
 
 
 def _path(traces: Mapping[str, ObjectTrace], axis: int) -> Panel:
     curves = [
-        Curve("measured", name, trace.time, trace.position[:, axis] - trace.position[0, axis])
+        (name, measured(trace.time, trace.position[:, axis] - trace.position[0, axis]))
         for name, trace in traces.items()
         if len(trace.time)
     ]

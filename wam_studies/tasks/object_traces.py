@@ -7,8 +7,8 @@ import numpy as np
 from wam_bag.bag import BagError, TableColumns
 from wam_description.signals import ObjectState
 from wam_description.world import World
+from wam_studies.figures.panels import Numbers
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Numbers
 
 TOPIC = "sim/objects"
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_bag.bag import BagError, PointColumns
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Forces, Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 
 NO_CONTACT = "base"  # frame of a contact wrench without contact
 
@@ -171,9 +172,9 @@ def _panel(found: Along, steps: Sequence[Step]) -> Panel:
     shown = (found.time >= steps[0].begin) & (found.time < steps[-1].end)
     time = found.time[shown]
     curves = [
-        Curve("measured", "true", time, found.true[shown]),
-        Curve("measured", "estimated", time, found.estimated[shown]),
-        Curve("predicted", "commanded", time, found.commanded[shown]),
+        ("true", measured(time, found.true[shown])),
+        ("estimated", measured(time, found.estimated[shown])),
+        ("commanded", line_only(time, found.commanded[shown])),
     ]
     return Panel("force along the commanded one", "time [s]", "force [N]", curves)
 
@@ -223,7 +224,7 @@ def pushed(runs: Mapping[str, Recording]) -> Result:
     ]
     force = [np.linalg.norm(each.force, axis=1) for each in (truth, estimate)]
     curves = [
-        Curve("measured", "estimated", estimate.time, force[1]),
-        Curve("predicted", "true", truth.time, force[0]),
+        ("estimated", measured(estimate.time, force[1])),
+        ("true", line_only(truth.time, force[0])),
     ]
     return Result(rows, [Panel("force on the arm", "time [s]", "force [N]", curves)])

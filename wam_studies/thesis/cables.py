@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_description.arm import Arm
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory import cable
 
 
@@ -22,26 +23,26 @@ def efficiency(runs: Mapping[str, Recording]) -> Result:
             continue
         torque, input_work, output_work = work(run, step, after)
         predicted = 1.0 - cable.efficiency(_losses(arm, torque))
-        measured = 1.0 - output_work / input_work
+        lost = 1.0 - output_work / input_work
         rows.append(
             Comparison(
                 f"power lost, {torque:.2f} N m at the motor",
                 100 * predicted,
-                100 * measured,
+                100 * lost,
                 "%",
                 BOUNDS.within,
                 "(6.15)",
             )
         )
         torques.append(torque)
-        losses.append(measured)
+        losses.append(lost)
         predictions.append(predicted)
     x = np.array(torques)
     curves = [
-        Curve("measured", "measured", x, 100 * np.array(losses)),
-        Curve("predicted", "(6.15)", x, 100 * np.array(predictions)),
+        ("measured", measured(x, 100 * np.array(losses))),
+        ("(6.15)", line_only(x, 100 * np.array(predictions))),
     ]
-    return Result(rows, [Panel("power lost in the cables", "motor torque [N m]", "[%]", curves)])
+    return Result(rows, [Panel("power lost in the cables", "motor torque [N m]", "power lost [%]", curves)])
 
 
 def work(run: Recording, lift: Step, after: Step) -> tuple[float, float, float]:
@@ -90,7 +91,7 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
             rows.append(
                 Comparison(label, float(1e3 * predicted[at]), float(1e3 * creep[at]), "mrad", BOUNDS.within, "(6.19)")
             )
-    curves = [Curve("measured", "measured", travel, 1e3 * creep), Curve("predicted", "(6.19)", travel, 1e3 * predicted)]
+    curves = [("measured", measured(travel, 1e3 * creep)), ("(6.19)", line_only(travel, 1e3 * predicted))]
     remark = "with the printed signed differential, (6.19) would be zero after each return"
     return Result(
         rows, [Panel("creep, out and back twice", "travel of the motor [rad]", "creep [mrad]", curves)], (remark,)
@@ -117,8 +118,8 @@ def corrected(runs: Mapping[str, Recording]) -> Result:
                 f"error of the joint angle, {label}", 1e3 * left, last, "mrad", within * 1e3 * creep, "(6.19)", True
             )
         )
-        curves.append(Curve("measured", label, joints.time, 1e3 * error))
-    return Result(rows, [Panel("error of the joint angle, from motor angles", "time [s]", "[mrad]", curves)])
+        curves.append((label, measured(joints.time, 1e3 * error)))
+    return Result(rows, [Panel("error of the joint angle, from motor angles", "time [s]", "error [mrad]", curves)])
 
 
 def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link, response, set_until
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory.stiction import play
 
 
@@ -25,7 +26,7 @@ def accuracy(runs: Mapping[str, Recording]) -> Result:
                     name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - BOUNDS.settled_force]
                 )
             )
-            curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
+            curves.append((name.replace("_", " "), measured(shown.time, shown.force)))
     return Result(rows, [panel, Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)])
 
 
@@ -49,7 +50,7 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     worst = float(np.abs(force - expected).max() / expected.max())
     rows.append(Comparison("largest difference", 0.0, worst, "of F_c", BOUNDS.within, "5.2", True))
     each = slice(None, None, 40)
-    curves = [Curve("measured", "measured", desired[each], force[each]), Curve("predicted", "", desired, expected)]
+    curves = [("measured", measured(desired[each], force[each])), ("play", line_only(desired, expected))]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
 
 
@@ -91,7 +92,7 @@ def active_pretension(runs: Mapping[str, Recording]) -> Result:
                 f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", BOUNDS.within, "slack strand"
             ),
         ]
-        curves.append(Curve("measured", label, desired[::20], force[::20]))
+        curves.append((label, measured(desired[::20], force[::20])))
     return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
 
 

@@ -7,9 +7,10 @@ import numpy as np
 from wam_bag.bag import BagError, PointColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.world import World
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 
 
 def groping(runs: Mapping[str, Recording]) -> Result:
@@ -35,8 +36,8 @@ def groping(runs: Mapping[str, Recording]) -> Result:
     corners = np.array([low, [high[0], low[1], 0.0], high, [low[0], high[1], 0.0], low])
     found = np.array(list(points.values()))
     curves = [
-        Curve("predicted", "box", corners[:, 0], corners[:, 1]),
-        Curve("measured", f"touched: {', '.join(points)}", found[:, 0], found[:, 1]),
+        ("box", line_only(corners[:, 0], corners[:, 1])),
+        (f"touched: {', '.join(points)}", measured(found[:, 0], found[:, 1])),
     ]
     return Result(rows, [Panel("seen from above", "x [m]", "y [m]", curves)])
 

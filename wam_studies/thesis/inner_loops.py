@@ -7,10 +7,11 @@ import numpy as np
 
 from wam_control.velocity.torque_loop import TorqueLoopParameters
 from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque, period_map
+from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, growth, joint_stiffness, one_link, response
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 
 FRICTION = ("torque_fed_forward", "torque_loop", "position_loop")  # runs with friction at the motor
 
@@ -27,7 +28,7 @@ def compared(runs: Runs) -> Result:
             above = f"{loop}_above{cable}"
             rows.append(_largest(f"{loop} loop{cable.replace('_', ' ')}, largest gain", runs[below], runs[above]))
             motors = runs[above].joints("motor_states")
-            speeds.append(Curve("measured", above.replace("_", " "), motors.time, motors.velocity[:, 0]))
+            speeds.append((above.replace("_", " "), measured(motors.time, motors.velocity[:, 0])))
     return Result(rows, [*left.panels, Panel("above the largest gain", "time [s]", "motor [rad/s]", speeds)])
 
 
@@ -50,7 +51,7 @@ def friction_left(runs: Runs) -> Result:
                 f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", BOUNDS.within, "2.1.2"
             )
         )
-        curves.append(Curve("measured", label, command[::20], shown.force[::20]))
+        curves.append((label, measured(command[::20], shown.force[::20])))
     panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
     return Result(rows, [panel])
 
@@ -62,7 +63,7 @@ def torque_sample(runs: Runs) -> Result:
     label = f"torque loop at {fraction:.2f} of its largest gain"
     row = Comparison(label, words[fraction > 1.0], words[_growth(run) > 0.0], equation="sampled loop")
     motors = run.joints("motor_states")
-    curve = Curve("measured", name.replace("_", " "), motors.time, motors.velocity[:, 0])
+    curve = (name.replace("_", " "), measured(motors.time, motors.velocity[:, 0]))
     return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
 
 

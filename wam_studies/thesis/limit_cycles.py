@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from wam_analysis.measures.limit_cycle import CycleExtent, last_cycle
+from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import (
     MeasuredResponse,
@@ -16,7 +17,7 @@ from wam_studies.thesis.one_link import (
     response,
 )
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cycle_work
 from wam_theory.stick_slip import assess, simulate
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, stiction_cycle_period
@@ -35,11 +36,11 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
         Comparison("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", BOUNDS.within, "integrator"),
         Comparison("period, exact", exact.period, found.period, "s", BOUNDS.within, "integrator"),
     ]
-    curves = [Curve("measured", "without deadband", shown.time, shown.force), curve]
+    curves = [("without deadband", measured(shown.time, shown.force)), curve]
     rows += _with_deadband(runs["with_deadband"], force)
     rows.append(_with_smaller_deadband(runs["with_smaller_deadband"], force))
     quiet = response(runs["with_deadband"], link)
-    curves.append(Curve("measured", "with deadband", quiet.time, quiet.force))
+    curves.append(("with deadband", measured(quiet.time, quiet.force)))
     return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
 
 
@@ -49,7 +50,7 @@ def stiction_sample(runs: Mapping[str, Recording]) -> Result:
     link = one_link(run)
     shown = response(run, link)
     rows, remark = _closed_form(link, last_cycle(shown.time, shown.force))
-    curves = [Curve("measured", "without deadband", shown.time, shown.force)]
+    curves = [("without deadband", measured(shown.time, shown.force))]
     return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
 
 
@@ -98,13 +99,13 @@ def _with_smaller_deadband(run: Recording, force: float) -> Comparison:
     )
 
 
-def _exact(run: Recording, link: OneLink, shown: MeasuredResponse) -> tuple[CycleExtent, Curve]:
+def _exact(run: Recording, link: OneLink, shown: MeasuredResponse) -> tuple[CycleExtent, Line]:
     """Cycle and force of the exact motion of the continuous loop over the same time."""
     loop = replace(link.loop, sample_period=0.0)
     force = desired_force(run, shown.time[0]) * link.lever
     motion = simulate(link.node, loop, force, float(np.ptp(shown.time))).at(shown.time - shown.time[0])
     curve = motion.contact_force / link.lever
-    return last_cycle(shown.time, curve), Curve("predicted", "exact", shown.time, curve)
+    return last_cycle(shown.time, curve), ("exact", line_only(shown.time, curve))
 
 
 def actuator(runs: Mapping[str, Recording]) -> Result:
@@ -151,8 +152,8 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
             "time [s]",
             "force [N]",
             [
-                Curve("measured", "measured", shown.time, shown.force),
-                Curve("predicted", "exact", shown.time, motion.contact_force / link.lever),
+                ("measured", measured(shown.time, shown.force)),
+                ("exact", line_only(shown.time, motion.contact_force / link.lever)),
             ],
         ),
         Panel(
@@ -160,8 +161,8 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
             "time [s]",
             "angle [rad]",
             [
-                Curve("measured", "measured", shown.time, shown.motor),
-                Curve("predicted", "exact", shown.time, motion.x_m),
+                ("measured", measured(shown.time, shown.motor)),
+                ("exact", line_only(shown.time, motion.x_m)),
             ],
         ),
     ]

@@ -7,10 +7,11 @@ import numpy as np
 
 from wam_analysis.measures.limit_cycle import last_cycle
 from wam_driver.driver import DriverParameters
+from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
 
 Runs = Mapping[str, Recording]
@@ -53,8 +54,8 @@ def quantised(runs: Runs) -> Result:
     curves, motors = [], []
     for name, each in runs.items():
         time, force, motor = _true(each, link)
-        curves.append(Curve("measured", name.replace("_", " "), time, force))
-        motors.append(Curve("measured", name.replace("_", " "), time, motor))
+        curves.append((name.replace("_", " "), measured(time, force)))
+        motors.append((name.replace("_", " "), measured(time, motor)))
     panels = [
         Panel(f"true force, read in steps of {level:.2f} N", "time [s]", "force [N]", curves),
         Panel("motor", "time [s]", "motor at the joint [rad]", motors),
@@ -86,7 +87,7 @@ def sampled(runs: Runs) -> Result:
         ),
         Comparison("friction, error of F_c", 0.0, float(force[there].mean()) - desired, "N", level, "a step", True),
     ]
-    return Result(rows, [Panel("motor", "time [s]", "motor at the joint [rad]", [Curve("measured", "", time, motor)])])
+    return Result(rows, [Panel("motor", "time [s]", "motor at the joint [rad]", [("", measured(time, motor))])])
 
 
 def _level(run: Recording) -> float:

@@ -4,12 +4,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wam_analysis import table
-
-Numbers = NDArray[np.float64]
+from wam_studies.figures.panels import Panel
 
 
 class Comparison(NamedTuple):
@@ -49,30 +45,11 @@ class Comparison(NamedTuple):
         return abs(self.deviation) <= self.bound
 
 
-class Curve(NamedTuple):
-    """One line of a figure; `role` is predicted or measured."""
-
-    role: str
-    label: str
-    x: Numbers
-    y: Numbers
-
-
-class Panel(NamedTuple):
-    """One pair of axes."""
-
-    title: str
-    x: str
-    y: str
-    curves: Sequence[Curve]
-    logarithmic: str = ""  # of '', 'x', 'y', 'xy'
-
-
 class Result(NamedTuple):
     """Result of an experiment."""
 
-    rows: list[Comparison]
-    panels: list[Panel]
+    rows: Sequence[Comparison]
+    panels: Sequence[Panel]
     remarks: tuple[str, ...] = ()
 
     @property

@@ -6,10 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import MeasuredResponse, OneLink, desired_force, one_link, response
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
 from wam_theory.regimes import gamma_a, gamma_b, psi
 from wam_theory.stick_slip import Kind, simulate
@@ -34,8 +35,8 @@ def responses(runs: Mapping[str, Recording]) -> Result:
             )
         )
         curves = [
-            Curve("measured", "measured", shown.time, shown.force),
-            Curve("predicted", "exact", shown.time, predicted),
+            ("measured", measured(shown.time, shown.force)),
+            ("exact", line_only(shown.time, predicted)),
         ]
         panels.append(Panel(f"{label}, gamma {link.gamma:.2f}: {domain(link)}", "time [s]", "force [N]", curves))
     return Result(rows, panels)

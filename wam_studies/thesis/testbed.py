@@ -10,6 +10,7 @@ from wam_analysis.measures.limit_cycle import last_cycle
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_description.arm import Servo
+from wam_studies.figures.panels import Line, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import (
     ACROSS,
@@ -24,7 +25,7 @@ from wam_studies.thesis.one_link import (
     set_until,
 )
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Curve, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
 from wam_theory.stick_slip import Verdict, simulate
 
@@ -137,9 +138,9 @@ def _growth_row(fraction: float, oscillation: Growth, how: str, law: str) -> Com
     )
 
 
-def _last_step(label: str, run: Recording) -> Curve:
+def _last_step(label: str, run: Recording) -> Line:
     shown = response(run, one_link(run), run.steps[-1])
-    return Curve("measured", label, shown.time, shown.force)
+    return (label, measured(shown.time, shown.force))
 
 
 def margin_with_servo(run: Recording) -> float:
@@ -220,12 +221,12 @@ def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> P
         is_plain = len(run.steps) <= BOUNDS.plain_steps
         last = response(run, link, step)
         shown = last if is_plain else response(run, link)
-        curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
+        curves.append((name.replace("_", " "), measured(shown.time, shown.force)))
         if is_plain:
             exact = simulate(
                 link.node, link.loop, desired_force(run, step.begin) * link.lever, np.ptp(last.time), link.state(last)
             )
             curves.append(
-                Curve("predicted", "", last.time, exact.at(last.time - last.time[0]).contact_force / link.lever)
+                ("exact", line_only(last.time, exact.at(last.time - last.time[0]).contact_force / link.lever))
             )
     return Panel(title, "time [s]", "force by deflection [N]", curves)

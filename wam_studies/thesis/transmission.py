@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_studies.thesis.rows import Comparison, Result
 from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
 
@@ -46,13 +47,13 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
     ]
     curves = [
-        Curve("measured", "measured", found.frequency[inside], gain[inside]),
-        Curve("predicted", "(4.3) with damping", found.frequency[inside], predicted[inside]),
+        ("measured", measured(found.frequency[inside], gain[inside])),
+        ("(4.3) with damping", line_only(found.frequency[inside], predicted[inside])),
     ]
-    coherence = [Curve("measured", "", found.frequency[inside], found.coherence[inside])]
+    coherence = [("", measured(found.frequency[inside], found.coherence[inside]))]
     panels = [
-        Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy"),
-        Panel("coherence", "frequency [Hz]", "", coherence, "x"),
+        Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", curves, "xy"),
+        Panel("coherence", "frequency [Hz]", "coherence [-]", coherence, "x"),
     ]
     count = BOUNDS.averaged_frequencies
     remark = f"low coherence: the response changes within the {count} averaged neighbouring frequencies"
@@ -65,8 +66,10 @@ def resonances_sample(runs: Mapping[str, Recording]) -> Result:
     found = transfer(run)
     rows = _resonance_rows(run, found)
     inside = (found.frequency > 0.5 * float(rows[0].predicted)) & (found.frequency < 1.5 * float(rows[1].predicted))
-    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
-    return Result(rows, [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+    gain = ("measured", measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
+    return Result(
+        rows, [Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", [gain], "xy")]
+    )
 
 
 def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
@@ -87,9 +90,9 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
         rows.append(_lower_resonance(run, found, label))
         low, high = swept(run)
         inside = (found.frequency > low) & (found.frequency < high)
-        curves.append(Curve("measured", label, found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
+        curves.append((label, measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))))
         predicted = np.abs(response_of(run, found.frequency[inside]))
-        curves.append(Curve("predicted", "", found.frequency[inside], predicted))
+        curves.append(("(4.3)", line_only(found.frequency[inside], predicted)))
     for ratio in (14, 30):
         at_joint, at_motor = (runs[f"reducer_at_{where}_N_{ratio}"] for where in ("joint", "motor"))
         predicted_ratio = stiffness_gain(at_joint)
@@ -104,7 +107,7 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
                 "(4.1)",
             )
         )
-    panel = Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy")
+    panel = Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", curves, "xy")
     return Result(rows, [panel])
 
 
@@ -114,8 +117,10 @@ def allocation_sample(runs: Mapping[str, Recording]) -> Result:
     found = transfer(run)
     row = _lower_resonance(run, found, name.replace("_", " "))
     inside = (found.frequency > 0.5 * float(row.predicted)) & (found.frequency < 3.0 * float(row.predicted))
-    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
-    return Result([row], [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+    gain = ("measured", measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
+    return Result(
+        [row], [Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", [gain], "xy")]
+    )
 
 
 def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
