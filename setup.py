@@ -129,6 +129,7 @@ setup(
         "numpy",
         "pin",
         "pyyaml",
+        "quadprog",
         "zstandard",
     ],
     extras_require={

@@ -254,7 +254,7 @@ def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction
     rows = np.flatnonzero(traces.during(reaction.begin, reaction.end))
     sizes = {name: signal.size for name, signal in (("true", traces.true), ("estimated", traces.estimated))}
     known = {name: size for name, size in sizes.items() if np.any(size[rows] > 0.0)}
-    if reaction.name is not Code.CONTACT_FORCE or not known:
+    if reaction.name is not Code.PUSHED or not known:
         return reaction
     hardest = {name: rows[np.nanargmax(size[rows])] for name, size in known.items()}
     largest = [

@@ -9,6 +9,10 @@ class MotionThresholds:
 
     at_rest: float = 0.05  # rad/s, speed of a joint below which the arm is at rest
     arrived: float = 0.02  # rad, of each joint from a posture, within which the arm is there
+    left_angle: float = 0.05  # rad, motion of a joint by which the arm has left what it pressed on
+    caught_up: float = (
+        1.25  # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
+    )
     goal_time: float = 1.0  # s after the end, in which the arm must be there, where the client gives no time
     nodes: int = 200  # of a line, between which the joint angles are interpolated
     steepest: float = 15.0  # rad/m, of a joint on a line

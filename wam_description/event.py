@@ -5,6 +5,7 @@ from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 Value = float | str
+HOLDS = "holds"  # value that is 1 where the force loop holds the arm instead of obeying
 CAUSE = "cause"  # value that names the sentence of a code, where that has several
 SUBJECTS = (CAUSE, "axis", "cover", "joint", "topic", "reason")  # values that distinguish two events of a code
 
@@ -19,50 +20,22 @@ class Level(IntEnum):
 
 
 class Code(StrEnum):
-    """What happened; in the order in which `force_axis` numbers what the force loop does, from 0."""
+    """What happened; in the order in which `force_axis` numbers what the force loop reports, from 0."""
 
     NONE = "none"  # the command is obeyed
-    NOT_SENSED = "not_sensed"  # holds: the commanded force cannot be measured here
-    OTHER_LINK = "other_link"  # holds: another link is touched
-    NOTHING_TOUCHED = "nothing_touched"  # holds: it has gone as far as allowed and nothing was touched
-    CONTACT_FORCE = "contact_force"  # does not move against the world
-    JOINT_END = "joint_end"  # a joint is at its end
-    NOT_REACHED = "not_reached"  # goes on: the force or the motion is not reached within the time for it
-    POSITION_ASSUMED = "position_assumed"  # goes on: where the force acts is not known well, and not pinned
-    NOT_EXPLAINED = "not_explained"  # goes on: the torques are not those of the commanded force
-    TASK_REFUSED = "task_refused"  # holds: the axes of the task cannot be done here
-    UNCERTAIN = "uncertain"  # goes on: the force is not known as well as it has to be reached
-    CYCLE = "cycle"  # goes on: the measured force is in a limit cycle
-    SHAKEN = "shaken"  # holds: the arm shakes by more than the surface gives way under the commanded force
-    TOO_SLOW = "too_slow"  # holds: the arm moves too slowly for the commanded force
-    SECOND_CONTACT = "second_contact"  # holds: a second contact is nearly certain
-    NOT_FOLLOWED = "not_followed"  # goes on: the commanded posture or position moves faster than the arm may
-    REFUSED = "refused"  # a command is not taken: it is beyond a limit or has no effect
+    REFUSED = "refused"  # a command is not taken: it is beyond a limit, or its force would be off by too much
+    NOT_REACHED = "not_reached"  # a force, a torque or a motion is not reached within the time for it
+    UNEXPLAINED = "unexplained"  # the torques are not those of the commanded force, or another link is touched
+    PUSHED = "pushed"  # something pushes harder than allowed
+    AT_LIMIT = "at_limit"  # a bound of the motion is reached
+    OSCILLATING = "oscillating"  # the measured force turns back again and again
     FAULT = "fault"  # of the driver, which has put the brakes on
     DONE = "done"  # the scenario was played to its end
-
-    @property
-    def holds(self) -> bool:
-        """Whether the force loop holds the arm instead of controlling the force."""
-        return self in _HOLDING
 
     @property
     def number(self) -> int:
         """Its number in `force_axis`."""
         return list(Code).index(self)
-
-
-_HOLDING = frozenset(
-    {
-        Code.NOT_SENSED,
-        Code.OTHER_LINK,
-        Code.NOTHING_TOUCHED,
-        Code.TASK_REFUSED,
-        Code.SHAKEN,
-        Code.TOO_SLOW,
-        Code.SECOND_CONTACT,
-    }
-)
 
 
 class Event(NamedTuple):
@@ -81,6 +54,16 @@ class Event(NamedTuple):
     values: Mapping[str, Value] = {}
 
     @property
+    def cause(self) -> Value:
+        """Which of the cases of its code it is, '' where there is one alone."""
+        return self.values.get(CAUSE, "")
+
+    @property
+    def holds(self) -> bool:
+        """Whether the force loop holds the arm because of it."""
+        return bool(self.values.get(HOLDS, 0.0))
+
+    @property
     def subject(self) -> tuple[Value, ...]:
         """What it is about: events that differ in this are two, while one whose numbers change goes on."""
         return self.code, *(self.values.get(name, "") for name in SUBJECTS)
@@ -93,6 +76,11 @@ class Event(NamedTuple):
 def warning(code: Code, cause: str, **values: Value) -> Event:
     """An event that does not stop the arm, but that somebody has to know of."""
     return Event(code, Level.WARN, {CAUSE: cause, **values})
+
+
+def holding(code: Code, cause: str, **values: Value) -> Event:
+    """An event because of which the force loop holds the arm."""
+    return warning(code, cause, **{HOLDS: 1.0, **values})
 
 
 def refused(topic: str, reason: str) -> Event:

@@ -57,9 +57,18 @@ FRICTION_COLUMNS: Final = (
 )
 
 FORCE_AXIS_COLUMNS: Final = (
-    "reaction",  # number of `wam_description.event.Code`: 0 where the command is obeyed
+    "event",  # number of `wam_description.event.Code`: 0 where the command is obeyed
+    "holds",  # 1 where the arm holds its position because of it
+    "doubt",  # predicted error of the true force per tolerated error
+    "tolerance",  # N
+    "torques",  # N, parts of the predicted error: the measured torques
+    "friction",  # N, friction of the surface
+    "place",  # N, the position of the contact
+    "resting",  # N, torques that were there before the touch
+    "moving_surface",  # N, a surface that moves ahead of the loop
+    "slow_arm",  # N, infinite where the arm gets there too slowly
+    "shaking_arm",  # N, the arm's own shaking
     "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
-    "force_sd_limit",  # N, above which the arm holds its position
     "lever",  # m, size of the joint torques per force
     "apparent_mass",  # kg, measured force per acceleration along the force
     "speed_fraction",  # velocity along the force per commanded one, 0 to 1
@@ -85,7 +94,6 @@ TASK_AXIS_COLUMNS: Final = (
     "commanded",  # the value in force
     "measured",  # N, m/s or m; of a joint N m, rad/s or rad
     "force_sd",  # N or N m, standard deviation of the measured force; NaN for a motion
-    "independence",  # part of the axis that those before it leave, 0 to 1
     "speed_fraction",  # velocity along the axis per commanded one, 0 to 1
 )
 
@@ -251,7 +259,7 @@ TOPICS: Final = (
         TABLE,
         "display",
         "how well the commanded force can be measured and applied here, and what the force loop does; frame = the cover, "
-        "no row without a command; at once where the reaction changes; float64 columns: see docs/force.md",
+        "no row without a command; at once where the event changes; float64 columns: see docs/force.md",
         columns=FORCE_AXIS_COLUMNS,
     ),
     _joints(

@@ -322,7 +322,7 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
 def press_text(snapshot: Snapshot, pressing: float) -> str:
     """What becomes of a commanded force, N, as HTML: the force loop may not do it."""
     loop = snapshot.statuses.get("force_loop")
-    if loop is not None and any(event.code is not Code.NOT_FOLLOWED for event in loop.events):
+    if loop is not None and any(event.cause != "speed" for event in loop.events):
         text = f"commanded {pressing:.1f} N, not done: {html.escape(loop.message)}"
         return paragraph(text, DOTS[Level.ERROR])
     if not snapshot.measured:

@@ -45,14 +45,14 @@ class RecordedReaction(NamedTuple):
     @property
     def holds(self) -> bool:
         """Whether the force was not controlled meanwhile."""
-        return self.name.holds or self.name in (Code.REFUSED, Code.FAULT)
+        return self.event.holds or self.name is Code.FAULT or "topic" in self.event.values
 
     @property
     def outcome(self) -> str:
         """What became of a command that is not met because of it, one of `OUTCOMES`."""
         if self.holds:
             return REFUSAL
-        return TOO_MUCH if self.name is Code.CONTACT_FORCE else UNREACHED
+        return TOO_MUCH if self.name is Code.PUSHED else UNREACHED
 
 
 class StepSpan(Protocol):
@@ -112,9 +112,9 @@ def unmet(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Recorde
     found = within(reactions, steady, step.end)
     refused = [one for one in of_force_loop(found) if one.holds]
     at_end = [one for one in found if one.end >= step.end - BRIEF]
-    hard = [one for one in at_end if one.name is Code.CONTACT_FORCE and one.begin <= steady]
+    hard = [one for one in at_end if one.name is Code.PUSHED and one.begin <= steady]
     missed = [one for one in at_end if one.name is Code.NOT_REACHED]
-    late = [one for one in within(reactions, step.begin, step.end) if one.name is Code.NOT_FOLLOWED]
+    late = [one for one in within(reactions, step.begin, step.end) if one.event.cause == "speed"]
     return [*refused[:1], *hard[:1], *missed[:1], *late[:1]]
 
 

@@ -149,7 +149,7 @@ class RecordedRun(NamedTuple):
         def is_braked(stamp: int) -> bool:
             return next((mode for since, mode in reversed(modes) if since <= stamp), ENABLED) != ENABLED
 
-        pushed = [one for one in lasting(loop, end) if one.name is not Code.CONTACT_FORCE or not is_braked(one.begin)]
+        pushed = [one for one in lasting(loop, end) if one.name is not Code.PUSHED or not is_braked(one.begin)]
         return tuple(sorted((*pushed, *lasting(faults, end)), key=lambda one: (one.begin, one.end, one.name)))
 
     def joints(self, topic: str) -> JointColumns | None:

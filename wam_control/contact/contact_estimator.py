@@ -22,7 +22,7 @@ from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.second_contact import SecondContact
 from wam_control.contact.thresholds import CONTACT
-from wam_control.force.given_way import has_left
+from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
@@ -276,7 +276,7 @@ class ContactEstimator:
         q, at = self._observer.q, self._pressed_at
         if is_pressing and (self._in_contact or at):
             self._pressed_at = q
-        elif at and has_left(at, q):
+        elif at and any(abs(a - b) > MOTION.left_angle for a, b in zip(at, q, strict=True)):
             self._pressed_at = []
         return self._in_contact or bool(self._pressed_at)
 

@@ -1,7 +1,7 @@
 """What is fed forward besides the velocity of the force loop: torques of the commanded forces, and dry friction.
 
 The torque of a force on a free arm is a throw: the arm hits what it was to touch.  From the motors it is fed forward
-after the touch alone (`ForceHold.feed`); `force_feedforward` feeds it forward from the command on.
+after the touch alone; `force_feedforward` feeds it forward from the command on.
 """
 
 import math
@@ -31,10 +31,6 @@ class FeedForward:
         self._arm, self._map = arm, TransmissionMap.of(arm)
         self._countered = LowPass()
 
-    def reset(self) -> None:
-        """Another force is commanded."""
-        self._countered.reset()
-
     def step(self, force: Array, velocity: Sequence[float], parameters: ForceLoopParameters, dt: float) -> list[float]:
         """Torque of the joints in one outer period (n,), N m: of the forces and, with joint sensors, of friction.
 
@@ -46,8 +42,8 @@ class FeedForward:
         dt : outer period, s.
         """
         if parameters.friction_feedforward and not parameters.is_estimated:
-            friction, _ = self._countered.step(self._friction(velocity), FORCE.friction_time, dt)
-            force = force + parameters.friction_feedforward * np.array(friction)
+            friction = self._countered.step(np.array(self._friction(velocity)), FORCE.friction_time, dt)
+            force = force + parameters.friction_feedforward * friction
         result: list[float] = force.tolist()
         return result
 

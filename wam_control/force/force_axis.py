@@ -18,7 +18,7 @@ from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
-from wam_description.small_matrices import inverse, solution
+from wam_description.small_matrices import inverse
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
@@ -42,37 +42,13 @@ class SensingParameters:
         "N m",
         high=1e3,
     )
-    force_sd_limit: float = tunable(
-        "standard deviation of the measured force up to which any force is controlled; where it is larger, and larger "
-        "than force_sd_fraction, the arm holds its position",
-        "N",
-    )
-    force_sd_fraction: float = tunable(
-        "standard deviation of the measured force, per commanded force, up to which it is controlled",
-        high=1.0,
-    )
-    force_sd_fraction_unpinned: float = tunable(
-        "the same where the position is estimated, if it is larger: once touched, the position is known better",
-        high=1.0,
-    )
-    stated_fraction: float = tunable(
-        "standard deviation of the measured force with what the contact estimator states of its torques, per commanded "
-        "force, up to which a force is begun with feedback contact_estimate",
-    )
-    reported_fraction: float = tunable(
-        "standard deviation of the measured force, per commanded force, above which it is reported"
-    )
-    least_signal: float = tunable(
-        "commanded force per standard deviation with which the contact estimator knows the torques, from which a force "
-        "at a pinned position is controlled with feedback contact_estimate: what is not detected is not measured",
-        high=1e3,
-    )
-    least_signal_unpinned: float = tunable(
-        "the same where the position is estimated, so that the link has to be identified, too", high=1e3
+    least_apparent_mass: float = tunable(
+        "least mass of the arm that the loop sees in the measured force: with less, the arm is not passive along it",
+        "kg",
+        high=100.0,
     )
     apparent_mass_limit: float = tunable(
-        "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
-        "is larger is slowed down; 0: no limit",
+        "largest such mass; the motion along directions in which it is larger is slowed down; 0: no limit",
         "kg",
         high=1e6,
     )
@@ -81,11 +57,6 @@ class SensingParameters:
     def of_estimate(self) -> "SensingParameters":
         """Those of torques that are estimated from the motors."""
         return replace(self, torque_sd=self.estimated_torque_sd, torque_fraction=self.estimated_torque_fraction)
-
-    def sd_limit(self, force: float, is_pinned: bool) -> float:
-        """Largest standard deviation, N, with which a force, N, at a pinned or an estimated position is controlled."""
-        unpinned = 0.0 if is_pinned else self.force_sd_fraction_unpinned
-        return max(self.force_sd_limit, max(self.force_sd_fraction, unpinned) * force)
 
 
 class ForceAxis(NamedTuple):
@@ -98,7 +69,7 @@ class ForceAxis(NamedTuple):
     sense : force per torque on each joint (n,), 1/m; sense @ press is 1.
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
-    free_sd : the same if its position along the cover has to be known from the same torques, N.
+    friction_sd, place_sd : part of it by tangential forces and by the position, N.
     carried : sensed force per acceleration of each joint (n,), kg m: of the arm itself, nothing touched.
     apparent_mass : the same per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
@@ -113,7 +84,8 @@ class ForceAxis(NamedTuple):
     sense: Array
     move: Array
     force_sd: float
-    free_sd: float
+    friction_sd: float
+    place_sd: float
     carried: Array
     apparent_mass: float
     impact_mass: float
@@ -122,33 +94,17 @@ class ForceAxis(NamedTuple):
     precision: Array
     covariance_there: Array
 
-    def times(self, side: float) -> "ForceAxis":
-        """The same with its direction to the other side, where that is -1."""
-        if side > 0.0:
-            return self
-        turned = {name: -getattr(self, name) for name in ("lever", "press", "sense", "move", "carried")}
-        return self._replace(**turned)
-
-    def signal(self, force: float, torque_sd: Sequence[float]) -> float:
-        """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
-        return force * float(np.linalg.norm(self.press / np.array(torque_sd)))
-
-    def error(self, torque_sd: Sequence[float]) -> float:
+    def error(self, torque_sd: Array) -> float:
         """Standard deviation of the force, N, by those of the torques (n,), N m."""
-        return float(np.linalg.norm(self.sense * np.array(torque_sd)))
+        return float(np.linalg.norm(self.sense * torque_sd))
 
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
-        weighted = self.precision @ torques
-        force = float(self.sense @ torques)
-        return float(torques @ weighted) - force * force / (self.force_sd * self.force_sd)
+        return _unexplained(self.precision, self.press, torques)
 
-    def turned(self, change: Array) -> float:
-        """chi^2 of a change of the torques (n,), N m, which the force does not explain, at the same position."""
-        precision = inverse(self.covariance_there)
-        weighted = precision @ change
-        force = float(self.press @ weighted)
-        return float(change @ weighted) - force * force / float(self.press @ precision @ self.press)
+    def changed(self, change: Array) -> float:
+        """The same of a change of the torques (n,), N m, at the same position."""
+        return _unexplained(inverse(self.covariance_there), self.press, change)
 
 
 class PressedForce(NamedTuple):
@@ -198,7 +154,7 @@ class ForceAxes:
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
         return result
 
-    def disturbance(self, q: Sequence[float], pressed: PressedForce, turned: float = 0.0) -> list[Array]:
+    def disturbance(self, q: Sequence[float], pressed: PressedForce) -> list[Array]:
         """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
 
         Arguments as those of `axis`.
@@ -207,7 +163,7 @@ class ForceAxes:
         size = max(force, FORCE.sized_force)
         jacobian, point = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
-        friction = max(self._parameters.friction, turned) * size * _across(direction, direction)
+        friction = self._parameters.friction * size * _across(direction, direction)
         return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
 
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
@@ -215,23 +171,6 @@ class ForceAxes:
         point = (position, *self._covers.aside(cover, position))
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
-
-    def whole(self, q: Sequence[float], pressed: PressedForce, torques: Array) -> float:
-        """Size of the force in all, N, less its uncertainty, by torques of the world on the joints (n,), N m.
-
-        It is taken to be as large as the commanded one: what the joints do not see of it is not counted.
-        """
-        own, (cover, position, position_sd, direction, force) = self._parameters, pressed
-        jacobian, surface = self._jacobian(q, cover, position, direction)
-        slide = self._body.point_jacobian(q, cover, surface + ALONG) - jacobian
-        shift = position_sd * force * direction @ slide
-        spread = np.diag(own.torque_sd**2 + (own.torque_fraction * torques) ** 2) + np.outer(shift, shift)
-        weighted = np.linalg.solve(spread, jacobian.T)
-        precision = jacobian @ weighted + np.eye(3) / max(force, FORCE.sized_force) ** 2
-        found = solution(precision, torques @ weighted)
-        size = float(np.linalg.norm(found))
-        sd = math.sqrt(float(found @ solution(precision, found))) / max(size, FORCE.sized_force)
-        return size - FORCE.axis_certain * sd
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
@@ -257,9 +196,7 @@ class ForceAxes:
         force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
         return force / float(force @ direction)
 
-    def axis(
-        self, q: Sequence[float], pressed: PressedForce, others: Sequence[Array] = (), turned: float = 0.0
-    ) -> ForceAxis:
+    def axis(self, q: Sequence[float], pressed: PressedForce, others: Sequence[Array] = ()) -> ForceAxis:
         """The axis of a force at a contact.
 
         Parameters
@@ -267,7 +204,6 @@ class ForceAxes:
         q : joint angles (n,), rad.
         pressed : the force.
         others : torques (n,), N m, of other forces, each as large as its standard deviation.
-        turned : force across the direction per force along it which the surface may give without friction, too.
         """
         parameters, n = self._parameters, len(q)
         cover, position, position_sd, direction, force = pressed
@@ -278,7 +214,7 @@ class ForceAxes:
             zero = np.zeros(n)
             none = np.zeros((n, n))
             return ForceAxis(
-                lever, zero, zero, zero, math.inf, math.inf, zero, math.inf, math.inf, 0.0, 0.0, none, none
+                lever, zero, zero, zero, math.inf, 0.0, 0.0, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
         size = max(force, FORCE.sized_force)
         length = self._covers.length_of(cover)
@@ -286,7 +222,7 @@ class ForceAxes:
         # the end of a link is round, and other forces at the same position press the surface as well
         is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
         push = aside if is_side else direction
-        friction = max(parameters.friction, turned) * size * _across(direction, push)
+        friction = parameters.friction * size * _across(direction, push)
         tangential = friction @ jacobian
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         press: Array = push @ jacobian
@@ -297,30 +233,27 @@ class ForceAxes:
         spread += tangential.T @ tangential
         for torque in others:
             spread += np.outer(torque, torque)
-        weight = inverse(spread + position_sd**2 * moved)
-        weighted = weight @ press
-        precision = float(press @ weighted)
-        sense: Array = weighted / precision
+        moved *= position_sd**2
+        weight = inverse(spread + moved)
         inertia = self.inertia(q)
+        sense = _passive(weight, press, inertia @ lever, parameters.least_apparent_mass * square)
         carried: Array = sense @ inertia
         mass = float(carried @ lever) / square
         impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
-        if position_sd and not is_side:
-            other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not show it
-            anywhere += np.outer(other, other)
-        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ solution(anywhere, press))))
+        friction_sd = float(np.linalg.norm(tangential @ sense))
+        place_sd = math.sqrt(float(sense @ moved @ sense))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(
             lever,
             press,
             sense,
             lever / damped,
-            sd,
-            free_sd,
+            math.sqrt(float(sense @ (spread + moved) @ sense)),
+            friction_sd,
+            place_sd,
             carried,
             mass,
             impact,
@@ -329,6 +262,39 @@ class ForceAxes:
             weight,
             spread,
         )
+
+
+def _passive(weight: Array, press: Array, carried: Array, least: float) -> Array:
+    """Force per torque on each joint (n,), 1/m: generalised least squares with at least this apparent mass.
+
+    Minimises s'S s for s.press = 1 and, where that gives less, s.carried = least: with less than no mass, an arm that
+    presses is pushed by its own motion.
+
+    Parameters
+    ----------
+    weight : inverse of the covariance S (n, n), 1/(N m)^2.
+    press : torque on each joint per force (n,), m.
+    carried : torque on each joint as the arm moves along the force (n,), kg m^2.
+    least : of s.carried, kg m^2.
+    """
+    pressed, moved = weight @ press, weight @ carried
+    size, mixed = float(press @ pressed), float(press @ moved)
+    sense: Array = pressed / size
+    if mixed >= least * size:
+        return sense
+    moving = float(carried @ moved)
+    apart = size * moving - mixed * mixed
+    if apart <= FORCE.negligible * size * moving:
+        return sense  # the torques of the force are those of the motion along it
+    passive: Array = ((moving - least * mixed) * pressed + (least * size - mixed) * moved) / apart
+    return passive
+
+
+def _unexplained(precision: Array, press: Array, torques: Array) -> float:
+    """chi^2 of torques (n,), N m, apart from the multiple of `press` that explains them best."""
+    weighted = precision @ torques
+    force = float(press @ weighted)
+    return float(torques @ weighted) - force * force / float(press @ precision @ press)
 
 
 def _across(direction: Array, push: Array) -> Array:

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from wam_control.force.contact_position import pinned_position, torque_of_position
+from wam_control.force.contact_place import pinned_position, torque_of_position
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.task import TaskCommand
+from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Covers
@@ -231,6 +231,24 @@ class CommandAdmission:
             wanted = [b + min(max(a - b, -most), most) for a, b in zip(wanted, present, strict=True)]
         self._present_torque = wanted
         return wanted
+
+
+def beyond(task: TaskCommand, own: ForceLoopParameters) -> str:
+    """Why a task is refused: the first axis beyond a limit; '' if there is none."""
+    for axis in task.axes:
+        name, limit, unit = "", math.inf, ""
+        if axis.kind is AxisKind.FORCE:
+            name, limit, unit = "force_limit", own.force_limit, "N"
+            if axis.joint >= 0:
+                name, limit, unit = "torque_limit", own.torque_limit, "N m"
+        elif axis.kind is AxisKind.VELOCITY:
+            (limit, name), unit = own.task.fastest(axis.joint >= 0), f"{axis.unit}/s"
+        elif axis.kind is AxisKind.IMPEDANCE and (reason := own.task.too_stiff(axis)):
+            return reason
+        if abs(axis.value or 0.0) > limit:
+            size = f"{abs(axis.value or 0.0):.4g} {unit}"
+            return f"{axis.name}: {size} is commanded; allowed: up to {name}, {limit:g} {unit}"
+    return ""
 
 
 def _size(command: ForceCommand | None) -> float:

@@ -7,7 +7,6 @@ point: a step of the set point moves the arm through G_I alone, without a jerk.
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -111,27 +110,6 @@ class ForceLaw:
         )
 
 
-class DelayLine:
-    """Delays the velocities of a law by whole periods."""
-
-    def __init__(self) -> None:
-        self._held: deque[list[float]] = deque()
-
-    def reset(self) -> None:
-        """Forget all inputs."""
-        self._held.clear()
-
-    def step(self, velocities: list[float], samples: int) -> list[float]:
-        """Input of `samples` periods ago; zeros before there was one."""
-        if not samples:
-            self._held.clear()
-            return velocities
-        self._held.append(velocities)
-        while len(self._held) > samples + 1:
-            self._held.popleft()
-        return self._held.popleft() if len(self._held) > samples else [0.0] * len(velocities)
-
-
 def per_axis(field: str, given: Sequence[float], names: Sequence[str]) -> tuple[float, ...]:
     """One value per axis, from as many or from one for all.
 
@@ -147,43 +125,3 @@ def per_axis(field: str, given: Sequence[float], names: Sequence[str]) -> tuple[
         "or one for all",
     )
     return values * len(names) if len(values) == 1 else values
-
-
-class BumplessTransfer:
-    """Adds the jump of the law's velocity as an offset that decays exponentially."""
-
-    def __init__(self, joints: int) -> None:
-        self._zero = [0.0] * joints
-        self.reset()
-
-    def reset(self) -> None:
-        """Start again from rest."""
-        self._offset = self._commanded = self._zero
-        self._is_due = True
-
-    def restart(self) -> None:
-        """Transfer from the commanded velocity to whatever the law gives in the next step."""
-        self._is_due = True
-
-    def step(self, velocity: list[float], measured: Sequence[float], time_constant: float, dt: float) -> list[float]:
-        """Velocity to command.
-
-        Parameters
-        ----------
-        velocity : of the law (n,), rad/s; empty for torque only.
-        measured : joint velocities (n,), rad/s, from which the transfer starts after torque only.
-        time_constant : of the decay, s; 0 for no transfer.
-        dt : outer period, s.
-        """
-        if not velocity or not time_constant:
-            self._offset = self._zero
-        elif self._is_due:
-            self._offset = [a - b for a, b in zip(self._commanded or measured, velocity, strict=True)]
-        elif any(self._offset):
-            decay = math.exp(-dt / time_constant)
-            self._offset = [decay * offset for offset in self._offset]
-        self._is_due = False
-        if any(self._offset):
-            velocity = [a + b for a, b in zip(velocity, self._offset, strict=True)]
-        self._commanded = velocity
-        return velocity

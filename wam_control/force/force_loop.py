@@ -1,60 +1,53 @@
 """The outer loop: force control through velocity-controlled motors (figure 5.2, sections 5.1.2 and 5.7).
 
-F_error = F_des - F_c goes through the law of `wam_control.force.force_law`, axis by axis, and becomes a
-commanded velocity along the direction of the force; the posture is held in the complement (hybrid
-control, [Raibert 81]).  The axes are x y z of the command's frame, or the joints in the mode
-joint_torque.  Forces are those of the arm on the world.
+What is commanded becomes the axes of one problem (`axes`).  The error F_des - F_c of each force goes through the law
+of `force_law` and becomes a velocity along its axis; motions have laws of their own, and the posture is held in what
+is left.  A belief of each force decides whether it is obeyed (`belief`), limits bound the motion (`limits`), one small
+problem gives the joint velocities (`problem`), and events report what is not as commanded (`force_watch`).
+Forces are those of the arm on the world.
 """
 
 import math
 from collections.abc import Sequence
-from operator import add
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.arm_push import ArmPush
-from wam_control.force.contact_position import ContactPosition, ForceCase, ForcePoint
-from wam_control.force.feed_forward import FeedForward
-from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
-from wam_control.force.force_command import CommandAdmission, Commands
-from wam_control.force.force_hold import ForceHold, by_seriousness
-from wam_control.force.force_law import BumplessTransfer, DelayLine
+from wam_control.force.advice import Advice, tries
+from wam_control.force.axes import Axis, TaskAxes
+from wam_control.force.belief import Belief
+from wam_control.force.command_run import CommandRun
+from wam_control.force.contact_place import ContactPlace, Place, pinned_position
+from wam_control.force.force_axis import ForceAxes
+from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
-from wam_control.force.force_measurement import ForceMeasurement, LowPass
-from wam_control.force.given_way import GivenWay, has_left
+from wam_control.force.force_measurement import ForceMeasurement
+from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
-from wam_control.force.held_arm import HeldArm, RetreatForce
-from wam_control.force.hybrid_velocity import followed, hybrid_velocity, posture_velocity
-from wam_control.force.motion_limits import AT_COMMANDED, AT_LEAST, AT_MIDDLE, HowKnown, MotionLimits, WholeForce
-from wam_control.force.motion_watch import MotionWatch
-from wam_control.force.posture_watch import PostureWatch, ShortfallWatch
-from wam_control.force.sensing_advice import OtherForces, Turnable
-from wam_control.force.stability_guard import GuardAssessment
-from wam_control.force.task import AxisKind, TaskCommand
-from wam_control.force.task_control import AxisRow, TaskControl
-from wam_control.force.thresholds import FORCE
-from wam_control.force.torque_watch import TorqueWatch
+from wam_control.force.held_arm import PushedArm
+from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time
+from wam_control.force.problem import Row, linear, solve
+from wam_control.force.stability_guard import GuardAssessment, GuardedContact, GuardedForces
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
+from wam_control.force.thresholds import FORCE, GUARD
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.event import OBEYED, Code, Event, refused, warning
+from wam_description.event import OBEYED, Code, Event, holding, refused, warning
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
-TASK = "task"  # in place of a frame of the force
-RESTED = 3.0 * FORCE.steady_time  # s at rest, after which it is
-SHORTEST = FORCE.shortest_lever**2  # m^2, square of a lever
+AxisRow = tuple[float, float, float, float, float]  # under TASK_AXIS_COLUMNS
 
 
 class ForceOutput(NamedTuple):
     """Commands of one period of the force loop, and the forces behind them.
 
-    Measured force and error are components along the commanded direction, as vectors in the frame of the
-    command in force; limited is the error after saturation.
+    Measured force and error are sums over the forces of points, as vectors in `frame`; limited is the error after
+    saturation.
     """
 
     velocity: list[float]  # (n,) rad/s, empty for torque only
@@ -63,16 +56,13 @@ class ForceOutput(NamedTuple):
     error: Triple = (0.0, 0.0, 0.0)  # N
     limited: Triple = (0.0, 0.0, 0.0)  # N
     frame: str = BASE
-    axis: ForceAxis | None = None  # of the commanded force; None where none is commanded
-    point: ForcePoint | None = None  # where it acts
-    sd_limit: float = math.inf  # N, of its standard deviation
+    axes: tuple[Axis, ...] = ()
+    known: tuple[Belief, ...] = ()  # of each axis
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
-    desired: float = 0.0  # N, of all that is commanded, where it presses on something
-    pressed: PressedForce | None = None  # where all of it acts at one known position
 
 
 class ForceLoop:
-    """Force, posture and torque control at the outer rate.
+    """Force, posture, torque and task control at the outer rate.
 
     Parameters
     ----------
@@ -87,64 +77,59 @@ class ForceLoop:
     parameters : those in force.
     refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in force.
-    fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
-    reactions : what the loop does instead of what is commanded, the most serious first; none where it obeys.
+    events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
 
     def __init__(
-        self,
-        arm: Arm,
-        servo: Servo,
-        parameters: ForceLoopParameters,
-        timing: Timing,
-        command_age: float = math.inf,
+        self, arm: Arm, servo: Servo, parameters: ForceLoopParameters, timing: Timing, command_age: float = math.inf
     ) -> None:
-        self._arm, self._timing = arm, timing
-        self._body = RigidBody(arm)
-        self._n = len(arm.joints.names)
-        self._joints: tuple[float, ...] = ()
+        self._timing, self._body = timing, RigidBody(arm)
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
-        self._position = ContactPosition(arm.covers)
-        self._contact_rejected = False
-        self._given = GivenWay(self._body)
-        self._held = HeldArm(self._body, self._given)
-        self._tasks = TaskControl(arm, self._body, self._given)
-        self._goes_back = False
-        self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
-        self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
-        self._inertia = LowPass()
-        self._approached = [0.0] * self._n
-        self._feed_forward = FeedForward(arm)
-        self._pressed_at: list[float] | None = None
-        self._free_at: list[float] = []
-        self._is_free = False
-        self._external = np.zeros(self._n), np.zeros(self._n)
-        self._resting: Array | None = None
-        self._is_moving = self._is_fast = False
-        self._rested = 0.0  # s
-        self._unknown: tuple[Array, float] = np.zeros(self._n), 0.0  # torques at rest that no surface gives
-        self._external_sd: Sequence[float] | None = None
-        self._transfer = BumplessTransfer(self._n)
-        self._hold = ForceHold()
-        self._axes = ""
-        self._torque_before: list[float] = []
-        self._rate: Sequence[float] | None = None
-        self._posture_watch = PostureWatch(arm.joints.names, "posture", "joint_speed_limit", "rad/s")
-        self._posture_shortfall = ShortfallWatch(arm.joints.names)
-        self._posture_motions = [MotionWatch(f"posture of {name}", "rad", "posture_taken") for name in arm.joints.names]
-        self._posture_before: list[float] = []  # (n,) rad, as the task began
-        self._has_posture = False  # whether another one has been commanded since
-        self.refused = 0
-        self.refusals: dict[str, Event] = {}
-        self.fallback = ""
-        self.reactions: dict[Code, Event] = {}
+        self._pushed = PushedArm(self._body)
+        self._velocity, self._q = np.zeros(len(arm.joints.names)), list[float]()
+        self._pressed_at: Array | None = None
+        self.refused, self.refusals = 0, dict[str, Event]()
+        self.events: tuple[Event, ...] = ()
         self._take(servo, parameters)
+        self._begin(None, None)
+
+    def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
+        arm = self._body.arm
+        parameters.require_fit(arm)
+        self._supervision = Supervision(arm, servo, self._timing, parameters, tuple(self._q))
+        self.parameters = parameters
+        self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, sensing_of(parameters)))
+
+    def tune(self, parameters: ForceLoopParameters) -> None:
+        """Take new parameters, or refuse the set.
+
+        Raises
+        ------
+        ParameterError
+            where values do not fit each other or the arm, or the guard does not accept the set; nothing has
+            changed then.
+        """
+        self._take(self._supervision.servo, parameters)
+
+    def retune_servo(self, servo: Servo) -> None:
+        """Take new gains of the velocity loop, on which the guard relies, or refuse them, as `tune` does."""
+        self._take(servo, self.parameters)
 
     @property
-    def reaction(self) -> Event:
+    def event(self) -> Event:
         """The most serious one; OBEYED where the loop obeys."""
-        return next(iter(self.reactions.values()), OBEYED)
+        return next(iter(self.events), OBEYED)
+
+    @property
+    def fallback(self) -> str:
+        """Why the estimated contact position is not used, '' if it is or if no contact is detected."""
+        return self._run.fallback
+
+    @property
+    def is_advised(self) -> bool:
+        """Whether the event of a refused force has what would help: it is looked for over several periods."""
+        return self._run.advice.is_complete
 
     @property
     def assessment(self) -> GuardAssessment | None:
@@ -164,82 +149,25 @@ class ForceLoop:
     @property
     def free_torques(self) -> list[float]:
         """Torques of the joint sensors (n,), N m, that count as those of a free arm; zeros with estimated torques."""
-        return [0.0] * self._n if self.parameters.is_estimated else self._measurement.free
-
-    @property
-    def is_stopping(self) -> bool:
-        """Whether the arm still comes to rest from a motion in which the force began; then its reason is another."""
-        return self._is_fast
-
-    @property
-    def is_advised(self) -> bool:
-        """Whether the reason of a refused force states what would help: it is looked for in several periods."""
-        return self._hold.is_advised
-
-    def tune(self, parameters: ForceLoopParameters) -> None:
-        """Take new parameters, or refuse the set.
-
-        Raises
-        ------
-        ParameterError
-            where values do not fit each other or the arm, or the guard does not accept the set; nothing has
-            changed then.
-        """
-        self._take(self._servo, parameters)
-
-    def retune_servo(self, servo: Servo) -> None:
-        """Take new gains of the velocity loop, on which the guard relies, or refuse them.
-
-        Raises
-        ------
-        ParameterError
-            where the guard does not accept the present parameters with them; nothing has changed then.
-        """
-        self._take(servo, self.parameters)
-
-    def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
-        parameters.require_fit(self._arm)
-        self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
-        self._servo, self.parameters = servo, parameters
-        sensing = sensing_of(parameters)
-        self._torque_sd = np.full(self._n, sensing.torque_sd)
-        self._force_axes = ForceAxes(self._arm, self._body, sensing)
-        self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit, self._given)
-        self._tasks.retune(self._force_axes, parameters, self._supervision)
-        self._transfer.restart()
+        free: list[float] = self._measurement.free.tolist()
+        return [0.0] * len(free) if self.parameters.is_estimated else free
 
     def tare(self) -> str:
         """Take the present external torques as zero; '' or why they are not those of a free arm."""
-        if self._axes:
+        if self._run.axes:
             return "a force is commanded: end the command, and free the arm"
-        if not self._is_at_rest:
+        if self._measurement.speed >= MOTION.at_rest:
             return "the arm moves: let it come to rest"
         if not self._has_left:
             return "the arm still is where it pressed: free it first"
         self._measurement.tare()
-        self._filter.reset()
         return ""
-
-    @property
-    def is_pushed(self) -> bool:
-        """Whether something has pushed the arm since it holds."""
-        return bool(self._held.pushed or self._tasks.is_pushed)
-
-    @property
-    def _is_at_rest(self) -> bool:
-        return self._speed < MOTION.at_rest
-
-    @property
-    def _speed(self) -> float:
-        """Mean speed of the fastest joint, rad/s; infinite where it is not known yet."""
-        speed = self._motion.value
-        return math.inf if speed is None else max(map(abs, speed))
 
     @property
     def _has_left(self) -> bool:
         """Whether the arm has moved away from where it last pressed on something."""
         at = self._pressed_at
-        return at is None or has_left(at, self._joints)
+        return at is None or bool(np.abs(at - np.array(self._q)).max() > MOTION.left_angle)
 
     def step(
         self,
@@ -274,580 +202,506 @@ class ForceLoop:
         posture_rate : velocity at which the commanded posture moves (n,), rad/s.
         external_sd : standard deviations of `external` (n,), N m; None where they are not published.
         """
-        own = self.parameters
-        self._external_sd = external_sd if own.is_estimated else None
-        is_braked = not any(joints.effort)
-        if not self._joints or is_braked:
-            self._reset(joints.position)
-        self._joints = tuple(joints.position)
+        own, q = self.parameters, joints.position
+        is_braked, is_first = not any(joints.effort), not self._q
+        self._q = list(q)
+        if is_braked or is_first:
+            self._reset()
         if (contact if own.is_estimated else sensors) is None:
             task = None
             if own.mode != "open_loop":
                 command = torque = None  # a force that is not measured would grow without bounds
-        self._is_free = contact is not None and not contact.cover
-        self._given.step(joints.position, dt)
-        self._motion.step(joints.velocity, FORCE.steady_time, dt)
-        self._rested = self._rested + dt if self._is_at_rest else 0.0
-        contact = contact or NO_CONTACT
-        if task is None and self._axes == TASK:
-            self._reset(joints.position)
-        commands = self._admission.step(own, joints.position, command, posture, torque, dt, task)
-        self._rate = posture_rate if posture_rate and commands.posture == posture else None
-        if commands.refusals:
-            self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
-        self.refusals, self.fallback = commands.refusals, ""
-        self.reactions = {}
-        self._measurement.step(own, sensors, external, dt)
-        is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
-        present = self._measurement.external if is_touched else [0.0] * self._n
-        now, before = self._filter.step(present, own.force_filter, dt)
-        self._external = np.array(now), np.array(before)
-        self._acceleration, _ = self._inertia.step(self._measurement.acceleration, own.force_filter, dt)
-        if task is not None:
-            out = self._task(joints.position, contact, task, commands.posture, dt)
-        elif own.mode == "joint_torque":
-            out = self._joint_torque(contact, commands.torque, dt)
-        else:
-            out = self._force(joints.position, contact, commands.force, commands.posture, dt)
-        velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        push = self._push_on_arm(joints.position, contact, _known_position(out.point, task))
-        limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        if is_braked:
-            self._limits.forget()  # the force with which brakes stop the arm is none of the world
-        else:
-            self._react_too(limited.contact_force)
-        self._react_too(limited.joint_end)
-        self._watch_rise(commands)
-        self._watch_posture(commands, posture is not None, joints.position, dt)
-        return ForceOutput(limited.velocity, *out[1:])
+        is_free, contact = contact is not None and not contact.cover, contact or NO_CONTACT
+        is_touched = bool(contact.cover) or self._run.is_touching
+        self._measurement.step(own, joints, sensors, external, external_sd, is_touched, dt)
+        if task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
+            self._admission.restart(q)
+        commands = self._admission.step(own, q, command, posture, torque, dt, task)
+        self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
+        self.refusals = commands.refusals
+        done, key = _task(commands, task, own)
+        if key != self._run.key or (self._run.is_moving and self._measurement.rested > FORCE.rested):
+            self._begin(done, key, is_free)
+        axes = self._find_axes(done, contact)
+        frame = done.frame if done else BASE
+        if own.mode == "open_loop" and task is None:
+            effort = axes[0].along * axes[0].desired if axes else np.zeros(len(q))
+            self.events = ()
+            return ForceOutput([], effort.tolist(), frame=frame)
+        rate = posture_rate if posture_rate and commands.posture == posture else None
+        found, known = self._watch(axes, contact, rate is not None, dt)
+        if task is not None and (reason := beyond(task, own)):
+            found.append(holding(Code.REFUSED, "task", reason=reason))
+        velocity, fed, limits = self._move(axes, known, found, contact, commands.posture, rate, is_braked, dt)
+        found += limits
+        found += self._watch_motions(axes, found, commands.posture if posture is not None else None, rate, dt)
+        if commands.rising and axes and commands.risen > own.limits.settling_time:
+            found.append(warning(Code.NOT_REACHED, "rising", **commands.rising))
+        self.events = _by_seriousness(self._advised(found, done, axes))
+        if self.event.holds:
+            self.refusals["task_command" if task else "force_command"] = self.event
+        self._velocity = velocity
+        return _output(velocity, fed, axes, known, frame, self._supervision, bool(task), self._run)
 
-    def _watch_rise(self, commands: Commands) -> None:
-        """State that the set point is not the command yet, in each reaction and, if that lasts, as one."""
-        if not commands.rising or self._axes in ("", TASK):
-            return
-        self.reactions = {code: event.with_values(**commands.rising) for code, event in self.reactions.items()}
-        if commands.risen > self.parameters.limits.settling_time:
-            self._react(warning(Code.NOT_REACHED, "rising", **commands.rising), *self.reactions.values())
-
-    def _watch_posture(self, commands: Commands, is_commanded: bool, q: Sequence[float], dt: float) -> None:
-        """React to a posture that moves on faster than the arm follows, or is not reached where it is all there is."""
-        is_held = self.reaction.code.holds or "joint_posture_command" in commands.refusals
-        own, is_pushed = self.parameters, Code.CONTACT_FORCE in self.reactions
-        if is_held or is_pushed or self._axes or not is_commanded or own.mode != "hybrid":
-            self._posture_shortfall.restart()
-        else:
-            short = self._posture_shortfall.step(commands.posture, q, own.posture_gain, own.joint_speed_limit, dt)
-            self._react_too(short)
-        if self._axes != TASK or is_held or not self._posture_before:
-            self._posture_before, self._has_posture = commands.posture, False
-        if is_held:
-            self._posture_watch.restart()
-            return
-        limit = self.parameters.joint_speed_limit
-        late = (
-            self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
-            if is_commanded
-            else self._posture_watch.wait(dt)
-        )
-        self._react_too(late)
-        if self._posture_before is not commands.posture:
-            self._watch_posture_of_task(commands.posture, q, dt)
-
-    def _watch_posture_of_task(self, posture: Sequence[float], q: Sequence[float], dt: float) -> None:
-        """React to a posture that has moved next to a task, and that the task does not leave to the arm."""
-        before = self._posture_before
-        if not self._has_posture:
-            if posture == before or not any(abs(a - b) > MOTION.arrived for a, b in zip(posture, before, strict=True)):
-                return
-            self._has_posture = True
-            for watch in self._posture_motions:
-                watch.restart()
-        own, rate, share = self.parameters, self._rate or [0.0] * self._n, self._tasks.share
-        law = own.posture_gain, own.joint_speed_limit
-        for goal, speed, at, watch in zip(posture, rate, q, self._posture_motions, strict=True):
-            self._react_too(watch.position(goal, speed, at, 1.0, law, share, own, dt))
-
-    def _whole(self, out: ForceOutput) -> WholeForce | None:
-        """The force that presses on something, and how it is known in all; None where none does."""
-        if not out.desired:
-            return None
-        pressed = out.pressed
-        return WholeForce(out.desired, (lambda: self._whole_force(pressed)) if pressed else lambda: None)
-
-    def _whole_force(self, pressed: PressedForce) -> tuple[float, HowKnown]:
-        """The force in all, N, and how it is known: at its position, or on another link if it would be less there.
-
-        Torques that no force along the commanded direction gives may be those of a push on another link.  They may
-        look like a force along this one, which would have to be many times as large.
-        """
-        q, torques, axes = self._joints, self._external[0], self._force_axes
-        size = axes.whole(q, pressed, torques)
-        if size <= FORCE.slow_from * self.parameters.limits.whole_force * pressed.force:
-            return size, AT_COMMANDED
-        axis = axes.axis(q, pressed)
-        if axis.unexplained(torques) <= FORCE.unexplained * max(-float(axis.sense @ torques) / pressed.force, 1.0) ** 2:
-            return size, AT_COMMANDED
-        here = self._push(q, pressed[:2]).least(self._body, q), AT_LEAST
-        others = [
-            (self._push(q, (cover, FORCE.middle * length)).least(self._body, q), (AT_MIDDLE, cover))
-            for cover, length in self._other_covers(pressed)
-        ]
-        return min((size, AT_COMMANDED), max([here, *others]))
-
-    def _react(self, *found: Event) -> None:
-        self.reactions = by_seriousness(found)
-
-    def _react_too(self, event: Event | None) -> None:
-        """React to this, too, where there is something."""
-        if event:
-            self._react(*self.reactions.values(), event)
-
-    def _reset(self, q: Sequence[float]) -> None:
+    def _reset(self) -> None:
         """Hold this posture and forget what was before."""
-        self._admission.restart(q)
-        self._given.restart()
-        self._posture_watch.restart()
-        self._posture_shortfall.restart()
-        self._transfer.reset()
-        self._filter.reset()
-        self._begin("")
+        self._admission.restart(self._q)
+        self._measurement.restart()
+        self._pushed.restart()
+        self._velocity = np.zeros(len(self._q))
+        self._begin(None, None)
 
-    def _begin(self, axes: str) -> None:
-        """Control other axes, without a memory of the force on those before; '' for none.
+    def _begin(self, task: TaskCommand | None, key: object, is_free: bool = False) -> None:
+        """Something else is commanded: what a free arm at rest measures is the error of its model."""
+        measurement, limit = self._measurement, self.parameters.sensing.zero_limit
+        is_at_rest = measurement.speed < MOTION.at_rest
+        resting = np.zeros(len(self._velocity))
+        if task is not None and limit and self._has_left and is_at_rest:
+            if is_free:
+                measurement.zero(limit)
+            resting = measurement.resting
+        is_moving = task is not None and bool(limit) and FORCE.fast < measurement.speed < math.inf
+        self._run = CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
 
-        What a free arm at rest measures is the error of its model.
-        """
-        self._hold.reset()
-        self._position.restart()
-        self._delay.reset()
-        self._feed_forward.reset()
-        self._torque_before, self._q_before, self._free_at = [], [], []
-        self._torques = [TorqueWatch(name) for name in self._arm.joints.names]
-        self._external = self._external[0], self._external[0]
-        self._resting = None
-        if axes != self._axes:
-            self._given.restart()
-        self._axes = axes
-        self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
-        self._held.release()
-        self._transfer.restart()
-        limit = self.parameters.sensing.zero_limit
-        self._is_moving, self._is_fast = not self._is_at_rest, False
-        if not (axes and limit and self._has_left):
-            return
-        self._is_fast = self._speed > FORCE.fast and axes != TASK
-        if self._is_moving:
-            self._resting = self._external[0]
-            if self.parameters.feedback == "joint_sensors":
-                self._resting = self._resting + self._force_axes.inertia(self._joints) @ self._acceleration
-            return
-        if self._is_free and self._measurement.zero(limit):
-            self._filter.reset()
-            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
-        self._resting = self._measurement.resting
-
-    def _force(
-        self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
-    ) -> ForceOutput:
-        """Force along the commanded direction, posture in the complement."""
-        own, law = self.parameters, self._supervision.force_law
-        is_open = own.mode == "open_loop"
-        desired = math.hypot(*command.force) if command is not None else 0.0
-        axes = command.frame if command is not None and desired else ""
-        if axes != self._axes or (self._is_fast and self._rested > RESTED):
-            self._begin(axes)
-        goal = list(map(add, posture, self._approached))
-        held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
-        if command is None or not desired:
-            return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)
-        rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
-        direction = rotation @ (np.array(command.force) / desired)
-        axis = (rotation.T @ direction).tolist()
-        point = self._point(contact, command, direction)
-        force_axis = self._force_axes.axis(q, point.pressed(direction, desired))
-        measured, before, free = self._measured(force_axis)
-        scalar = law.along(axis)
-        error, is_touching = desired - measured, self._hold.is_touching
-        out = ForceOutput(
-            [],
-            [0.0] * self._n,
-            _triple([part * measured for part in axis]),
-            _triple([part * error for part in axis]),
-            _triple([part * scalar.limited(0, error) for part in axis]),
-            command.frame,
-            force_axis,
-            point,
-            own.sensing.sd_limit(desired, point.is_pinned),
-            desired=desired if is_touching or contact.cover else 0.0,
-            pressed=point.pressed(direction, desired) if is_touching and point.is_certain else None,
-        )
-        moved = np.array(q) - np.array(self._q_before or q)
-        self._q_before = list(q)
-        is_watching = self._is_watching(force_axis, moved, dt)
-        self._react(*self._found(q, force_axis, point, direction, (measured, free), desired, dt, command.frame))
-        self._remember(q, moved, contact, point, force_axis, direction, dt)
-        if self.reaction.code.holds:
-            measured -= -float(force_axis.sense @ self._unknown[0])
-            excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
-            factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
-            force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
-            velocity, effort = self._hold_still(q, contact, point, force, desired, dt)
-            if pushed := self._held.pushed:
-                self._react(self.reaction.with_values(pushed=pushed))
-            self.refusals["force_command"] = self.reaction
-            return out._replace(velocity=[] if is_open else velocity, effort=effort)
-        if self._held.is_holding:
-            self._held.release()
-            self._transfer.restart()
-        if is_open:
-            return out._replace(effort=(force_axis.lever * desired).tolist())
-        if contact.cover and not point.is_identified:
-            error = min(error, self._shortfall(q, point, direction, desired))
-        if self._hold.keeps(force_axis, measured, desired, own):
-            error, held = 0.0, self._at_rest(held)
-        speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
-        speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
-        speed *= self._hold.share
-        speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
-        if self._hold.has_touched and self._rate is None:
-            held = self._followed(q, point, force_axis, held, desired, scalar.gain[0])
-        velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
-        fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
-        return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
-
-    def _followed(
-        self, q: Sequence[float], point: ForcePoint, axis: ForceAxis, held: list[float], desired: float, gain: float
-    ) -> list[float]:
-        """Velocities of the posture (n,), rad/s, slower where the link would slide fast on what it presses."""
-        on_axis = (point.position, *self._arm.covers.aside(point.cover, point.position))
-        across = np.array(hybrid_velocity(held, axis, 0.0, self.parameters.joint_speed_limit))
-        slow: list[float] = followed(across, self._body.point_jacobian(q, point.cover, on_axis), desired, gain).tolist()
-        return slow
-
-    def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
-        """Force along an axis, N, now and one period before, and now without the inertia of the arm itself.
-
-        The last one shows whether something is touched, and is the measured one until then: near a straight elbow the
-        apparent mass of the arm has either sign, and the arm would chatter in free space.
-        """
-        measured, before = (-float(axis.sense @ torques) for torques in self._external)
-        if self.parameters.feedback != "joint_sensors":
-            return measured, before, measured
-        # the acceleration is the mean of a period
-        free = 0.5 * (measured + before) - float(axis.carried @ self._acceleration)
-        return (measured, before, free) if self._hold.is_touching else (free, free, free)
-
-    def _found(
-        self,
-        q: Sequence[float],
-        axis: ForceAxis,
-        point: ForcePoint,
-        direction: Array,
-        measured: tuple[float, float],
-        desired: float,
-        dt: float,
-        frame: str,
-    ) -> list[Event]:
-        """What the loop does instead of the command; forces in N, the measured one without inertia, too."""
-        if self._is_fast:
-            return [warning(Code.NOT_SENSED, "moved_fast", speed=FORCE.fast)]
-        if self._resting is not None:
-            self._judge(q, point, direction, self._resting)
-        return self._hold.step(
-            self._case(q, axis, point, direction, desired),
-            self._external[0],
-            measured[0],
-            self.parameters,
-            dt,
-            pushed=measured[1],
-            others=lambda: self._others(q, point, direction, frame),
-            given_way=0.0 if self._held.is_holding else self._given.way,
-        )
-
-    def _case(
-        self, q: Sequence[float], axis: ForceAxis, point: ForcePoint, direction: Array, desired: float
-    ) -> ForceCase:
-        """A force in a pose, with what is known of the torques now."""
-        return ForceCase(
-            axis,
-            point,
-            desired,
-            signal=axis.signal(desired, self._external_sd) if self._external_sd else math.inf,
-            elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
-            torque_error=self._torque_error(axis),
-            unknown=-float(axis.sense @ self._unknown[0]),
-            payload=self._unknown[1],
-        )
-
-    def _others(self, q: Sequence[float], point: ForcePoint, direction: Array, frame: str) -> OtherForces:
-        """A force along the same direction of its frame in other poses, of other sizes, and at a pinned position."""
-        body, joints, margin = self._body, self._arm.joints, self.parameters.limits.joint_margin
-        known = point._replace(is_pinned=True, is_certain=True, is_identified=True, is_doubtful=False)
-        pinned = known._replace(position_sd=self.parameters.contact_position_sd)
-
-        def turn(pose: Sequence[float]) -> Array:
-            return np.eye(3) if frame == BASE else body.cover_pose(pose, frame).rotation
-
-        along = turn(q).T @ direction
-
-        def at(pose: Sequence[float], force: float, is_pinned: bool) -> ForceCase:
-            there, u = pinned if is_pinned else point, turn(pose) @ along
-            return self._case(pose, self._force_axes.axis(pose, there.pressed(u, force)), there, u, force)
-
-        moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))[::-1].tolist()
-        turnable = [Turnable(i, joints.names[i], joints.lower[i] + margin, joints.upper[i] - margin) for i in moving]
-        where = (
-            "" if point.is_pinned else f"by a force in the frame of {point.cover}; computed for {point.position:.3g} m"
-        )
-        return OtherForces(q, turnable, where, at)
-
-    def _torque_error(self, axis: ForceAxis) -> float:
-        """Standard deviation of the force by those of the estimated torques, N; 0 with sensors."""
-        return axis.error(self._external_sd) if self._external_sd else 0.0
-
-    def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
-        """Whether torques that are there as a force begins (n,), N m, are those of a surface that is touched already.
-
-        Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
-        """
-        pressed = point.pressed(direction, 0.0)
-        force = -float(self._force_axes.axis(q, pressed).sense @ resting)
-        axis = self._force_axes.axis(q, pressed._replace(force=abs(force)))
-        carried = self._carried(q, resting)
-        is_pressed = force > 0.0 and axis.unexplained(resting) <= FORCE.unexplained
-        is_contact = (is_pressed or self._is_moving) and not carried
-        self._resting, self._unknown = None, (np.zeros(self._n), 0.0) if is_contact else (resting, carried)
-
-    def _judge_load(self, q: Sequence[float]) -> None:
-        """The same for no direction: what no mass at the tool explains may be surfaces that are touched already."""
-        if (resting := self._resting) is not None:
-            carried = self._carried(q, resting)
-            self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
-
-    def _carried(self, q: Sequence[float], resting: Array) -> float:
-        """The mass at the tool, kg, that explains torques at rest (n,), N m; 0 where none does."""
-        sd = math.hypot(sensing_of(self.parameters).torque_sd, FORCE.payload_rest * float(np.abs(resting).max()))
-        mass, left = self._measurement.payload(q, resting, sd)
-        return mass if mass > 0.0 and left <= FORCE.unexplained else 0.0
-
-    def _hold_still(
-        self,
-        q: Sequence[float],
-        contact: Contact,
-        point: ForcePoint,
-        force: RetreatForce,
-        desired: float,
-        dt: float,
-    ) -> tuple[list[float], list[float]]:
-        """Velocities and torques of an arm that holds: to where it does, or away from what pushes too hard."""
-        own, still = self.parameters, [0.0] * self._n
-        self._hold.fed = 0.0
-        goes_back = self.reaction.code is Code.OTHER_LINK
-        if not self._held.is_holding or goes_back != self._goes_back:
-            self._goes_back = goes_back
-            self._held.hold(self._free_of(force.axis) if goes_back else q)
-            self._transfer.restart()
-        push = self._push(q, self._pushed_position(contact, _known_position(point, None)))
-        push = push._replace(allowed=min(push.allowed, desired))
-        velocity, is_yielding = self._held.step(q, [force], push, self._force_axes.moved_inertia(q), own)
-        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
-
-    def _push(self, q: Sequence[float], where: tuple[str, float] | None) -> ArmPush:
-        """What pushes the arm, at a position of a cover or wherever it does."""
-        own = self.parameters
-        torques = self._external[0] - self._unknown[0]
-        if own.feedback == "joint_sensors":
-            torques = torques + self._force_axes.inertia(q).dot(self._acceleration)
-        gain = self._supervision.present * max(own.force_gain)
-        return ArmPush(torques, self._push_sd, where, own.limits.contact_force, gain)
-
-    def _push_on_arm(self, q: Sequence[float], contact: Contact, where: tuple[str, float] | None) -> ArmPush:
-        """What pushes the arm: where the commanded force acts, or no nearer to the base than a contact is estimated."""
-        if self.reaction.code.holds:
-            return self._push(q, self._pushed_position(contact, where))
-        probable = self.parameters.link_probability_limit
-        if where is not None or not contact.cover or not contact.probability >= probable:
-            return self._push(q, where)
-        length = self._arm.covers.length_of(contact.cover)
-        farthest = contact.position + FORCE.certain * contact.position_sd
-        where = contact.cover, min(length if math.isnan(farthest) else farthest, length)
-        return self._push(q, where)._replace(is_estimated=True)
-
-    @property
-    def _push_sd(self) -> Array:
-        """Standard deviations of the torques of the world on the joints (n,), N m."""
-        return np.array(self._external_sd) if self._external_sd else self._torque_sd
-
-    def _pushed_position(self, contact: Contact, where: tuple[str, float] | None) -> tuple[str, float] | None:
-        """Where an arm that holds is pushed: estimated, if on another cover than that of the known position."""
-        if contact.cover and (where is None or where[0] != contact.cover):
-            middle = FORCE.middle * self._arm.covers.length_of(contact.cover)
-            where = contact.cover, middle if math.isnan(contact.position) else contact.position
-        return where
-
-    def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
-        """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
-        cycle = self._timing.dither_cycle
-        if not self.parameters.is_estimated or not cycle:
-            return False
-        return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
-
-    def _remember(
-        self,
-        q: Sequence[float],
-        moved: Array,
-        contact: Contact,
-        point: ForcePoint,
-        axis: ForceAxis,
-        direction: Array,
-        dt: float,
-    ) -> None:
-        """Keep where the arm presses, how far it has slid, its way there and back, and where it was free."""
-        if not self.reaction.code.holds and self.parameters.mode != "open_loop":
-            self._hold.travel(float(axis.lever @ moved), dt, self._posture_watch.is_moving)
-            if self._hold.goes_back:
-                self._given.give(-direction)
-        self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
-        if self._hold.is_touching:
-            if not self.reaction.code.holds:
-                self._pressed_at = list(q)
-        else:
-            way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
-            self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
-        if not (contact.cover or self._hold.is_touching) or not self._free_at:
-            self._free_at = list(q)
-
-    def _at_rest(self, held: list[float]) -> list[float]:
-        """Velocities of the posture, without those of a small error: they would wind up friction across the force."""
-        is_small = self._rate is None and max(map(abs, held)) < FORCE.slow_posture
-        return [0.0] * self._n if is_small else held
-
-    def _free_of(self, axis: ForceAxis) -> list[float]:
-        """Where the arm was free, and `way_back` further against the force: friction would hold it in less."""
-        away = axis.lever * (FORCE.way_back / float(axis.lever @ axis.lever))
-        return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
-
-    def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Torques of the commanded force on another cover, near its base, in sd of the estimated torques."""
-        if not self._external_sd:
-            return math.inf
-        sd = np.array(self._external_sd)
-        found = [
-            desired
-            * float(np.linalg.norm(self._force_axes.lever(q, cover, FORCE.faint_position * length, direction) / sd))
-            for cover, length in self._other_covers(point)
+    def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[Axis]:
+        """The axes of what is commanded, each at its place."""
+        if task is None:
+            return []
+        places = [
+            self._place(task, axis, contact, one.place) for axis, one in zip(task.axes, self._run.axes, strict=True)
         ]
-        return min(found, default=math.inf)
+        return self._axes.of(self._q, task, places, [one.side for one in self._run.axes])
 
-    def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""
-        middle = self._largest_force(q, point, direction, desired, FORCE.middle)
-        if self.parameters.is_estimated:
-            return desired - middle  # the motors identify a link only by a large force
-        return max(
-            desired - self._largest_force(q, point, direction, desired, FORCE.near_end), min(desired - middle, 0.0)
+    def _place(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> Place:
+        lean, own = 0.0, self.parameters
+        if axis.joint >= 0:
+            return Place("", 0.0, 0.0)
+        if contact.cover and axis.position is None:
+            turn = np.eye(3) if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
+            along = self._body.cover_pose(self._q, contact.cover).rotation[:, 0]
+            lean = math.asin(min(abs(float(turn @ np.array(axis.direction) @ along)), 1.0))
+        place = memory.step(axis, contact, lean, own)
+        self._run.fallback = place.rejection
+        if place.rejection and own.is_estimated:
+            self.refusals["contact/hypotheses"] = refused("contact/hypotheses", place.rejection)
+        return place
+
+    def _watch(
+        self, axes: Sequence[Axis], contact: Contact, is_led: bool, dt: float
+    ) -> tuple[list[Event], list[Belief]]:
+        """What is known of each axis, and what its watch reports."""
+        own, run, torques = self.parameters, self._run, self._measurement.torques
+        q = np.array(self._q)
+        moved = q - (q if run.before is None else run.before)
+        run.before = q
+        for axis in axes[:1]:
+            run.resting.judge(self._q, axis, self._measurement, self._axes.forces, float(torques.sd.max()))
+        known = [self._believe(axis, axes) for axis in axes]
+        run.move(moved, axes, self._axes.forces, self._q)
+        found: list[Event] = []
+        if run.is_moving:
+            found.append(holding(Code.REFUSED, "moved_fast", speed=FORCE.fast))
+        is_led = is_led or not all(axis.is_force for axis in axes)
+        covers = {axis.place.cover for axis in axes if axis.place}
+        probable = contact.probability >= own.link_probability_limit
+        touched = contact.cover if probable and contact.cover not in covers else ""
+        if contact.cover and not contact.is_single and len(covers) == 1:
+            touched = contact.cover
+        for axis, one, belief in zip(axes, run.axes, known, strict=True):
+            if not (axis.is_force and axis.desired):
+                continue
+            size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, belief.force))
+            one.watch.touch.step(force, size, dt)
+            way = 0.0 if run.held.at is not None or axis.is_joint else float(axis.along @ moved)
+            is_felt = math.hypot(*contact.force) >= FORCE.touch * size
+            seen = Seen(belief, way, touched if covers and is_felt else "", is_led)
+            found += one.watch.step(axis, seen, torques.now, own, dt)
+        if axes and run.is_touching and not any(event.holds for event in found):
+            self._pressed_at = q
+        if run.free_at is None or not (contact.cover or run.is_touching):
+            run.free_at = q
+        return found, known
+
+    def _believe(self, axis: Axis, axes: Sequence[Axis]) -> Belief:
+        """What is known of the force along an axis of those that are commanded."""
+        size = abs(axis.desired)
+        if axis.is_joint:  # the torques of the joints are one vector
+            size = math.hypot(*(one.desired for one in axes if one.is_joint))
+        own, torques, wound = self.parameters, self._measurement.torques, self._supervision.wound
+        known = self._run.believe(axis, size, torques, own, wound)
+        if axis.place is None or axis.place.is_pinned or known.force >= axis.desired:
+            return known
+        # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
+        sd = axis.place.position_sd * max(known.force / axis.desired, 0.0) if axis.place.is_known else 0.0
+        place = axis.place._replace(position_sd=max(sd, own.contact_position_sd))
+        touched = axis._replace(sensed=self._axes.forces.axis(self._q, place.pressed(axis.direction, axis.desired)))
+        return known._replace(errors=self._run.believe(touched, size, torques, own, wound).errors)
+
+    def _move(
+        self,
+        axes: Sequence[Axis],
+        known: Sequence[Belief],
+        found: Sequence[Event],
+        contact: Contact,
+        posture: Sequence[float],
+        rate: Sequence[float] | None,
+        is_braked: bool,
+        dt: float,
+    ) -> tuple[Array, list[float], list[Event]]:
+        """Joint velocities and torques (n,), and what limits them."""
+        own, run, q = self.parameters, self._run, np.array(self._q)
+        holds = any(event.holds for event in found)
+        factor = self._gain_factor(axes, dt)
+        wanted = np.clip(
+            own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate)),
+            -own.joint_speed_limit,
+            own.joint_speed_limit,
         )
+        rows, least = list[Row](), list[Row]()
+        forces = [axis for axis in axes if axis.is_force and axis.place is not None]
+        allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
+        if holds:
+            inertia = self._axes.forces.moved_inertia(self._q)
+            wanted = run.held.velocity(self._q, self._hold_at(axes, found), inertia, allowed, own)
+            least += [
+                self._no_harder(axis, belief, factor)
+                for axis, belief in zip(axes, known, strict=True)
+                if axis.sensed is not None and axis.desired and belief.sd < math.inf
+            ]
+        else:
+            run.held.at = None
+            rows = self._rows(axes, known, contact, factor, dt)
+            if rate is None:
+                wanted = self._slowed(axes, rows, wanted)
+        least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
+        low, high = joint_bounds(self._q, self._body.arm.joints, own)
+        if own.limits.joint_acceleration and self._pushed.event is None:
+            low, high = accelerated(low, high, self._velocity, own.limits.joint_acceleration * dt)
+        velocity, unlimited = solve(rows, wanted, least, low, high)
+        limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
+        if velocity is not unlimited:
+            limits += self._at_ends(unlimited, velocity)
+        effort = [0.0] * len(q)
+        if axes and not holds:
+            effort = run.feed_forward.step(self._fed(axes, dt), velocity.tolist(), own, dt)
+        return velocity, effort, limits
 
-    def _largest_force(
-        self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float, part: float
-    ) -> float:
-        """Largest force along a direction, N, that the torques would be of at a part of the length of other covers."""
-        found = -math.inf
-        for cover, length in self._other_covers(point):
-            axis = self._force_axes.axis(q, PressedForce(cover, part * length, 0.0, direction, desired))
-            if axis.force_sd <= FORCE.vague * self.parameters.sensing.sd_limit(desired, is_pinned=False):
-                found = max(found, -float(axis.sense @ self._external[0]))
+    def _hold_at(self, axes: Sequence[Axis], found: Sequence[Event]) -> Array:
+        """Where the arm is to hold (n,), rad: here, or off another link, where it last was free."""
+        q = np.array(self._q)
+        is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
+        if not is_elsewhere or self._run.free_at is None or not axes or not axes[0].along.any():
+            return q
+        along = axes[0].along
+        return self._run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
+
+    def _no_harder(self, axis: Axis, known: Belief, factor: float) -> Row:
+        """An arm that holds presses no harder than commanded, as far as the force is known."""
+        assert axis.sensed is not None
+        gain = factor * max(self.parameters.force_gain) * axis.sensed.speed_fraction
+        return Row(-axis.along, min(gain * (known.force - axis.desired - known.sd), self._fastest(axis)))
+
+    def _fastest(self, axis: Axis) -> float:
+        """Largest speed along an axis, m/s or rad/s."""
+        return self.parameters.task.fastest(axis.is_joint)[0]
+
+    def _rows(
+        self, axes: Sequence[Axis], known: Sequence[Belief], contact: Contact, factor: float, dt: float
+    ) -> list[Row]:
+        """The commanded velocity along each axis."""
+        run, own = self._run, self.parameters
+        speeds = [self._speed(i, axis, known[i], factor, dt) for i, axis in enumerate(axes)]
+        is_watching = bool(axes) and own.is_estimated and not run.is_touching and run.shaking.is_watching(self._q, dt)
+        watch = self._supervision.watch
+        is_assessed = watch is None or bool(watch.assessed) or all(axis.sensed is None for axis in axes)
+        if is_watching or not is_assessed:
+            speeds = [0.0] * len(speeds)
+        run.delayed.append(speeds)
+        while len(run.delayed) > own.delay_samples + 1:
+            run.delayed.popleft()
+        late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
+        return [Row(axis.along, speed) for axis, speed in zip(axes, late, strict=True)]
+
+    def _speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
+        """Commanded speed along one axis, m/s or rad/s."""
+        own, one, fastest = self.parameters, self._run.axes[i], self._fastest(axis)
+        if axis.is_force:
+            speed = self._force_speed(i, axis, known, factor, dt)
+            return min(max(speed, -fastest), fastest) if len(self._run.axes) > 1 else speed
+        goal = one.goal(axis, dt, own.limits.settling_time)
+        if axis.of.kind is AxisKind.VELOCITY:
+            speed = axis.of.value or 0.0
+        elif axis.of.kind is AxisKind.POSITION:
+            speed = axis.of.rate + own.task.largest_rate * (goal - axis.at)
+        else:
+            band = own.task.joint_deadband if axis.is_joint else own.task.deadband
+            if not axis.is_joint and known.force < -band:
+                one.side = -one.side  # an impedance may be pushed from either side
+            drive = axis.of.stiffness * (goal - axis.at) - known.force
+            yielding = math.copysign(max(abs(drive) - band, 0.0), drive)
+            speed = axis.of.rate + yielding / own.task.damping(axis.of)
+        return min(max(speed, -fastest), fastest)
+
+    def _force_speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
+        """The law of a force or a torque, as fast as the limits allow."""
+        own, one = self.parameters, self._run.axes[i]
+        error, before = axis.desired - known.force, axis.desired - known.before
+        if axis.sensed is None:
+            return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
+        law = self._supervision.force_law.along(axis.in_frame.tolist())
+        if axis.place is not None and axis.place.is_in_doubt:
+            error = self._unidentified(axis, error)
+        if own.limits.impact:
+            band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
+            one.is_kept = one.watch.touch.is_there and abs(error) < band
+            if one.is_kept:
+                return 0.0
+        speed = factor * one.watch.oscillation.share * law.velocity(0, error, before, dt)
+        if axis.desired:  # back no faster than the measured force can follow
+            most = approach_speed(axis, one.watch.touch.is_there, own)
+            speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
+        return axis.sensed.speed_fraction * speed
+
+    def _unidentified(self, axis: Axis, error: float) -> float:
+        """The error, N, while it is not known which link is touched: none may be pressed harder than commanded.
+
+        The force is taken for that in the middle of another link, and, going on, for that near its base, where the same
+        torques are those of a larger force.  The motors identify a link only by a large force.
+        """
+        parts = [(FORCE.middle, -math.inf)] + ([] if self.parameters.is_estimated else [(FORCE.near_base, 0.0)])
+        for part, least in parts:
+            for cover, length in zip(self._body.arm.covers.names, self._body.arm.covers.length, strict=True):
+                pressed = Place(cover, part * length, 0.0).pressed(axis.direction, axis.desired)
+                sensed = self._axes.forces.axis(self._q, pressed)
+                if sensed.force_sd <= FORCE.vague * axis.desired:
+                    force = -float(sensed.sense @ self._measurement.torques.now)
+                    error = min(error, max(axis.desired - force, least))
+        return error
+
+    def _slowed(self, axes: Sequence[Axis], rows: Sequence[Row], wanted: Array) -> Array:
+        """Velocities of the posture (n,), rad/s, at which the forces stay right."""
+        run, own = self._run, self.parameters
+        if any(one.is_kept for one in run.axes) and float(np.abs(wanted).max()) < FORCE.slow_posture:
+            return np.zeros_like(wanted)
+        for axis, one in zip(axes, run.axes, strict=True):
+            if axis.is_force and axis.desired and axis.place and one.watch.touch.has_been and own.limits.impact:
+                far = np.full(len(wanted), math.inf)
+                left = solve([row._replace(speed=0.0) for row in rows], wanted, [], -far, far).velocity
+                wanted = followed(left, axis, self._body, self._q, own)
+        return wanted
+
+    def _pushes(
+        self,
+        axes: Sequence[Axis],
+        forces: Sequence[Axis],
+        known: Sequence[Belief],
+        contact: Contact,
+        holds: bool,
+        allowed: float,
+        dt: float,
+    ) -> list[Row]:
+        """What pushes harder than allowed."""
+        own, torques = self.parameters, self._measurement.torques
+        if not holds:
+            allowed, pressed = own.limits.contact_force, math.fsum(axis.desired for axis in forces)
+            if pressed and len(forces) == len(axes) and self._run.is_touching:
+                allowed = min(allowed, own.limits.whole_force * pressed)
+        now = torques.now - self._run.resting.torques
+        if torques.acceleration is not None:
+            now = now + self._axes.forces.inertia(self._q) @ torques.acceleration
+        chi2 = max((one.chi2 for one in known), default=0.0)
+        gain = self._supervision.present * max(own.force_gain)
+        return self._pushed.step(self._q, forces, torques._replace(now=now), contact, chi2, allowed, gain, own, dt)
+
+    def _at_ends(self, unlimited: Array, velocity: Array) -> list[Event]:
+        """The joints that do not move on at their ends."""
+        own, joints = self.parameters, self._body.arm.joints
+        found = []
+        for i, (low, at, high) in enumerate(zip(joints.lower, self._q, joints.upper, strict=True)):
+            end = low if unlimited[i] < 0.0 else high
+            near = own.limits.joint_margin + FORCE.push_back / max(own.limits.joint_gain, FORCE.push_back)
+            if abs(velocity[i]) < FORCE.stopped * abs(unlimited[i]) and abs(at - end) < near and own.limits.joint_gain:
+                values = {"angle": at, "end": end, "margin": own.limits.joint_margin}
+                found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _other_covers(self, point: ForcePoint | PressedForce) -> list[tuple[str, float]]:
-        """Names and lengths, m, of the covers on which the force is not commanded."""
-        covers = self._arm.covers
-        return [one for one in zip(covers.names, covers.length, strict=True) if one[0] != point.cover]
+    def _fed(self, axes: Sequence[Axis], dt: float) -> Array:
+        """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
-    def _task(
-        self, q: Sequence[float], contact: Contact, task: TaskCommand, posture: list[float], dt: float
-    ) -> ForceOutput:
-        """Force, motion or impedance along each axis of a task, posture in what they leave."""
-        if self._axes != TASK:
-            self._begin(TASK)
-            self._tasks.restart()
-        self._judge_load(q)
-        push = self._push(q, self._pushed_position(contact, _known_position(None, task)))
-        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
-        self.reactions = found.reactions
-        if self.reaction.code.holds:
-            self.refusals["task_command"] = self.reaction
-        elif self._tasks.is_touching:
-            self._pressed_at = list(q)
-        if found.has_changed:
-            self._transfer.restart()
-        measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())
-        out = ForceOutput(found.velocity, found.effort, measured, error, error, task.frame)
-        return out._replace(rows=found.rows, desired=found.desired, pressed=found.pressed)
+        The velocity loops need not wind up to it; it rises as the force may.
+        """
+        own, run = self.parameters, self._run
+        at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
+        for axis in axes:
+            if axis.is_force:
+                at_once += own.force_feedforward * axis.desired * axis.along
+                if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
+                    later += (1.0 - own.force_feedforward) * axis.desired * axis.along
+        run.fed += (later - run.fed) * dt / (rise_time(own) + dt) if own.limits.impact else 0.0
+        return at_once + run.fed
 
-    def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
-        """Torque of each joint; without a command the arm holds still."""
-        axes = "joints" if torque is not None else ""
-        if axes != self._axes:
-            self._begin(axes)
-        if torque is None:
-            return ForceOutput([0.0] * self._n, [0.0] * self._n)
-        measured = [-torque for torque in self._measurement.external]
-        before, self._torque_before = self._torque_before or measured, measured
-        self._judge_load(self._joints)
-        self._watch_torques(torque, dt)
-        if self.reaction.code.holds:
-            self._delay.reset()
-            return ForceOutput([0.0] * self._n, [0.0] * self._n)
-        errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
-        velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)
-        velocity = self._delay.step(velocity, self.parameters.delay_samples)
-        point = self._position.step(contact, None, 0.0, self.parameters)
-        factor = self._gain_factor(point, None, 0.0, dt)
-        share = self.parameters.force_feedforward
-        return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
+    def _watch_motions(
+        self,
+        axes: Sequence[Axis],
+        found: Sequence[Event],
+        posture: Sequence[float] | None,
+        rate: Sequence[float] | None,
+        dt: float,
+    ) -> list[Event]:
+        """What the motions of a task do not reach, or a posture where it is all there is."""
+        own, run = self.parameters, self._run
+        if any(event.holds or event.code is Code.PUSHED for event in found):
+            run.joints = {name: MotionWatch() for name in run.joints}
+            for one in run.axes:
+                one.motion = MotionWatch()
+            return []
+        lasting = FORCE.quarter * own.limits.settling_time
+        events = []
+        for axis, one in zip(axes, run.axes, strict=True):
+            if axis.of.kind in (AxisKind.POSITION, AxisKind.VELOCITY):
+                speed = axis.of.rate if axis.of.kind is AxisKind.POSITION else axis.of.value or 0.0
+                law = (own.task.largest_rate, self._fastest(axis))
+                goal = one.goal(axis, 0.0, math.inf)
+                events.append(one.motion.step(axis.of.name, axis.of.unit, goal, speed, axis.at, *law, lasting, dt))
+        if not axes and posture is not None and own.mode == "hybrid":
+            law, rates = (own.posture_gain, own.joint_speed_limit), rate or [0.0] * len(self._q)
+            for (name, watch), goal, speed, at in zip(run.joints.items(), posture, rates, self._q, strict=True):
+                events.append(watch.step(name, "rad", goal, speed, at, *law, lasting, dt))
+        return [event for event in events if event]
 
-    def _watch_torques(self, desired: Sequence[float], dt: float) -> None:
-        """React to the torques of the joints, N m."""
-        values = (values.tolist() for values in (-self._external[0], self._push_sd, -self._unknown[0]))
-        self._react(
-            *(
-                watch.step(torque, measured, sd, self.parameters, dt, unknown, self._unknown[1])
-                for watch, torque, measured, sd, unknown in zip(self._torques, desired, *values, strict=True)
+    def _advised(self, found: list[Event], task: TaskCommand | None, axes: Sequence[Axis]) -> list[Event]:
+        """With what would help a refused force, which is looked for over several periods."""
+        is_refused = any(event.holds and event.cause == "error" for event in found)
+        if not is_refused or task is None or len(axes) > 1 or (place := axes[0].place) is None:
+            self._run.advice = Advice()
+            return found
+        self._run.advice.step(
+            lambda: tries(
+                self._q,
+                task,
+                place,
+                self._axes,
+                self._body.arm.joints,
+                lambda axis: self._believe(axis, [axis]),
+                self.parameters,
             )
         )
+        return [event.with_values(**self._run.advice.ways) if event.cause == "error" else event for event in found]
 
-    def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
-        """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""
-        lean = 0.0
-        if contact.cover:
-            along = self._body.cover_pose(self._joints, contact.cover).rotation[:, 0]
-            lean = math.asin(min(abs(float(direction @ along)), 1.0))
-        point = self._position.step(contact, command, lean, self.parameters)
-        self.fallback = point.rejection
-        if point.rejection and self.parameters.is_estimated:
-            self.refused += not self._contact_rejected
-            self.refusals["contact/hypotheses"] = refused("contact/hypotheses", point.rejection)
-        self._contact_rejected = bool(point.rejection)
-        return point
+    def _gain_factor(self, axes: Sequence[Axis], dt: float) -> float:
+        """The guard's factor of the gains."""
+        if not axes:
+            return 1.0
+        return self._supervision.factor(
+            lambda: [one for each in self._possible(axes) for one in self._guarded(each)], dt
+        )
 
-    def _gain_factor(self, point: ForcePoint, direction: Triple | None, force: float, dt: float) -> float:
-        """The guard's factor of the gains; `direction` and `force` as in `Supervision.step`."""
-        factor, has_changed = self._supervision.step(self._joints, point, direction, force, dt)
-        if has_changed:
-            self._transfer.restart()
-        return factor
+    def _possible(self, axes: Sequence[Axis]) -> list[Sequence[Axis]]:
+        """The axes, and where the gains follow the position, and it is not known, those of other positions."""
+        place = axes[0].place
+        if self.parameters.schedule != "position" or len(axes) > 1 or place is None or place.is_known:
+            return [axes]
+        length = self._body.arm.covers.length_of(place.cover)
+        pressed = [place._replace(position=part * length, position_sd=0.0) for part in GUARD.positions]
+        sensed = [self._axes.forces.axis(self._q, each.pressed(axes[0].direction, axes[0].desired)) for each in pressed]
+        return [
+            [axes[0]._replace(sensed=axis, along=axis.lever, place=each)]
+            for axis, each in zip(sensed, pressed, strict=True)
+        ]
+
+    def _guarded(self, axes: Sequence[Axis]) -> list[GuardedForces]:
+        """What is controlled, for the guard: all contacts at once; none where nothing is sensed at a point."""
+        contacts = [
+            GuardedContact(tuple(self._q), *axis.place[:3], _triple(axis.direction), axis.desired or FORCE.hand)
+            for axis in axes
+            if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < math.inf
+        ]
+        if not contacts:
+            return []
+        own, n = self.parameters, len(self._q)
+        move, left = linear([axis.along for axis in axes], n)
+        hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
+        for i, axis in enumerate(axes):
+            if axis.of.is_sensed:
+                sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
+            if axis.is_force:
+                move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
+                gain[:, i] = self._supervision.gains(axis.of.joint, axis.in_frame.tolist())
+            elif axis.of.kind is not AxisKind.VELOCITY:
+                rate = own.task.largest_rate
+                if axis.of.kind is AxisKind.IMPEDANCE:
+                    damping = own.task.damping(axis.of)
+                    rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
+                hold = hold + rate * np.outer(move[:, i], axis.along)
+        return [GuardedForces(tuple(contacts), sense, move, gain[0], gain[1], hold)]
 
 
-def _known_position(point: ForcePoint | None, task: TaskCommand | None) -> tuple[str, float] | None:
-    """Cover and position, m, where the one commanded force acts; None where that is not known."""
-    if point is not None:
-        return (point.cover, point.position) if point.is_pinned or point.is_certain else None
-    forces = [axis for axis in task.axes if axis.kind is AxisKind.FORCE] if task is not None else []
-    positions = [(axis.cover, axis.position) for axis in forces if axis.cover and axis.position is not None]
-    return positions[0] if len(forces) == len(positions) == 1 else None
+def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters) -> tuple[TaskCommand | None, object]:
+    """What is commanded as a task, and what makes it the same command as before, whatever its values are."""
+    if task is not None:
+        kept = (axis._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0) for axis in task.axes)
+        return task, (TaskCommand, task.frame, *kept)
+    if own.mode == "joint_torque":
+        if commands.torque is None:
+            return None, None
+        return TaskCommand(BASE, joint_axes(AxisKind.FORCE, commands.torque)), "joints"
+    force = commands.force
+    if force is None or not any(force.force):
+        return None, None
+    size = math.hypot(*force.force)
+    x, y, z = (part / size for part in force.force)
+    at: tuple[str, float | None] = pinned_position(force) or ("", None)
+    if not at[0] and own.contact_source == "pinned":
+        at = own.contact_cover, own.contact_position
+    axis = TaskAxis(AxisKind.FORCE, -1, *at, (x, y, z), size)
+    return TaskCommand(force.frame, (axis,)), (ForceCommand, force.frame)
 
 
-def _triple(values: Sequence[float]) -> Triple:
-    x, y, z = values
+def _by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
+    """One event of each subject, those that stop the arm first, then in the order of the codes."""
+    each = {event.subject: event for event in found}
+    return tuple(sorted(each.values(), key=lambda event: (not event.holds, event.code.number)))
+
+
+def _output(
+    velocity: Array,
+    effort: list[float],
+    axes: Sequence[Axis],
+    known: Sequence[Belief],
+    frame: str,
+    supervision: Supervision,
+    is_task: bool,
+    run: CommandRun,
+) -> ForceOutput:
+    measured, error, limited = np.zeros(3), np.zeros(3), np.zeros(3)
+    for axis, belief in zip(axes, known, strict=True):
+        if axis.is_force and axis.place is not None and axis.sensed is not None:
+            law = supervision.force_law.along(axis.in_frame.tolist())
+            off = axis.desired - belief.force
+            measured += belief.force * axis.in_frame
+            error += off * axis.in_frame
+            limited += law.limited(0, off) * axis.in_frame
+    rows = [_row(axis, belief, one.anchor) for axis, belief, one in zip(axes, known, run.axes, strict=True)]
+    return ForceOutput(
+        velocity.tolist(),
+        effort,
+        _triple(measured),
+        _triple(error),
+        _triple(limited),
+        frame,
+        tuple(axes),
+        tuple(known),
+        tuple(rows) if is_task else (),
+    )
+
+
+def _row(axis: Axis, known: Belief, anchor: float) -> AxisRow:
+    commanded = axis.desired if axis.is_force else anchor if axis.of.value is None else axis.of.value
+    measured = known.force if axis.of.is_sensed else axis.at
+    fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
+    return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
+
+
+def _triple(values: Array) -> Triple:
+    x, y, z = values.tolist()
     return x, y, z

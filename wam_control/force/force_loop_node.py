@@ -9,7 +9,7 @@ from wam_control.force.guard import Report
 from wam_control.force.task import TaskCommand, task_of
 from wam_control.task.trajectory_goal import TrajectoryPlayer
 from wam_description.arm import Shared
-from wam_description.event import Code, Event, Level, refused
+from wam_description.event import OBEYED, Code, Event, Level, refused
 from wam_description.event_text import sentences
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
@@ -39,7 +39,7 @@ class ForceLoopNode:
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
         self._reported: tuple[Any, ...] | None = None
-        self._reaction = Code.NONE
+        self._event = OBEYED
 
     @reaction(
         Input("joint_states"),
@@ -123,38 +123,46 @@ class ForceLoopNode:
         return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
 
     def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:
-        """How well the force is known, at the display rate and where the reaction has changed."""
-        reaction, before = self._loop.reaction.code, self._reaction
-        self._reaction = reaction
-        if reaction is before and not self._timing.is_display(stamp):
+        """How well the force is known, at the display rate and where the event has changed."""
+        event, before = self._loop.event, self._event
+        self._event = event
+        if event.subject == before.subject and not self._timing.is_display(stamp):
             return {}
-        axis, point = out.axis, out.point
         if out.rows:
             return {"force_axis": Table(BASE, ()), "task_axes": Table(out.frame, out.rows)}
-        if axis is None or point is None:
+        axis, place = (out.axes[0].sensed, out.axes[0].place) if out.axes else (None, None)
+        if axis is None or place is None:
             return {"force_axis": Table(BASE, ())}
-        lever = math.hypot(*axis.lever)
-        row = (float(reaction.number), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
-        return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
+        known, lever = out.known[0], math.hypot(*axis.lever)
+        row = (
+            float(event.code.number),
+            float(event.holds),
+            known.doubt,
+            known.tolerance,
+            *known.errors,
+            known.sd,
+            lever,
+        )
+        sensed = (axis.apparent_mass, axis.speed_fraction, place.position, place.position_sd)
+        return {"force_axis": Table(place.cover, ((*row, *sensed),))}
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
-        report, reactions = self._loop.report, self._loop.reactions
+        report, events = self._loop.report, self._loop.events
         refusals = self.refusals
         refusals.pop("contact/hypotheses", None)
-        why = self._loop.is_advised, self._loop.is_stopping, self._refusal or self._player.refusal
         commanded: tuple[str, ...] = ()
-        if reactions or refusals:  # which is that of the command for which it was given
+        if events or refusals:  # which is that of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             commanded = tuple(map(brief, values))
-        present = report, tuple(reactions), self._loop.is_pushed, tuple(refusals), why, commanded
+        subjects = tuple(event.subject for event in (*events, *refusals.values()))
+        present = report, subjects, self._loop.is_advised, commanded
         if present == self._reported:
             return {}
         self._reported = present
-        refused_ones = [event for event in refusals.values() if event.code is Code.REFUSED]
-        found = [*reactions.values(), *refused_ones]
-        events = tuple(sorted(found, key=lambda event: (not event.code.holds, event.code is not Code.REFUSED)))
+        found = {event.subject: event for event in (*events, *refusals.values())}
+        events = tuple(sorted(found.values(), key=lambda event: (not event.holds, event.code is not Code.REFUSED)))
         level = Level.WARN if report.is_warning or events else Level.OK
         message = sentences(events) or report.message
         facts = report.facts | ({REFUSED: ", ".join(refusals)} if refusals else {})
@@ -171,9 +179,9 @@ class ForceLoopNode:
         return refusals
 
     @property
-    def reaction(self) -> Event:
+    def event(self) -> Event:
         """What the loop does instead of what is commanded."""
-        return self._loop.reaction
+        return self._loop.event
 
     @property
     def guard_report(self) -> Report:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from wam_control.force.force_axis import SensingParameters
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.motion_limits import LimitParameters
 from wam_control.force.sampled_loop import Feedback
 from wam_control.force.stability_guard import GuardedTask, GuardParameters
 from wam_control.force.task import TaskParameters
@@ -13,6 +12,71 @@ from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter, require, tunable
 
 AXES = ("x", "y", "z")  # of the force command's frame
+
+
+@dataclass(frozen=True)
+class LimitParameters:
+    """Where the force loop stops the arm."""
+
+    joint_gain: float = tunable(
+        "largest speed of a joint per distance from where it has to stop; 0: the ends of the joints are not watched",
+        "1/s",
+        high=100.0,
+    )
+    joint_acceleration: float = tunable(
+        "largest change of the commanded velocity of a joint, but away from a push: a law that begins, ends or is "
+        "retuned does not jump; 0: no limit",
+        "rad/s^2",
+        high=1e4,
+    )
+    joint_margin: float = tunable("distance from the end of a joint at which it has to stop", "rad", high=1.0)
+    contact_force: float = tunable(
+        "largest force on the arm, as far as the joints measure it; above it the arm gives way", "N"
+    )
+    whole_force: float = tunable(
+        "largest force in all, per commanded force, at its position or, where that is not known, wherever it acts; "
+        "above it the arm gives way",
+    )
+    impact: float = tunable(
+        "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
+        "the speed along the force until something is touched; 0: no limit",
+        high=1e3,
+    )
+    settling_time: float = tunable("time after which a force that is still not reached is reported", "s", low=1e-3)
+    free_travel: float = tunable(
+        "largest way along a commanded force that is not right, or back against it with what pushes; then the arm "
+        "holds its position",
+        "m",
+    )
+    tolerance: float = tunable(
+        "error up to which a force counts as reached, per commanded force; one that will be off by more is refused"
+    )
+    doubt: float = tunable(
+        "predicted error per tolerated error up to which a force is tried: more is obeyed more often and holds less",
+        low=0.01,
+    )
+    least_tolerance: float = tunable(
+        "least error up to which a force counts as reached, however small it is", "N", high=1e3
+    )
+    cycle_force: float = tunable(
+        "swing of the measured force, per commanded force, from which it is reported as a limit cycle"
+    )
+    shake_force: float = tunable(
+        "swing of the force, per commanded force, that a shaking arm (dither) may make on a surface of "
+        "guard.contact_stiffness; above it the arm holds its position; with feedback contact_estimate",
+    )
+    surface_speed: float = tunable(
+        "largest speed along the force of the surface that will be touched; what the force lags behind it counts as an "
+        "error",
+        "m/s",
+        high=10.0,
+    )
+    slide_speed: float = tunable(
+        "largest speed across the force of the surface that will be touched; what it comes nearer while the friction "
+        "of the arm turns round counts as an error",
+        "m/s",
+        high=10.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -63,12 +127,6 @@ class ForceLoopParameters:
         "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0
     )
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
-    blend_time: float = tunable(
-        "time constant of the bumpless transfer of the velocity when a command begins or ends, the mode or a gain is "
-        "changed, or the motors start; zero for none",
-        "s",
-        high=60.0,
-    )
     force_feedforward: float = tunable(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
         "arm at the surface",
@@ -95,7 +153,7 @@ class ForceLoopParameters:
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = tunable("contact position assumed along it", "m", high=3.0)
     contact_position_sd: float = tunable(
-        "standard deviation of a pinned contact position, as of a surface that moves along the link",
+        "standard deviation of a pinned contact position",
         "m",
         high=1.0,
     )
@@ -104,9 +162,6 @@ class ForceLoopParameters:
         "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",
         choices=("off", "position"),
         live=True,
-    )
-    position_uncertainty_limit: float = tunable(
-        "largest standard deviation of an estimated contact position that is used", "m", high=10.0
     )
     link_probability_limit: float = tunable(
         "least probability of the estimated link with which its contact position is used", high=1.0

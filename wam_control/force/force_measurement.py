@@ -1,39 +1,117 @@
-"""The torques behind the measured force F_c, from the feedback that the parameters choose."""
+"""The torques behind the measured force F_c, from the chosen feedback, and what of them counts as zero."""
 
+import math
 from collections.abc import Sequence
-from operator import add, sub
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.belief import Torques
+from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
 Array = NDArray[np.float64]
 
 
-class ForceMeasurement:
-    """External torques of the joints, and what of them counts as zero.
+class LowPass:
+    """First-order low pass of several values that starts at its first input.
 
     Attributes
     ----------
-    external : torques of the world on the joints (n,), N m, less the tare and the zero of the present command.
-    acceleration : of the joints by their sensors (n,), rad/s^2, mean over the last period.
+    value : filtered values (n,); None before the first input.
+    """
+
+    def __init__(self) -> None:
+        self.value: Array | None = None
+
+    def step(self, value: Array, time_constant: float, dt: float) -> Array:
+        """Filtered values; `time_constant` and `dt` in s."""
+        before = value if self.value is None else self.value
+        self.value = before + (value - before) * (dt / (dt + time_constant))
+        return self.value
+
+
+class ForceMeasurement:
+    """External torques of the joints, less the tare and the zero of the present command.
+
+    Attributes
+    ----------
+    torques : of the world on the joints, filtered.
+    rested : time for which the arm has been at rest, s.
+    speed : mean speed of the fastest joint, rad/s; infinite where it is not known yet.
     """
 
     def __init__(self, body: RigidBody) -> None:
         self._body = body
-        self._n = len(body.arm.joints.names)
-        self._tare = self._zero = [0.0] * self._n
-        self._steady = LowPass()
-        self.acceleration = self._velocity = [0.0] * self._n
-        self.external = [0.0] * self._n
+        self._none = np.zeros(len(body.arm.joints.names))
+        self._tare = self._zero = self._external = self._none
+        self._velocity: Array | None = None
+        self._filters = {"torque": LowPass(), "steady": LowPass(), "acceleration": LowPass(), "speed": LowPass()}
+        self.rested, self.speed = 0.0, math.inf
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the filtered torques."""
+        self._filters["torque"] = LowPass()
+        self.torques = Torques(self._none, self._none, None, self._none)
+
+    def step(
+        self,
+        own: ForceLoopParameters,
+        joints: State,
+        sensors: State | None,
+        estimated: Sequence[float] | None,
+        estimated_sd: Sequence[float] | None,
+        is_touched: bool,
+        dt: float,
+    ) -> None:
+        """Take the signals of one outer period.
+
+        Parameters
+        ----------
+        own : `feedback` chooses the signal.  joint_sensors: at rest, the torque that carries the links less the strain.
+            joint_position: deflection of a known spring, section 5.6.
+        joints : joint state from the motors.
+        sensors : joint-side sensors, None where there are none.
+        estimated, estimated_sd : estimated torques of the world on the joints (n,), N m, and their standard deviation.
+        is_touched : whether a contact is known; without one, what the motors show is none.
+        dt : outer period, s.
+        """
+        torque = self._torque(own, sensors, estimated)
+        speed = np.abs(self._filters["speed"].step(np.array(joints.velocity), FORCE.steady_time, dt)).max()
+        self.speed = float(speed)
+        self.rested = self.rested + dt if self.speed < MOTION.at_rest else 0.0
+        self._filters["steady"].step(torque, FORCE.steady_time, dt)
+        self._external = torque - self._tare - self._zero
+        counted = self._external if is_touched or not own.is_estimated else self._none
+        before = self._filters["torque"].value
+        now = self._filters["torque"].step(counted, own.force_filter, dt)
+        sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._none + sensing_of(own).torque_sd
+        self.torques = Torques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
+
+    def _acceleration(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
+        velocity = self._none if sensors is None else np.array(sensors.velocity)
+        change = velocity - (velocity if self._velocity is None else self._velocity)
+        self._velocity = velocity
+        filtered = self._filters["acceleration"].step(change / dt, own.force_filter, dt)
+        return filtered if own.feedback == "joint_sensors" else None
+
+    def _torque(self, own: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None) -> Array:
+        if own.is_estimated:
+            return self._none if estimated is None else np.array(estimated)
+        if sensors is None:
+            return self._none
+        if own.feedback == "joint_position":
+            return np.array(own.spring_stiffness) * (np.array(own.spring_rest) - np.array(sensors.position))
+        return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
-        self._tare = list(map(add, self._tare, self.external))
+        self._tare = self._tare + self._external
+        self.restart()
 
     @property
     def free(self) -> list[float]:
@@ -43,11 +121,17 @@ class ForceMeasurement:
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
-        steady = self._steady.value
-        return np.array(self.external if steady is None else self._beyond_zero(steady))
+        steady = self._filters["steady"].value
+        return self._external if steady is None else steady - self._tare - self._zero
 
-    def _beyond_zero(self, torques: Sequence[float]) -> list[float]:
-        return list(map(sub, map(sub, torques, self._tare), self._zero))
+    def zero(self, limit: float) -> bool:
+        """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
+        steady = self._filters["steady"].value
+        if steady is None or float(np.abs(steady - self._tare).max()) > limit:
+            return False
+        self._zero = steady - self._tare
+        self.restart()
+        return True
 
     def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
@@ -57,81 +141,8 @@ class ForceMeasurement:
         q : joint angles (n,), rad.
         torques, torque_sd : torques (n,), N m, and the standard deviation of each, N m.
         """
-        weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q)[:3] / torque_sd
+        weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q) / torque_sd
         scaled = torques / torque_sd
-        mass = float(weight @ scaled) / max(float(weight @ weight), FORCE.least_weight)
+        mass = float(weight @ scaled) / max(float(weight @ weight), FORCE.negligible)
         left = scaled - mass * weight
         return mass, float(left @ left)
-
-    def zero(self, limit: float) -> bool:
-        """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
-        if self._steady.value is None:
-            return False
-        zero = list(map(sub, self._steady.value, self._tare))
-        if max(map(abs, zero)) > limit:
-            return False
-        self._zero = zero
-        return True
-
-    def step(
-        self,
-        parameters: ForceLoopParameters,
-        sensors: State | None,
-        estimated: Sequence[float] | None,
-        dt: float,
-    ) -> None:
-        """Take the signals of one outer period.
-
-        Parameters
-        ----------
-        parameters : `feedback` chooses the signal.  joint_sensors: at rest, the torque that carries the links
-            less the strain.  joint_position: deflection of a known spring, section 5.6.
-        sensors : joint-side sensors, None where there are none.
-        estimated : estimated torques of the world on the joints (n,), N m.
-        dt : outer period, s.
-        """
-        torque = self._torque(parameters, sensors, estimated)
-        velocity = [0.0] * self._n if sensors is None else sensors.velocity
-        self.acceleration = [change / dt for change in map(sub, velocity, self._velocity)]
-        self._velocity = velocity
-        self._steady.step(torque, FORCE.steady_time, dt)
-        self.external = self._beyond_zero(torque)
-
-    def _torque(
-        self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None
-    ) -> list[float]:
-        if parameters.is_estimated:
-            return [0.0] * self._n if estimated is None else list(estimated)
-        if sensors is None:
-            return [0.0] * self._n
-        if parameters.feedback == "joint_position":
-            springs = zip(parameters.spring_stiffness, parameters.spring_rest, sensors.position, strict=True)
-            return [stiffness * (rest - angle) for stiffness, rest, angle in springs]
-        gravity = self._body.gravity_torque(sensors.position).tolist()
-        return list(map(sub, gravity, sensors.effort))
-
-
-class LowPass:
-    """First-order low pass of several values that starts at its first input.
-
-    Attributes
-    ----------
-    value : filtered values; None before the first input.
-    """
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all inputs."""
-        self.value: list[float] | None = None
-
-    def step(self, value: list[float], time_constant: float, dt: float) -> tuple[list[float], list[float]]:
-        """Filtered values now and one period before; `time_constant` and `dt` in s."""
-        before = self.value
-        if before is None:
-            self.value = value
-            return value, value
-        time = dt + time_constant
-        self.value = [old + (new - old) * dt / time for old, new in zip(before, value, strict=True)]
-        return self.value, before

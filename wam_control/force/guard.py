@@ -11,12 +11,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from wam_control.force.contact_position import ForcePoint
+from wam_control.force.belief import tolerance
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.force.stability_guard import (
     GuardAssessment,
-    Guarded,
     GuardedContact,
+    GuardedForces,
     GuardedTask,
     StabilityGuard,
     posture_of,
@@ -24,6 +24,7 @@ from wam_control.force.stability_guard import (
 from wam_control.force.thresholds import GUARD
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
+from wam_description.transmission_map import TransmissionMap
 
 UNKNOWN: Final = "not assessed yet: it is while a force is commanded; the margin is that of guard.posture"
 Triple = tuple[float, float, float]
@@ -42,6 +43,7 @@ class Supervision:
 
     Attributes
     ----------
+    servo, wound : gains of the velocity loop, and its integral gains at the joints (n, n), N m/rad.
     force_law, torque_law : laws in force; with guard.mode `limit` their saturation may be lower than configured.
     assessment : what the guard finds; None where it is off or nothing is fed back.
     watch : what the guard does while the arm moves; None with the assessment.
@@ -56,7 +58,8 @@ class Supervision:
     def __init__(
         self, arm: Arm, servo: Servo, timing: Timing, parameters: ForceLoopParameters, q: tuple[float, ...]
     ) -> None:
-        self._covers, self._parameters = arm.covers, parameters
+        self._parameters, self.servo = parameters, servo
+        self.wound = TransmissionMap.of(arm).at_joints(servo.integral_gain)
         self.force_law, self.torque_law = force_law(parameters), torque_law(parameters, arm.joints.names)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
@@ -69,14 +72,19 @@ class Supervision:
         guard, parameters = self._guard, self._parameters
         is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
         task = task_of(parameters, self.torque_law if is_joints else self.force_law)
-        is_pinned = parameters.contact_source == "pinned"
-        position_sd = parameters.contact_position_sd if is_pinned else parameters.position_uncertainty_limit
+        position_sd = parameters.contact_position_sd
         contacts = [
             contact
             for q in postures
             for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position, position_sd)
         ]
-        found = guard.assess(task, contacts if is_joints else guard.sensed(contacts))
+        if not is_joints:  # what is not known well enough is refused
+            contacts = [
+                each
+                for each in contacts
+                if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
+            ]
+        found = guard.assess(task, contacts)
         if found.reason and found.stable_error and mode == "limit":
             limits = tuple(min(limit, found.stable_error) for limit in task.law.error_limit)
             task = task._replace(law=replace(task.law, error_limit=limits))
@@ -92,23 +100,13 @@ class Supervision:
         parameters = self._parameters
         self.report = report(self.assessment, self.watch, parameters.guard.mode, parameters.mode == "joint_torque")
 
-    def step(
-        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float, dt: float
-    ) -> tuple[float, bool]:
-        """Factor of the gains in this period, and whether it has changed.
+    def gains(self, joint: int, direction: Sequence[float]) -> tuple[float, float]:
+        """G_I and G_P of a joint, or for -1 of the force along a unit vector of its frame (3,)."""
+        law = self.torque_law if joint >= 0 else self.force_law.along(direction)
+        return law.gain[max(joint, 0)], law.proportional_gain[max(joint, 0)]
 
-        Parameters
-        ----------
-        q : joint angles (n,), rad.
-        point : of action.
-        direction : of the force in the base frame (3,); None for both directions across the cover.
-        force : commanded, N.
-        dt : outer period, s.
-        """
-        return self.factor(lambda: self._contacts(q, point, direction, force), dt)
-
-    def factor(self, where: Callable[[], Sequence[Guarded]], dt: float) -> tuple[float, bool]:
-        """Factor of the gains in this period, and whether it has changed.
+    def factor(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> float:
+        """Factor of the gains in this period.
 
         Parameters
         ----------
@@ -116,29 +114,17 @@ class Supervision:
         dt : outer period, s.
         """
         watch = self.watch
-        if watch is None:
-            return 1.0, False
-        before = watch.assessed
-        has_changed = watch.step(where, dt)
-        if watch.assessed is not before:
-            self._report()
-        return self.present, has_changed
+        if watch is not None:
+            before = watch.assessed
+            watch.step(where, dt)
+            if watch.assessed is not before:
+                self._report()
+        return self.present
 
     @property
     def present(self) -> float:
         """Factor of the gains in force."""
         return 1.0 if self.watch is None or self._parameters.guard.mode == "warn" else self.watch.factor
-
-    def _contacts(
-        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float
-    ) -> list[GuardedContact]:
-        guard, covers = self._guard, self._covers
-        if self._parameters.schedule == "position" and not point.is_certain:
-            return possible_contacts(guard, q, point.cover, covers.length_of(point.cover))
-        if direction is None:
-            return guard.contacts(q, point.cover, point.position, point.position_sd)
-        contact = GuardedContact(q, point.cover, point.position, point.position_sd, direction, force)
-        return guard.sensed(guard.with_lever(contact))
 
 
 class Watch:
@@ -175,7 +161,7 @@ class Watch:
         self._since = math.inf
         self.factor, self.scale = 1.0, found.scale
 
-    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
+    def step(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if the factor has changed.
 
         Parameters
@@ -209,11 +195,6 @@ class Watch:
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
-
-
-def possible_contacts(guard: StabilityGuard, q: Sequence[float], cover: str, length: float) -> list[GuardedContact]:
-    """Contacts at an unknown position: along the whole cover, `length` m, along both axes across it."""
-    return [contact for part in GUARD.positions for contact in guard.contacts(q, cover, part * length, 0.0)]
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:

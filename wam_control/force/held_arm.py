@@ -1,117 +1,136 @@
-"""An arm that holds its position instead of controlling a force, and gives way where it is pressed harder than that."""
+"""An arm that holds its position, and what pushes an arm in all: it gives way, and no further than allowed."""
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.arm_push import ArmPush
-from wam_control.force.force_axis import ForceAxis
+from wam_control.force.axes import Axis
+from wam_control.force.belief import Torques
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.given_way import GivenWay
-from wam_control.force.hybrid_velocity import posture_velocity
+from wam_control.force.limits import Push, calm, likeliest_link
+from wam_control.force.problem import Row
 from wam_control.force.thresholds import FORCE
-from wam_control.thresholds import MOTION
+from wam_description.event import Code, Event, Value, warning
 from wam_description.rigid_body import RigidBody
+from wam_description.signals import Contact
 
 Array = NDArray[np.float64]
 
 
-class RetreatForce(NamedTuple):
-    """A commanded force that is not controlled: its axis, and the speed along it by what is above it, m/s."""
-
-    axis: ForceAxis
-    speed: float
-
-
 class HeldArm:
-    """Holds a posture, and presses no harder than commanded on what comes.
+    """Where an arm holds its position while a command is not obeyed.
 
-    Along a force it goes back by what is measured there.  Whatever else pushes, from any side and where no force can
-    be sensed, pushes with at least the smallest force that explains the torques, and moves the joints along these.
+    It goes back there after a push, with no more energy than it may hit something with.
 
-    Parameters
+    Attributes
     ----------
-    body : kinematics of the arm.
-    given : how far the arm has given way.
+    at : joint angles (n,), rad; None while the command is obeyed.
     """
 
-    def __init__(self, body: RigidBody, given: GivenWay) -> None:
-        self._body, self._given = body, given
-        self.release()
+    def __init__(self) -> None:
+        self.at: Array | None = None
 
-    def release(self) -> None:
-        """Hold no longer."""
-        self._at: list[float] = []
-        self._has_arrived, self._pushed = False, 0.0
-
-    @property
-    def is_holding(self) -> bool:
-        """Whether a posture is held."""
-        return bool(self._at)
-
-    @property
-    def pushed(self) -> float:
-        """Largest force, N, with which something has pushed the arm since it holds; 0 where nothing has."""
-        return self._pushed
-
-    def hold(self, at: Sequence[float]) -> None:
-        """Hold a posture (n,), rad."""
-        self._at, self._has_arrived, self._pushed = list(at), False, 0.0
-
-    def step(
-        self,
-        q: Sequence[float],
-        forces: Sequence[RetreatForce],
-        push: ArmPush,
-        inertia: Array,
-        parameters: ForceLoopParameters,
-    ) -> tuple[list[float], bool]:
-        """Joint velocities (n,), rad/s, of one outer period, and whether the arm gives way.
+    def velocity(
+        self, q: Sequence[float], at: Array, inertia: Array, allowed: float, own: ForceLoopParameters
+    ) -> Array:
+        """Velocities of the posture (n,), rad/s.
 
         Parameters
         ----------
         q : joint angles (n,), rad.
-        forces : that are commanded.
-        push : what pushes.
-        inertia : of the arm with its rotors at the joints (n, n), kg m^2.
-        parameters : of the force loop.
+        at : where to hold (n,), rad, if it does not hold yet.
+        inertia : at the joints, with rotors (n, n), kg m^2.
+        allowed : force, N, with which the arm may hit something.
+        own : parameters of the force loop.
         """
-        limit = parameters.joint_speed_limit
-        energy = parameters.impact_energy(push.allowed)
-        back = _slowed(posture_velocity(self._at, q, parameters.posture_gain, limit), inertia, energy)
-        self._has_arrived = (
-            self._has_arrived or max(abs(a - b) for a, b in zip(self._at, q, strict=True)) < MOTION.arrived
-        )
-        least = push.least(self._body, q)
-        is_yielding = least > push.allowed or any(force.speed for force in forces)
-        if is_yielding:
-            self._given.give()  # also where it may no further: what overpowers the motors still moves it
-        if self._given.way >= parameters.limits.free_travel:
-            push, is_yielding = push._replace(gain=0.0), False
-        velocity = np.array(back)
-        if least:
-            velocity += push.correction(self._body, q, back, least, limit)
-        if not is_yielding:
-            return velocity.tolist(), False
-        self._pushed = max(self._pushed, least)
-        for force in forces:
-            if force.speed:
-                row = force.axis.lever
-                velocity -= row * (float(row @ velocity) / float(row @ row))
-        for force in forces:
-            velocity += force.axis.move * force.speed
-        velocity *= min(limit / max(float(np.abs(velocity).max()), FORCE.slowest), 1.0)
-        if self._has_arrived:
-            self._at = list(q)
-        return velocity.tolist(), True
+        if self.at is None:
+            self.at = at
+        wanted = own.posture_gain * (self.at - np.array(q))
+        limited = np.clip(wanted, -own.joint_speed_limit, own.joint_speed_limit)
+        return calm(limited, inertia, own.impact_energy(allowed))
 
 
-def _slowed(velocity: list[float], inertia: Array, energy: float) -> list[float]:
-    """Velocities (n,), rad/s, with no more than this kinetic energy, J: something may be in the way."""
-    fast = np.array(velocity)
-    moving = 0.5 * float(fast @ inertia @ fast)
-    slow: list[float] = (fast * math.sqrt(energy / moving)).tolist() if moving > energy else velocity
-    return slow
+class PushedArm:
+    """What pushes the arm harder than allowed: it does not move against that, and gives way to it.
+
+    Parameters
+    ----------
+    body : kinematics of the arm.
+
+    Attributes
+    ----------
+    event : while it is pushed, and for some time after.
+    """
+
+    def __init__(self, body: RigidBody) -> None:
+        self._body = body
+        self.restart()
+
+    def restart(self) -> None:
+        """Nothing pushes."""
+        self.event: Event | None = None
+        self._since = math.inf  # s, since the last time
+        self._allowed = 0.0  # N
+        self._from: Array | None = None  # (3,) m, of the tool, where the push began
+
+    def step(
+        self,
+        q: Sequence[float],
+        axes: Sequence[Axis],
+        torques: Torques,
+        contact: Contact,
+        chi2: float,
+        allowed: float,
+        gain: float,
+        own: ForceLoopParameters,
+        dt: float,
+    ) -> list[Row]:
+        """One-sided rows of one period.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        axes : of the commanded forces of points.
+        torques : of the world on the joints, of the arm's own motion free.
+        contact : estimated.
+        chi2 : of the torques that the commanded forces do not explain.
+        allowed : force, N, up to which nothing gives way.
+        gain : of the force law, m/s/N.
+        own : parameters of the force loop.
+        dt : s.
+        """
+        tool = self._body.tool_pose(q).position
+        self._since += dt
+        if self._since > own.limits.settling_time or self._from is None:
+            self._from = tool
+        rows: list[Row] = []
+        pushes = [Push.at(torques.now, torques.sd, self._jacobian(q, axes, contact))]
+        if chi2 > FORCE.unexplained:  # what is left without the commanded force, on the link that explains it best
+            rest = torques.now + sum(axis.sensed.press * axis.force(torques.now) for axis in axes if axis.sensed)
+            pushes.append(Push.at(rest, torques.sd, likeliest_link(self._body, q, rest)))
+        # a force that was allowed, and falls with its command, is no push
+        fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
+        self._allowed = allowed = max(allowed, self._allowed * (1.0 - fade))
+        hardest = max(pushes, key=lambda push: push.least)
+        if hardest.least > allowed:
+            self._since = 0.0
+            values: dict[str, Value] = {"force": hardest.least, "allowed": allowed}
+            self.event = warning(Code.PUSHED, "pushed", **values)
+        elif self._since > FORCE.lasting:
+            self.event = None
+        if float(np.linalg.norm(tool - self._from)) <= own.limits.free_travel:
+            rows = [push.row(allowed, gain, own.joint_speed_limit) for push in pushes if push.least]
+        return rows
+
+    def _jacobian(self, q: Sequence[float], axes: Sequence[Axis], contact: Contact) -> Array:
+        """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""
+        places = {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
+        if len(places) == 1:
+            cover, position = places.pop()
+        elif contact.cover and not math.isnan(contact.position):
+            cover, position = contact.cover, contact.position
+        else:
+            return self._body.tool_jacobian(q)
+        return self._body.point_jacobian(q, cover, (position, 0.0, 0.0))

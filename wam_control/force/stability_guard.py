@@ -182,7 +182,6 @@ class StabilityGuard:
         self.parameters = parameters
         self._arm, self._timing = arm, timing
         self._loop = SampledLoop(arm, timing, servo)
-        self._sensing = sensing
         self._force_axes = ForceAxes(arm, self._loop.body, sensing)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
@@ -199,11 +198,6 @@ class StabilityGuard:
         """The contact itself; nothing where its force has no lever on any joint."""
         lever = self.axis(contact).lever
         return [contact] if float(lever @ lever) > FORCE.least_lever * FORCE.least_lever else []
-
-    def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
-        """Those contacts whose force is known well enough to be controlled, pinned or not."""
-        most = [self._sensing.sd_limit(contact.force, is_pinned=False) for contact in contacts]
-        return [each for each, sd in zip(contacts, most, strict=True) if self.axis(each).force_sd <= sd]
 
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""

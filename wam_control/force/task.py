@@ -32,7 +32,8 @@ class TaskAxis(NamedTuple):
     ----------
     kind : what is commanded.
     joint : index of the joint; -1 for a point of a link.
-    cover, position : link and position along it, m, of the point; '' and 0 for a joint; None for the estimated one.
+    cover, position : link and position along it, m, of the point; '' and 0 for a joint; position None: the estimated
+        one, on any link where no cover is named.
     direction : unit vector in the frame of the task (3,); zeros for a joint.
     value : N, m/s or m; of a joint N m, rad/s or rad; None for the position where the axis is when it begins.
     rate : at which a commanded position moves, m/s or rad/s.
@@ -67,7 +68,7 @@ class TaskAxis(NamedTuple):
             return f"{kind} of joint {self.joint + 1}"
         x, y, z = self.direction
         place = "the estimated position" if self.position is None else f"{self.position:.3g} m"
-        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place} of {self.cover}"
+        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place}{f' of {self.cover}' if self.cover else ''}"
 
 
 class TaskCommand(NamedTuple):
@@ -260,9 +261,6 @@ def unit(vector: Triple) -> Triple:
 class TaskParameters:
     """Limits of tasks."""
 
-    condition_limit: float = tunable(
-        "largest condition number of the axes of a task, each scaled to length 1", low=1.0, high=1e6
-    )
     speed_limit: float = tunable("largest speed along an axis of a task", "m/s", high=10.0)
     joint_speed_limit: float = tunable("largest speed of a joint that is an axis of a task", "rad/s", high=10.0)
     least_damping: float = tunable("least damping of an impedance along an axis", "N s/m", low=1e-3, high=1e6)
@@ -282,3 +280,20 @@ class TaskParameters:
         if is_joint:
             return self.joint_speed_limit, "task.joint_speed_limit"
         return self.speed_limit, "task.speed_limit"
+
+    def damping(self, axis: TaskAxis) -> float:
+        """Damping of an impedance, N s/m or N m s/rad."""
+        return axis.damping or (self.least_joint_damping if axis.joint >= 0 else self.least_damping)
+
+    def too_stiff(self, axis: TaskAxis) -> str:
+        """Why an impedance is refused, '' where it is not."""
+        name = "least_joint_damping" if axis.joint >= 0 else "least_damping"
+        least, damping = float(getattr(self, name)), self.damping(axis)
+        if damping < least:
+            return f"{axis.name}: damping is {damping:g}; allowed: task.{name}, {least:g}, and above"
+        if axis.stiffness > self.largest_rate * damping:
+            return (
+                f"{axis.name}: stiffness is {axis.stiffness:g} at a damping of {damping:g}; allowed: up to "
+                f"{self.largest_rate * damping:g} (task.largest_rate); give it more damping"
+            )
+        return ""

@@ -5,119 +5,69 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ForceThresholds:
-    """When a force is reached, kept, lost or refused, and how the arm moves meanwhile."""
+    """When a force is touched, kept or reported, and how the arm moves meanwhile."""
 
-    # measured force and torque
+    # measured force
     steady_time: float = 0.1  # s, time constant of the torques that are taken as zero
-    least_weight: float = 1e-12  # 1/kg^2, of a weight that no joint carries
+    fast: float = 0.3  # rad/s, above which a payload is not known from the torques of the motion
+    rested: float = 0.3  # s at rest, after which it is
+    payload_rest: float = 0.05  # of the torques at rest: what a payload may leave of them
     certain: float = 3.0  # standard deviations of the torques, within which they show nothing
-    shortest_lever: float = 1e-6  # m, lever of a point on the joints
-    one_sided: float = 0.5  # of the time in which it is off, above which it is off to one side
-    # m, lever of the part of a torque that is not that of the force at a position on the cover
-    cross_lever: float = 1e-3
-    # N; a smaller force is none: its direction is a rounding, and nothing can be divided by it
-    smallest_force: float = 1e-6
-    negligible: float = 1e-12  # square of a component of a direction that counts as zero
+    unexplained: float = 16.0  # chi^2 of torques above which they are not those of the commanded force
+    changed: float = 3.0  # chi^2 of their change since the force has settled: above it something else acts
     # direction and lever of a force
+    smallest_force: float = 1e-6  # N; a smaller force is none: its direction is a rounding
+    cross_lever: float = 1e-3  # m, lever of the part of a torque that is not that of a force on the cover
     least_lever: float = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
     least_normal: float = 0.5  # cosine of the angle of a force to the normal of the side of a link
-    axis_certain: float = 2.0  # standard deviations
     sized_force: float = 1.0  # N, for the size of tangential forces
-    # feed-forward of friction
-    # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
-    friction_time: float = 0.04
+    hand: float = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
+    negligible: float = 1e-12  # of what is 1 where it counts
+    shortest_lever: float = 1e-9  # m or 1, of an axis along which nothing moves
+    rounding: float = 1e-9  # of sums of periods
+    # touch and link
+    touch: float = 0.2  # of the commanded force, from which something is touched
+    bouncing_time: float = 0.1  # s after the first touch, in which an impact turns the force
+    conflict_time: float = 0.1  # s, after which another contact counts: an impact looks like one
+    middle: float = 0.5  # of a link that may be touched, where its force is taken to be
+    near_base: float = 0.1  # of a link that may be touched: nearer to its base its force is not measured
+    vague: float = 0.3  # of the commanded force: sd up to which a force on another link is measured
+    # speed along a force
+    settled: float = 3.0  # time constants within the settling time
+    creep: float = 3e-3  # m, least way within the settling time: slower, friction moves the arm in jerks
+    rise: float = 7.0  # latencies of the measured force, in which it may rise to the commanded one
+    detected: float = 2.0  # latencies of joint sensors, in which a touch is detected at a place that is not known
+    identified_rise: float = 0.3  # s, in which the force may rise at a place that is not known
+    finest_motion: float = 1.2e-5  # m, of the arm against its friction: a force is not set more finely
+    kept: float = 0.3  # of the tolerance, up to which an error is left alone
+    surface_slope: float = 0.01  # of a surface that moves across the force
+    friction_turn: float = 0.3  # s, in which the friction of the arm turns round
+    slide_slope: float = 0.3  # of a surface along which a posture moves the link
+    slow_posture: float = 0.2  # rad/s, below which a posture waits while a force is kept
+    way_back: float = 3e-3  # m, way back from another link than commanded
+    # feed-forward
+    friction_time: float = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters
     slow_motor: float = 0.04  # rad/s, of a motor, below which less of the dry friction is fed forward
     slow_joint: float = 0.002  # rad/s, the same of a joint
-    # a force that is held: reached, conflict, creep
-    tolerance: float = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
-    touch: float = 0.2  # of the commanded force, from which something is touched
-    unexplained: float = 16.0  # chi^2 of torques above which they are not those of the commanded force
-    turned: float = 3.0  # chi^2 of a change of the torques at a settled force: above it something else acts
-    turned_back: float = 1.0  # the same: below it, no more
-    conflict_time: float = 0.1  # s, after which another contact counts
-    uncertain_time: float = 0.5  # s, after which a contact counts of which it is not known on which link it is
-    # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
-    identified_rise: float = 0.3
-    detection_time: float = 0.04  # s, until a touch is detected there
-    # s, the same as `identified_rise` where the position is known: the measured force and the arm's speed are late
-    known_rise: float = 0.1
-    # s, the same with the estimate from the motors, which detect most of a small force at once, and late
-    motors_rise: float = 0.2
-    fed_time: float = 0.3  # s, in which the torque of the force is fed forward after the touch
-    crept: float = 1.5  # settling times in which the arm has moved less than `little_way`, and touched nothing
-    little_way: float = 9e-3  # m
-    # of a surface that moves across the force, or of the link on it, against the direction of its motion
-    surface_slope: float = 0.01
-    friction_turn: float = 0.3  # s, in which the friction of the arm turns round on a surface that moves
-    settled: float = 3.0  # time constants within the settling time
-    # of the errors that are stated of torques; those of friction on a surface are as large as stated
-    likely: float = 0.6
-    # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
-    creep: float = 3e-3
-    # of the time without a touch, by which that with it is reduced: a link that bounces is touched
-    free_rate: float = 0.2
-    fine_way: float = 4e-4  # m, way of the whole force up to which the band in which it is kept is as wide as below
-    coarse_way: float = 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
-    settle: float = 0.03  # of the commanded force: errors below which it is kept
-    leave: float = 0.06  # of the commanded force: errors up to which it is kept
-    # of the settling time, after which a force that is too large, or has been reached and left, is reported
-    left_after: float = 0.25
-    bouncing_time: float = 0.1  # s after the first touch, in which an impact turns the force as often as a limit cycle
-    few_turns: int = 2  # turns of the late force of the motors, after which the arm is slowed down
-    # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
-    faint_swing: float = 0.5
-    slowed: float = 0.5  # of the speed along the force, from then on
-    shake_samples: int = 8  # outer periods, at least: a dither of 25 Hz
+    # shaking by a dither
+    watched_time: float = 0.2  # s, for which it is watched before the arm moves, or a whole cycle
     resonance: float = 4.0  # largest swing on a surface, per swing without resonance
-    # s, for which the shaking is watched before the arm moves, or for a whole cycle of a slower dither
-    watched_time: float = 0.2
-    # by how much worse another force may be known, and the arm slower, so that it still would be accepted
-    reserve: float = 1.2
-    not_slowed: float = 0.95  # of the speed along the force
-    resume: float = 0.8  # of the largest standard deviation, below which a force is controlled again
-    swing_cycles: int = 2  # that have to be seen
-    # contact on another link than commanded, payload
-    fast: float = 0.3  # rad/s, above which a payload is not known from the torques of the motion
-    # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
-    slow_posture: float = 0.2
-    way_back: float = 3e-3  # m, way back from another link than commanded
-    near_end: float = 0.1  # of a link that is perhaps touched: where its force is taken to be
-    middle: float = 0.5  # the same
-    faint_position: float = 0.25  # of a link that may be touched, where its force has to be detected
-    vague: float = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
-    # of the torques at rest: what a payload may leave of them, as the masses are not known better
-    payload_rest: float = 0.05
-    # an arm that is pushed, that gives way, or that has left the surface
-    lasting: float = 0.2  # s, for which a push counts after the last time: a swing is one, and the arm runs on
-    left_angle: float = 0.05  # rad, motion of a joint by which it has left what it pressed on
-    slowest: float = 1e-9  # rad/s
+    # events
+    hysteresis: float = 1.25  # of the doubt, above which an arm that has not touched yet holds again
+    quarter: float = 0.25  # of the settling time, in which a force that has been reached may be off
+    turns: int = 4  # of the force within the settling time, above which it oscillates
+    faint_swing: float = 0.5  # of a swing that is reported, from which the arm is slowed down
+    slowed: float = 0.5  # of the speed along the force, from then on
+    least_share: float = 0.25  # of that speed, below which it is not slowed down
+    lasting: float = 0.2  # s, for which a push is reported after the last time
     push_back: float = 0.3  # rad/s, at which a joint beyond its end is brought back, at most
-    slow_from: float = 0.9  # of the largest contact force, from which motion against it is slowed down
-    # posture
-    # of a surface to the force: as fast as this times the link slides on it, it comes towards the link
-    slide_slope: float = 0.3
-    # of the largest joint speed: on a path up to so fast the arm lags behind, and arrives in time
-    caught_up: float = 1.25
-    pause: float = 0.1  # s, after which a posture that changes is another goal, to which the arm goes as fast as it may
-    rhythm: float = 1.5  # factor between two intervals of changes, up to which they are those of one path
-    rounding: float = 1e-9  # s, rad
-    pace: float = 5.0  # 1/s, velocity per posture error of an arm that arrives in time
-    behind_angle: float = 0.05  # rad, by which an arm may be behind the one that arrives in time
-    behind_time: float = 0.1  # s, in which that arm moves: it may be behind by that way, too
-    short_for: float = 0.1  # s, after which it is reported
-    # tasks
-    lost_touch: float = 0.5  # s without a touch, after which another one begins
-    short_lever: float = 0.05  # m or 1, lever below which a motion along an axis is slowed down
-    lost_axis: float = 1e-3  # part of an axis that the others have to leave it
-    least_friction: float = 0.01  # of surfaces that two forces press on
-    hand: float = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
+    stopped: float = 0.5  # of the velocity without limits, below which a joint is at its end
     # advice
     more: tuple[float, ...] = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
-    # rad, by which a joint is turned, to both sides
-    turns: tuple[float, ...] = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)
+    turned: tuple[float, ...] = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned
     spare: float = 0.1  # rad, from where a joint may be no further: the arm moves on as it presses
     each: int = 5  # ways that are tried in a period
-    another: float = 0.1  # of a force, by which another one differs that has an advice of its own
+    reserve: float = 1.2  # by how much worse another force may be known, so that it still would be obeyed
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from wam_control.force.contact_position import torque_of_position
+from wam_control.force.contact_place import torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
-from wam_control.force.thresholds import FORCE
 from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
 from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list, require_made
@@ -321,7 +320,7 @@ def _planned(step: ScenarioStep, start: Sequence[float], shared: Shared | None) 
 
 def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], shared: Shared, followed: float) -> None:
     """Refuse a motion at which the driver would stop the arm, or with which the force loop would not keep up."""
-    joints, allowed = shared.arm.joints, FORCE.caught_up if step.posture else 1.0
+    joints, allowed = shared.arm.joints, MOTION.caught_up if step.posture else 1.0
     loop = allowed * followed, (f"{allowed:g} times " if allowed > 1.0 else "") + f"{FORCE_LOOP}:{FOLLOWED}"
     found = []
     for k, (speed, fault) in enumerate(zip(motion.fastest, joints.speed_limit, strict=True)):

@@ -159,7 +159,7 @@ class TaskWatch:
         fault, node = self._run.driver.safety.fault, self._node
         return _Standing(
             self._event,
-            bool(fault) or node.reaction.code.holds,
+            bool(fault) or node.event.holds,
             bool(fault),
             float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
         )
@@ -171,7 +171,7 @@ class TaskWatch:
             return Event(Code.FAULT, Level.ERROR, {"reason": fault})
         refusals = self._node.refusals
         found = (refusals[topic] for topic in ("force_command", "task_command") if topic in refusals)
-        event: Event = next(found, self._node.reaction)
+        event: Event = next(found, self._node.event)
         return event
 
     def _along(self, q: list[float]) -> Array:

@@ -1,0 +1,98 @@
+"""What to change so that a refused force would be obeyed: a joint to turn, more force, or a pinned position.
+
+A search over the belief of other forces in other poses, a few in each period, since one takes a fifth of a millisecond.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+
+from wam_control.force.axes import Axis, TaskAxes
+from wam_control.force.belief import Belief
+from wam_control.force.contact_place import Place
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.task import TaskCommand
+from wam_control.force.thresholds import FORCE
+from wam_description.event import Value
+from wam_description.parts import Joints
+
+Ways = dict[str, Value]
+
+
+class Advice:
+    """Looks for what would help.
+
+    Attributes
+    ----------
+    ways : what was found, as values of the event; `searched` once all was tried.
+    """
+
+    def __init__(self) -> None:
+        self._search: Iterator[Ways] | None = None
+        self.ways: Ways = {}
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all was tried."""
+        return "searched" in self.ways
+
+    def step(self, tries: Callable[[], Iterator[Ways]]) -> None:
+        """Try some ways, of those that `tries` has."""
+        self._search = self._search or tries()
+        for _ in range(0 if self.is_complete else FORCE.each):
+            way = next(self._search, None)
+            if way is None:
+                self.ways["searched"] = 1.0
+                return
+            self.ways |= way
+
+
+def tries(
+    q: Sequence[float],
+    task: TaskCommand,
+    place: Place,
+    axes: TaskAxes,
+    joints: Joints,
+    believe: Callable[[Axis], Belief],
+    own: ForceLoopParameters,
+) -> Iterator[Ways]:
+    """After each force that is tried, the way where it would be obeyed with a reserve, else nothing.
+
+    Parameters
+    ----------
+    q : joint angles (n,), rad.
+    task : with the one refused force.
+    place : where it acts.
+    axes : of tasks of this arm.
+    joints : of the arm.
+    believe : what would be known of a force.
+    own : parameters of the force loop.
+    """
+    (force,) = task.axes
+    pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True, is_in_doubt=False)
+
+    def is_obeyed(pose: Sequence[float], where: Place, size: float) -> bool:
+        (axis,) = axes.of(pose, task._replace(axes=(force._replace(value=size),)), [where], [1.0])
+        return FORCE.reserve * believe(axis).doubt <= own.limits.doubt
+
+    size = force.value or 0.0
+    for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):
+        is_good = is_obeyed(pose, place, size)
+        yield {"turn": name, "turn_from": was, "turn_to": angle} if is_good else {}
+        if is_good:
+            break
+    for factor in FORCE.more:
+        larger = float(f"{factor * size:.2g}")
+        is_good = larger <= own.force_limit and is_obeyed(q, place, larger)
+        yield {"more_force": larger} if is_good else {}
+        if is_good:
+            break
+    if not place.is_pinned:
+        yield {"pin": place.position} if is_obeyed(q, pinned, size) else {}
+
+
+def _turned(q: Sequence[float], joints: Joints, margin: float) -> Iterator[tuple[str, float, float, Sequence[float]]]:
+    """Poses in which one joint is turned, its name, and its angle before and after; the nearest first."""
+    for by in FORCE.turned:
+        for i in reversed(range(len(q))):
+            for angle in (round(q[i] + by, 1) + 0.0, round(q[i] - by, 1) + 0.0):  # no -0
+                if joints.lower[i] + margin + FORCE.spare <= angle <= joints.upper[i] - margin - FORCE.spare:
+                    yield joints.names[i], q[i], angle, [*q[:i], angle, *q[i + 1 :]]

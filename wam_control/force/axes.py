@@ -1,0 +1,141 @@
+"""What is commanded, as the axes of one problem.
+
+A force command is a task with one force axis, joint torques are a task with one axis for each joint, and a posture
+alone is a task without axes.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.contact_place import Place
+from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
+from wam_control.force.thresholds import FORCE
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE
+
+Array = NDArray[np.float64]
+
+
+class Axis(NamedTuple):
+    """One axis in one pose.
+
+    Attributes
+    ----------
+    of : what is commanded.
+    along : velocity along it per joint velocity, and torque on the joints per force (n,), m or 1.
+    direction, in_frame : towards what is touched, in the base frame and in that of the command (3,); zeros of a joint.
+    desired : size of the force, N; torque of a joint, N m; 0 for a motion.
+    at : position along it, m or rad.
+    sensed, place : how its force is measured, and where it acts; None for a motion or a joint.
+    """
+
+    of: TaskAxis
+    along: Array
+    direction: Array
+    in_frame: Array
+    desired: float
+    at: float
+    sensed: ForceAxis | None = None
+    place: Place | None = None
+
+    @property
+    def is_force(self) -> bool:
+        """Whether a force or a torque is commanded along it."""
+        return self.of.kind is AxisKind.FORCE
+
+    @property
+    def is_joint(self) -> bool:
+        """Whether it is a joint."""
+        return self.of.joint >= 0
+
+    def force(self, external: Array) -> float:
+        """Force of the arm on the world along it, N or N m, from torques of the world on the joints (n,), N m."""
+        return -float((self.along if self.sensed is None else self.sensed.sense) @ external)
+
+
+class TaskAxes:
+    """Makes the axes of the tasks of one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    body : its kinematics and dynamics.
+    forces : how forces are sensed.
+    """
+
+    def __init__(self, arm: Arm, body: RigidBody, forces: ForceAxes) -> None:
+        self._arm, self._body, self.forces = arm, body, forces
+
+    def of(self, q: Sequence[float], task: TaskCommand, places: Sequence[Place], sides: Sequence[float]) -> list[Axis]:
+        """The axes of a task; the force along each is measured with those of the others as unknowns.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        task : what is commanded.
+        places : where each axis acts.
+        sides : 1 or -1, where along its direction each impedance touches; those of forces follow from their sign.
+        """
+        rotation = np.eye(3) if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
+        signs = [
+            (-1.0 if (axis.value or 0.0) < 0.0 else 1.0) if axis.kind is AxisKind.FORCE else side
+            for axis, side in zip(task.axes, sides, strict=True)
+        ]
+        in_frame = [sign * np.array(axis.direction) for axis, sign in zip(task.axes, signs, strict=True)]
+        directions = [rotation @ one for one in in_frame]
+        pressed = [
+            PressedForce(place.cover, place.position, place.position_sd, direction, _size(axis))
+            for axis, place, direction in zip(task.axes, places, directions, strict=True)
+        ]
+        torques = [self._disturbance(q, *one) for one in zip(task.axes, pressed, strict=True)]
+        return [
+            self._axis(q, i, task.axes, directions[i], in_frame[i], pressed[i], torques, places[i])
+            for i in range(len(task.axes))
+        ]
+
+    def _disturbance(self, q: Sequence[float], axis: TaskAxis, pressed: PressedForce) -> list[Array]:
+        """Torques (n,), N m, by which a force along an axis disturbs the others; a hand has no friction."""
+        if axis.joint >= 0 or not axis.is_sensed:
+            return []
+        if axis.kind is AxisKind.IMPEDANCE:
+            return [FORCE.hand * self.forces.lever(q, pressed.cover, pressed.position, pressed.direction)]
+        return self.forces.disturbance(q, pressed)
+
+    def _axis(
+        self,
+        q: Sequence[float],
+        i: int,
+        axes: Sequence[TaskAxis],
+        direction: Array,
+        in_frame: Array,
+        pressed: PressedForce,
+        torques: Sequence[list[Array]],
+        place: Place,
+    ) -> Axis:
+        axis = axes[i]
+        if axis.joint >= 0:
+            desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
+            return Axis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, q[axis.joint])
+        point = np.array([place.position, *self._arm.covers.aside(place.cover, place.position)])
+        at = float(direction @ self._body.point(q, place.cover, point))
+        if not axis.is_sensed:
+            along: Array = direction @ self._body.point_jacobian(q, place.cover, point)
+            return Axis(axis, along, direction, in_frame, 0.0, at)
+        others: list[Array] = []
+        for k, each in enumerate(torques):
+            # two axes at one position are parts of one force, whose friction is that of `sensed` already
+            is_same = (axes[k].cover, axes[k].position) == (axis.cover, axis.position)
+            others += [] if k == i else each[:1] if is_same else each
+        sensed = self.forces.axis(q, pressed, others)
+        desired = pressed.force if axis.kind is AxisKind.FORCE else 0.0
+        return Axis(axis, sensed.lever, direction, in_frame, desired, at, sensed, place)
+
+
+def _size(axis: TaskAxis) -> float:
+    """Size of the force along an axis, N, as an unknown of the others."""
+    return abs(axis.value or 0.0) if axis.kind is AxisKind.FORCE else FORCE.hand

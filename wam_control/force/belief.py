@@ -1,0 +1,167 @@
+"""What is known of a force, and by how much the true one will be off: one number decides.
+
+The predicted error e of the true force has independent parts, in N: torques and masses, friction of the surface, the
+position of the contact, torques that were there before the touch, a surface that moves ahead of the loop, and an arm
+that shakes.  Its size per tolerated error is the doubt of a command.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.axes import Axis
+from wam_control.force.force_axis import ForceAxis
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.thresholds import FORCE
+
+Array = NDArray[np.float64]
+
+
+class Errors(NamedTuple):
+    """Predicted error of a true force by its causes, N; infinite where a cause forbids the force."""
+
+    torques: float = 0.0
+    friction: float = 0.0
+    place: float = 0.0
+    resting: float = 0.0
+    moving_surface: float = 0.0
+    slow_arm: float = 0.0
+    shaking_arm: float = 0.0
+
+    @property
+    def size(self) -> float:
+        """Root of the sum of squares, N."""
+        return math.hypot(*self)
+
+    @property
+    def cause(self) -> str:
+        """Name of the largest part."""
+        return max(self._fields, key=lambda name: float(getattr(self, name)))
+
+
+class Belief(NamedTuple):
+    """What is known of one force in one period.
+
+    Attributes
+    ----------
+    force, before : measured now and a period ago, N.
+    sd : of the measured force, N.
+    chi2 : of the torques that the force does not explain.
+    errors : predicted.
+    tolerance : of the force, N.
+    """
+
+    force: float
+    before: float
+    sd: float
+    chi2: float
+    errors: Errors
+    tolerance: float
+
+    @property
+    def doubt(self) -> float:
+        """Predicted error per tolerated error."""
+        return self.errors.size / self.tolerance if self.tolerance else math.inf
+
+
+class Torques(NamedTuple):
+    """Torques of the world on the joints, and what is known of them.
+
+    Attributes
+    ----------
+    now, before : filtered (n,), N m, in this period and the one before.
+    acceleration : of the joints (n,), rad/s^2, where sensors measure the torques of the links' motion, too; else None.
+    sd : of each (n,), N m.
+    """
+
+    now: Array
+    before: Array
+    acceleration: Array | None
+    sd: Array
+
+
+def tolerance(desired: float, own: ForceLoopParameters) -> float:
+    """Error, N, up to which a force of this size, N, counts as reached."""
+    return max(own.limits.tolerance * abs(desired), own.limits.least_tolerance)
+
+
+def yielding(sensed: ForceAxis, own: ForceLoopParameters) -> float:
+    """How far the stiffest surface and the cables yield to a force, m/N."""
+    return 1.0 / own.guard.contact_stiffness + sensed.compliance
+
+
+def predicted(
+    sensed: ForceAxis,
+    torque_sd: Array,
+    own: ForceLoopParameters,
+    resting: float = 0.0,
+    shaking: float = 0.0,
+    reach_time: float = 0.0,
+) -> Errors:
+    """Predicted error of a force.
+
+    Parameters
+    ----------
+    sensed : how the force is measured.
+    torque_sd : of the torques (n,), N m.
+    own : parameters of the force loop.
+    resting : force, N, that torques at rest look like, and nothing touched gives.
+    shaking : swing of the force, N peak to peak, as the arm shakes on the stiffest surface.
+    reach_time : time, s, that the velocity loops need to wind up to the force.
+    """
+    if sensed.force_sd == math.inf:
+        return Errors(torques=math.inf)
+    limits, soft = own.limits, yielding(sensed, own)
+    pace = max(own.force_gain) * sensed.speed_fraction
+    settling = (FORCE.settled * soft / pace if pace else math.inf) + reach_time
+    slope = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed / soft
+    return Errors(
+        torques=sensed.error(torque_sd),
+        friction=sensed.friction_sd,
+        place=sensed.place_sd,
+        resting=abs(resting),
+        moving_surface=(limits.surface_speed / pace if limits.surface_speed else 0.0) + slope,
+        slow_arm=math.inf if settling > limits.settling_time else 0.0,
+        shaking_arm=limits.tolerance / limits.shake_force * shaking,
+    )
+
+
+def belief(
+    axis: Axis,
+    size: float,
+    torques: Torques,
+    own: ForceLoopParameters,
+    is_touching: bool,
+    resting: Array,
+    shaking: float,
+    reach_time: float,
+) -> Belief:
+    """The belief of one force axis.
+
+    Parameters
+    ----------
+    axis : of the force.
+    size : of the command, N: of the force, or of the torques of all joints together, N m.
+    torques : of the world on the joints.
+    own : parameters of the force loop.
+    is_touching : whether something is touched: until then, what sensors measure of the arm's own motion is no force.
+    resting : torques at rest before (n,), N m, that no touched surface gives.
+    shaking, reach_time : as `predicted` has them.
+    """
+    sensed, desired = axis.sensed, axis.desired
+    force, before = axis.force(torques.now), axis.force(torques.before)
+    if sensed is None:
+        sd = float(torques.sd[axis.of.joint])
+        errors = Errors(torques=sd, resting=abs(float(resting[axis.of.joint])))
+        return Belief(force, before, sd, 0.0, errors, tolerance(size, own))
+    if torques.acceleration is not None and not is_touching:
+        # the acceleration is the mean of a period
+        force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
+    errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, reach_time)
+    sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)
+    chi2 = 0.0
+    if desired and sd < math.inf:  # friction and position are known per force
+        chi2 = sensed.unexplained(torques.now) / max(1.0, force / desired) ** 2
+    return Belief(force, before, sd, chi2, errors, tolerance(size, own))

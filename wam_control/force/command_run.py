@@ -1,0 +1,189 @@
+"""What is remembered of one command: a new object where something else is commanded."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.advice import Advice
+from wam_control.force.axes import Axis
+from wam_control.force.belief import Belief, Torques, belief, yielding
+from wam_control.force.contact_place import ContactPlace
+from wam_control.force.feed_forward import FeedForward
+from wam_control.force.force_axis import ForceAxes
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_measurement import ForceMeasurement
+from wam_control.force.force_watch import ForceWatch, MotionWatch
+from wam_control.force.held_arm import HeldArm
+from wam_control.force.limits import reach_time
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
+from wam_control.force.thresholds import FORCE
+from wam_description.arm import Arm, Covers, Timing
+
+Array = NDArray[np.float64]
+
+
+class AxisRun:
+    """One axis of a command.
+
+    Parameters
+    ----------
+    of : what is commanded.
+    covers : of the arm.
+
+    Attributes
+    ----------
+    place : where its force acts.
+    watch, motion : what is reported of its force, or of its motion.
+    anchor : position to hold where none is commanded, m or rad.
+    side : 1 or -1, on which side along it an impedance is touched.
+    is_kept : whether its force is left as it is.
+    """
+
+    def __init__(self, of: TaskAxis, covers: Covers) -> None:
+        self.place = ContactPlace(covers)
+        self.watch, self.motion = ForceWatch(), MotionWatch()
+        self.anchor, self.side, self.is_kept = math.nan, 1.0, False
+        self.is_force = of.kind is AxisKind.FORCE
+
+    def goal(self, axis: Axis, dt: float, lasting: float) -> float:
+        """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
+        if math.isnan(self.anchor):
+            self.anchor = axis.at
+        if axis.of.kind is AxisKind.VELOCITY:  # what is behind for long is forgotten
+            self.anchor += (axis.of.value or 0.0) * dt + (axis.at - self.anchor) * dt / lasting
+        elif axis.of.value is not None:
+            return axis.of.value
+        return self.anchor
+
+
+class Shaking:
+    """How a dithered arm shakes before it moves along a force: the swing of the force that it will make.
+
+    Parameters
+    ----------
+    timing : of the loops and the dither.
+    """
+
+    def __init__(self, timing: Timing) -> None:
+        self._cycle, self._poses = timing.dither_cycle * timing.period, list[Array]()
+
+    def is_watching(self, q: Sequence[float], dt: float) -> bool:
+        """Take a pose (n,), rad; whether more of them are needed."""
+        if not self._cycle or len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
+            return False
+        self._poses.append(np.array(q))
+        return True
+
+    def swing(self, axis: Axis, own: ForceLoopParameters) -> float:
+        """Swing of the force on the stiffest surface, N peak to peak."""
+        sensed = axis.sensed
+        if len(self._poses) < 2 or sensed is None or sensed.force_sd == math.inf:
+            return 0.0
+        way = np.array(self._poses) @ axis.along
+        way = way - np.linspace(way[0], way[-1], len(way))
+        motion = float(way.max() - way.min())
+        if not motion:
+            return 0.0
+        # the arm against its inertia, and against the surface; in resonance `resonance` times the lesser of the two
+        blocked = sensed.impact_mass * (2.0 * math.pi / self._cycle) ** 2 * motion
+        pressed = motion / yielding(sensed, own)
+        least = FORCE.resonance * min(blocked, pressed)
+        return 1.0 / math.hypot(1.0 / blocked - 1.0 / pressed, 1.0 / least)
+
+
+class Resting:
+    """Torques of an arm at rest as a force begins: of a surface that is touched, or an error of the model.
+
+    What a payload explains may always be one.
+
+    Parameters
+    ----------
+    torques : of the world on the joints (n,), N m, that are not taken as zero.
+    """
+
+    def __init__(self, torques: Array) -> None:
+        self.torques, self._is_judged = torques, not torques.any()
+
+    def judge(
+        self, q: Sequence[float], axis: Axis, measurement: ForceMeasurement, forces: ForceAxes, torque_sd: float
+    ) -> None:
+        """Decide once for the first axis of the command."""
+        if self._is_judged or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
+            return
+        self._is_judged = True
+        sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(self.torques).max()))
+        mass, left = measurement.payload(q, self.torques, sd)
+        if mass > 0.0 and left <= FORCE.unexplained:
+            return
+        if axis.sensed is None or axis.place is None:
+            self.torques = np.zeros_like(self.torques)
+            return
+        force = axis.force(self.torques)
+        pressed = axis.place.pressed(axis.direction, abs(force))
+        if force > 0.0 and forces.axis(q, pressed).unexplained(self.torques) <= FORCE.unexplained:
+            self.torques = np.zeros_like(self.torques)
+
+
+class CommandRun:
+    """What is remembered while the same axes are commanded.
+
+    Parameters
+    ----------
+    key : what makes a command the same as before.
+    task : what is commanded; None for a posture alone.
+    arm : the arm as the controller knows it.
+    timing : of the loops.
+    resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins.
+    is_moving : whether the arm moves too fast for these to be known.
+
+    Attributes
+    ----------
+    axes : one of each axis.
+    held : where the arm holds while the command is not obeyed.
+    approached : way of the posture along the forces to what they touch (n,), rad.
+    free_at, before : where the arm last was free, and a period ago (n,), rad; None at first.
+    fed : torque of the forces that is fed forward after the touch (n,), N m.
+    is_moving : whether the arm still moves as it did when the command began.
+    delayed : speeds along the axes that are still to come, m/s or rad/s.
+    joints : what is reported of a posture, of each joint.
+    feed_forward, advice : of this command.
+    fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
+    """
+
+    def __init__(
+        self, key: object, task: TaskCommand | None, arm: Arm, timing: Timing, resting: Array, is_moving: bool
+    ) -> None:
+        self.key = key
+        self.axes = [AxisRun(axis, arm.covers) for axis in (task.axes if task else ())]
+        self.held, self.shaking, self.resting = HeldArm(), Shaking(timing), Resting(resting)
+        self.approached = np.zeros_like(resting)
+        self.free_at: Array | None = None
+        self.before: Array | None = None
+        self.fed, self.is_moving = np.zeros_like(resting), is_moving
+        self.delayed: deque[list[float]] = deque()
+        self.joints = {name: MotionWatch() for name in arm.joints.names}
+        self.feed_forward, self.advice, self.fallback = FeedForward(arm), Advice(), ""
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether something is touched by one of its forces."""
+        return any(one.watch.touch.is_there for one in self.axes)
+
+    def believe(self, axis: Axis, size: float, torques: Torques, own: ForceLoopParameters, wound: Array) -> Belief:
+        """What is known of the force along an axis, N; `size` is that of the command, `wound` as of `reach_time`."""
+        swing, reach = self.shaking.swing(axis, own), reach_time(axis, wound, own)
+        return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, reach)
+
+    def move(self, moved: Array, axes: Sequence[Axis], forces: ForceAxes, q: Sequence[float]) -> None:
+        """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""
+        is_approach = all(axis.is_force for axis in axes)  # another motion may lead to what is to be touched
+        for axis, one in zip(axes, self.axes, strict=True):
+            if not axis.is_force or axis.place is None or not (is_approach or one.watch.touch.is_there):
+                continue
+            one.place.slide(forces.slide(q, axis.place.cover, axis.place.position, moved))
+            square = float(axis.along @ axis.along)
+            if not one.watch.touch.is_there and square:
+                self.approached = self.approached + axis.along * (float(axis.along @ moved) / square)

@@ -1,0 +1,148 @@
+"""Where the controlled force acts: where the command or the parameters pin it, or at the estimated contact."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.force_axis import PressedForce
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.task import TaskAxis
+from wam_description.arm import Covers
+from wam_description.signals import BASE, Contact, ForceCommand, Triple
+
+Array = NDArray[np.float64]
+STEEPEST = math.radians(30.0)  # lean of a force from the normal of a link, up to which its position is estimated well
+
+
+class Place(NamedTuple):
+    """Where a force acts.
+
+    Attributes
+    ----------
+    cover, position, position_sd : cover, position along it and its standard deviation, m.
+    is_pinned : whether the command or the parameters give it.
+    is_known : whether it is pinned, or estimated well enough while something is touched.
+    is_in_doubt : whether something is touched, and it is neither pinned nor known on which link.
+    rejection : why the present estimate is not used, '' if it is or is not needed.
+    """
+
+    cover: str
+    position: float
+    position_sd: float
+    is_pinned: bool = False
+    is_known: bool = False
+    is_in_doubt: bool = False
+    rejection: str = ""
+
+    def pressed(self, direction: Array, force: float) -> PressedForce:
+        """A force there, N, along a direction (3,), base frame."""
+        return PressedForce(self.cover, self.position, self.position_sd, direction, force)
+
+
+class ContactPlace:
+    """Where one force acts, and what is remembered of that while the contact lasts.
+
+    A pinned point is one of the world: the link slides along it.  An estimate near its limits would step the measured
+    force back and forth, so the last one that was certain is kept.  A position that is not known may be anywhere on
+    the cover: the force is then sensed apart from what depends on it.
+
+    Parameters
+    ----------
+    covers : of the arm.
+    """
+
+    def __init__(self, covers: Covers) -> None:
+        self._covers = covers
+        self._last: tuple[str, float, float] | None = None
+        self._pinned = ("", 0.0)
+        self._slid = 0.0
+
+    def slide(self, way: float) -> None:
+        """Count a way of the link along itself, m: what is touched, or is to be, is touched elsewhere on it."""
+        self._slid += way
+
+    def step(self, axis: TaskAxis, contact: Contact, lean: float, parameters: ForceLoopParameters) -> Place:
+        """Place for the present estimate.
+
+        Parameters
+        ----------
+        axis : of the force; its cover is '' where any link may touch, its position None where it is estimated.
+        contact : estimated contact.
+        lean : angle of the force from the normal of the touched cover, rad.
+        parameters : of the force loop.
+        """
+        covers = self._covers
+        if axis.position is not None:
+            at = axis.cover, axis.position
+            if at != self._pinned:
+                self._pinned, self._slid = at, 0.0
+            position = slid_position(covers, *at, self._slid)
+            return Place(axis.cover, position, parameters.contact_position_sd, is_pinned=True, is_known=True)
+        is_likely = bool(contact.cover) and not contact.probability < parameters.link_probability_limit
+        is_identified = is_likely and axis.cover in ("", contact.cover)
+        rejection = _rejection(contact, lean) if is_identified else ""
+        if not contact.cover:
+            self._last = None
+        elif is_identified and not rejection:
+            sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
+            self._last = self._estimated(contact.cover, contact.position, sd)
+        cover = axis.cover or parameters.contact_cover
+        assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
+        where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)
+        return Place(
+            *where,
+            is_known=self._last is not None,
+            is_in_doubt=bool(contact.cover) and not is_identified,
+            rejection=rejection,
+        )
+
+    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> tuple[str, float, float]:
+        """A position and its standard deviation, m; one that is not known is anywhere on the cover."""
+        if math.isnan(position):
+            position, is_known = self._covers.length_of(cover) / 2.0, False
+        return cover, position, sd if is_known else anywhere_sd(self._covers, cover, position)
+
+
+def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:
+    """Where a cover is touched, m, that has slid along itself by a way, m, since that was at a position, m."""
+    length = covers.length_of(cover)
+    return min(max(position - way, 0.0), length) if position < length - covers.radius_of(cover) else position
+
+
+def anywhere_sd(covers: Covers, cover: str, position: float) -> float:
+    """Deviation from a position, m, rms, of one that is uniformly distributed over a cover, m."""
+    length = covers.length_of(cover)
+    return math.hypot(length / math.sqrt(12.0), position - length / 2.0)
+
+
+def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:
+    """Cover and position, m, that a command pins: its torque is that of the force about the origin of the cover.
+
+    A force (fx, fy, fz) at the position x has the torque (0, -x fz, x fy).  None for a command without a torque
+    or in the base frame, whose torque determines no cover.
+    """
+    if command is None or command.frame == BASE or not any(command.torque):
+        return None
+    (_, fy, fz), (_, my, mz) = command.force, command.torque
+    across = fy * fy + fz * fz
+    return (command.frame, (fy * mz - fz * my) / across) if across else None
+
+
+def torque_of_position(force: Triple, position: float) -> Triple:
+    """Torque about the origin of a cover, N m, of a force at a position along it; the inverse of `pinned_position`."""
+    return 0.0, -position * force[2], position * force[1]
+
+
+def _rejection(contact: Contact, lean: float) -> str:
+    """Why an estimated position is not used, '' if it is."""
+    if not contact.is_single:
+        return f"a second contact is nearly certain besides that on {contact.cover}; the last position is used"
+    if lean > STEEPEST:
+        return (
+            f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "
+            f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
+            "pin the position (contact_source, or the torque of the command); the last position is used"
+        )
+    return ""

@@ -1,0 +1,309 @@
+"""What is reported of a force or a motion: six events, each by a condition that has to last.
+
+===============  ===================================================================================
+REFUSED          the predicted error of the force is larger than tolerated; before the touch, the arm holds
+NOT_REACHED      a force, a torque or a motion has been off by more than tolerated for too long
+UNEXPLAINED      the torques are not those of what is commanded, or another link is touched; then the arm holds
+PUSHED           something pushes harder than allowed
+AT_LIMIT         a joint is at its end, or the arm has moved as far as it may; then it holds
+OSCILLATING      the measured force turns back again and again
+===============  ===================================================================================
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.axes import Axis
+from wam_control.force.belief import Belief
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.thresholds import FORCE
+from wam_control.thresholds import MOTION
+from wam_description.event import Code, Event, Value, holding, warning
+
+Array = NDArray[np.float64]
+
+
+class Lasting:
+    """Whether a condition has lasted: some time to begin with, and some time without it to end."""
+
+    def __init__(self) -> None:
+        self._level, self.is_on = 0.0, False
+
+    def step(self, is_there: bool, after: float, back: float, dt: float) -> bool:
+        """One period of dt, s; it begins `after` s with the condition, and ends `back` s without it."""
+        change = dt / max(after, dt) if is_there else -dt / max(back, dt)
+        self._level = min(max(self._level + change, 0.0), 1.0)
+        self.is_on = self._level > 1.0 - FORCE.rounding or (self.is_on and self._level > FORCE.rounding)
+        return self.is_on
+
+
+class Turns:
+    """How often a signal has turned back by more than a size, within a window; and by how much."""
+
+    def __init__(self) -> None:
+        self._time, self._sense, self._extreme = 0.0, 1, math.nan
+        self._found: deque[tuple[float, float]] = deque()
+
+    def step(self, value: float, least: float, window: float, dt: float) -> int:
+        """Number of turns by at least `least` within the last `window`, s."""
+        self._time += dt
+        if math.isnan(self._extreme) or self._sense * (value - self._extreme) >= 0.0:
+            self._extreme = value
+        elif abs(value - self._extreme) >= least:
+            self._found.append((self._time, self._extreme))
+            self._extreme, self._sense = value, -self._sense
+        while self._found and self._found[0][0] < self._time - window:
+            self._found.popleft()
+        return len(self._found)
+
+    @property
+    def swing(self) -> tuple[float, float]:
+        """Peak to peak, and period, s, of the turns in the window."""
+        times, values = zip(*self._found, strict=True)
+        return max(values) - min(values), 2.0 * (times[-1] - times[0]) / max(len(times) - 1, 1)
+
+
+class Touch:
+    """Whether something is touched, and whether it was."""
+
+    def __init__(self) -> None:
+        self.is_there = self.has_been = False
+        self._since = 0.0
+
+    def step(self, force: float, desired: float, dt: float) -> None:
+        """A force is measured, N, of a desired one, N."""
+        self.is_there = force >= FORCE.touch * desired > 0.0
+        self.has_been = self.has_been or self.is_there
+        self._since = self._since + dt if self.has_been else 0.0
+
+    @property
+    def is_bouncing(self) -> bool:
+        """Whether the first touch was so short ago that an impact turns the force."""
+        return self._since < FORCE.bouncing_time
+
+
+class Oscillation:
+    """Slows the arm down along a force that oscillates, and reports it where that does not help.
+
+    Attributes
+    ----------
+    share : of the speed along the force.
+    """
+
+    def __init__(self) -> None:
+        self.share = 1.0
+        self._turns, self._faint, self._lasting = Turns(), Turns(), Lasting()
+        self._values: dict[str, Value] = {}
+
+    def rest(self) -> None:
+        """There is nothing to see yet."""
+        self._turns, self._faint = Turns(), Turns()
+
+    def step(self, force: float, desired: float, own: ForceLoopParameters, dt: float) -> Event | None:
+        """The event of one period."""
+        least, window = own.limits.cycle_force * abs(desired), own.limits.settling_time
+        count = self._turns.step(force, least, window, dt)
+        # a cycle that grows is seen late, and with a wrong size
+        faint = self._faint.step(force, FORCE.faint_swing * least, window, dt)
+        is_swinging = count > FORCE.turns
+        if is_swinging:
+            swing, period = self._turns.swing
+            self._values = {"swing": swing, "period": period, "desired": desired, "allowed": own.limits.cycle_force}
+        if faint > FORCE.turns // 2 and self.share > FORCE.least_share:
+            self.share *= FORCE.slowed
+            self.rest()
+        is_on = self._lasting.step(is_swinging, dt, window, dt)
+        return warning(Code.OSCILLATING, "oscillating", **self._values) if is_on else None
+
+
+class Seen(NamedTuple):
+    """What is seen of a force in a period.
+
+    Attributes
+    ----------
+    known : of the force.
+    way : of the arm along the force since the period before, m; 0 while it holds.
+    touched : the link that is surely touched instead, '' where none is.
+    is_led : whether another motion is commanded besides.
+    """
+
+    known: Belief
+    way: float
+    touched: str
+    is_led: bool
+
+
+class ForceWatch:
+    """The events of one force axis.
+
+    Attributes
+    ----------
+    touch : of what is pressed.
+    oscillation : of the force.
+    ended : the event because of which the arm holds until the command ends; None where there is none.
+    """
+
+    def __init__(self) -> None:
+        self.touch, self.oscillation = Touch(), Oscillation()
+        self.ended: Event | None = None
+        self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
+        self._is_refused, self._is_decided, self._has_settled = True, False, False
+        self._desired, self._travel = math.nan, 0.0
+        self._pattern: Array | None = None  # m, torques per force as it has settled
+
+    def step(self, axis: Axis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
+        """The events of one period.
+
+        Parameters
+        ----------
+        axis : of the force.
+        seen : of it.
+        torques : of the world on the joints (n,), N m.
+        own : parameters of the force loop.
+        dt : s.
+        """
+        known, desired, limits = seen.known, axis.desired, own.limits
+        error = desired - known.force
+        if not abs(desired - self._desired) <= known.tolerance:
+            self._has_settled, self._pattern = False, None
+        self._desired = desired
+        events = self._decide(axis, known, error, own, dt)
+        if self._is_refused:
+            return events
+        is_reached = self.touch.is_there and abs(error) <= known.tolerance
+        self.ended = self.ended or self._contradicted(axis, seen, dt) or self._travelled(seen, is_reached, own)
+        if self.ended:
+            return [self.ended]
+        lasting = limits.settling_time
+        soon, late = FORCE.quarter * lasting, lasting
+        after, back = (soon, late) if self._has_settled else (late, soon)
+        if self._off.step(not is_reached, after, back, dt):
+            values: dict[str, Value] = {"measured": known.force, "desired": desired, "time": after, "unit": _unit(axis)}
+            cause = "force_strays" if self._has_settled else "force_off"
+            events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
+        self._has_settled = self._has_settled or is_reached
+        events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
+        if self.touch.is_there and not self.touch.is_bouncing:
+            events += filter(None, [self.oscillation.step(known.force, desired, own, dt)])
+        else:
+            self.oscillation.rest()
+        return events
+
+    def _decide(self, axis: Axis, known: Belief, error: float, own: ForceLoopParameters, dt: float) -> list[Event]:
+        """Refused until the force is there, at a pinned place until the touch; then reported, where it lasts."""
+        most, place = own.limits.doubt, axis.place
+        if self._is_refused or not self._is_decided:
+            self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
+        is_there = self.touch.has_been if place is None or place.is_pinned else error < known.tolerance
+        self._is_decided = self._is_decided or (is_there and not self._is_refused)
+        values: dict[str, Value] = {
+            "error": known.errors.size, "part": known.errors.cause, "desired": axis.desired, "allowed": known.tolerance,
+            "unit": _unit(axis), "cover": place.cover if place else axis.of.name,
+            "position": place.position if place else math.nan,
+        }  # fmt: skip
+        if self._is_refused:
+            return [holding(Code.REFUSED, "error", **values)]
+        # what is off already leaves less of the tolerance to what is not known
+        is_doubtful = math.hypot(known.errors.size, error) > known.tolerance and self.touch.is_there
+        lasting = own.limits.settling_time
+        is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
+        return [warning(Code.REFUSED, "uncertain", **values)] if is_on else []
+
+    def _contradicted(self, axis: Axis, seen: Seen, dt: float) -> Event | None:
+        """Another link is touched."""
+        place = axis.place
+        is_strange = seen.known.chi2 > FORCE.unexplained
+        is_other = bool(seen.touched) and (is_strange or place is None or not place.is_pinned)
+        if not self._other.step(is_other, FORCE.conflict_time, FORCE.conflict_time, dt) or place is None:
+            return None
+        return holding(Code.UNEXPLAINED, "other_link", cover=place.cover, touched=seen.touched)
+
+    def _travelled(self, seen: Seen, is_reached: bool, own: ForceLoopParameters) -> Event | None:
+        """The arm has moved too far along or against a force that is not reached."""
+        self._travel += seen.way
+        if is_reached:
+            self._travel = 0.0 if seen.is_led else min(self._travel, 0.0)
+        if abs(self._travel) <= own.limits.free_travel:
+            return None
+        touched = float(self.touch.has_been)
+        return holding(
+            Code.AT_LIMIT, "free_travel", way=self._travel, allowed=own.limits.free_travel, has_touched=touched
+        )
+
+    def _unexplained(
+        self, axis: Axis, known: Belief, is_reached: bool, torques: Array, lasting: float, dt: float
+    ) -> list[Event]:
+        """The torques are not those of the force, or no longer those with which it has settled."""
+        if axis.sensed is None or axis.place is None or known.sd == math.inf:
+            return []
+        where: dict[str, Value] = {"cover": axis.place.cover, "position": axis.place.position}
+        is_strange = known.chi2 > FORCE.unexplained and self.touch.is_there
+        if self._strange.step(is_strange, lasting, lasting, dt):
+            return [warning(Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=FORCE.unexplained)]
+        if self._right.step(is_reached, FORCE.quarter * lasting, dt, dt) and self._pattern is None:
+            self._pattern = torques / known.force
+        if not self.touch.is_there or self._pattern is None:
+            return []
+        change = axis.sensed.changed(torques - known.force * self._pattern)
+        if not self._changed.step(change > FORCE.changed, FORCE.conflict_time, FORCE.conflict_time, dt):
+            return []
+        return [warning(Code.UNEXPLAINED, "torques_changed", **where, chi2=change, allowed=FORCE.changed)]
+
+
+class MotionWatch:
+    """Whether a joint or an axis follows a goal, next to an ideal one with the same speed limit and gain."""
+
+    def __init__(self) -> None:
+        self._ideal, self._late = math.nan, Lasting()
+
+    def step(
+        self,
+        name: str,
+        unit: str,
+        goal: float,
+        rate: float,
+        at: float,
+        gain: float,
+        fastest: float,
+        lasting: float,
+        dt: float,
+    ) -> Event | None:
+        """The event of one period.
+
+        Parameters
+        ----------
+        name, unit : of the axis, m or rad.
+        goal, rate : commanded position, and the velocity at which it moves.
+        at : present position.
+        gain, fastest : velocity per error, 1/s, and the largest velocity.
+        lasting : time after which it is reported, s.
+        dt : s.
+        """
+        if math.isnan(self._ideal):
+            self._ideal = at
+        speed = min(max(rate + gain * (goal - self._ideal), -fastest), fastest)
+        self._ideal += speed * dt
+        if abs(rate) > fastest:
+            return warning(Code.AT_LIMIT, "speed", axis=name, unit=unit, speed=abs(rate), allowed=fastest)
+        # behind by the time constant of its law while it moves, and by as much as an arm at rest may be
+        allowed = MOTION.arrived + abs(speed) / gain + abs(goal - self._ideal) * FORCE.quarter
+        if not self._late.step(abs(at - self._ideal) > allowed, lasting, lasting, dt):
+            return None
+        return warning(
+            Code.NOT_REACHED,
+            "motion_off",
+            axis=name,
+            unit=unit,
+            desired=goal,
+            measured=at,
+            allowed=allowed,
+            time=lasting,
+        )
+
+
+def _unit(axis: Axis) -> str:
+    return "N m" if axis.is_joint else "N"

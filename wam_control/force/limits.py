@@ -1,0 +1,151 @@
+"""What limits the motion: bounds of each joint, a speed along a force, and pushes that are given way to."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force.axes import Axis
+from wam_control.force.belief import yielding
+from wam_control.force.force_axis import ForceAxis
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.problem import Row
+from wam_control.force.thresholds import FORCE
+from wam_description.parts import Joints
+from wam_description.rigid_body import RigidBody
+
+Array = NDArray[np.float64]
+
+
+def joint_bounds(q: Sequence[float], joints: Joints, own: ForceLoopParameters) -> tuple[Array, Array]:
+    """Least and largest velocity of each joint (n,), rad/s: its speed limit, and a velocity damper at its ends."""
+    gain, margin, speed = own.limits.joint_gain, own.limits.joint_margin, own.joint_speed_limit
+    if not gain:
+        return np.full(len(q), -speed), np.full(len(q), speed)
+
+    def towards(distance: float) -> float:
+        if distance < 0.0:
+            return max(gain * distance, -FORCE.push_back)
+        return min(gain * max(distance - margin, 0.0), speed)
+
+    ends = zip(joints.lower, q, joints.upper, strict=True)
+    low, high = zip(*((-towards(at - lower), towards(upper - at)) for lower, at, upper in ends), strict=True)
+    return np.array(low), np.array(high)
+
+
+def accelerated(low: Array, high: Array, before: Array, step: float) -> tuple[Array, Array]:
+    """Bounds (n,), rad/s, within a step of the velocities before (n,), rad/s; those of the speed come first."""
+    return np.minimum(np.maximum(low, before - step), high), np.maximum(np.minimum(high, before + step), low)
+
+
+def rise_time(own: ForceLoopParameters) -> float:
+    """Time in which the force on the stiffest surface may rise, s: some latencies of the measured force."""
+    return FORCE.rise * (own.force_filter + own.guard.feedback_lag * own.is_estimated)
+
+
+def approach_speed(axis: Axis, is_touching: bool, own: ForceLoopParameters) -> float:
+    """Largest speed along a force, m/s.
+
+    Until something is touched, the impact (3.1), v sqrt(m k), stays below `limits.impact` of the force.  At a place
+    that is not known the arm is slower, since the touch is detected late; after the touch, since the measured force is
+    late: it rises in no less than some latencies of it on the stiffest surface.
+    """
+    sensed, place, limits = axis.sensed, axis.place, own.limits
+    if not limits.impact or sensed is None or place is None:
+        return math.inf
+    slowest = FORCE.creep / limits.settling_time
+    whole = axis.desired * yielding(sensed, own)
+    rise = rise_time(own) if place.is_known else max(FORCE.identified_rise, rise_time(own))
+    if is_touching:
+        return max(whole / sensed.speed_fraction / rise, slowest)
+    fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
+    if not place.is_known:
+        detected = rise_time(own) if own.is_estimated else FORCE.detected * own.force_filter
+        fastest = min(fastest, max(whole / detected, slowest))
+    return fastest / sensed.speed_fraction
+
+
+def reach_time(axis: Axis, wound: Array, own: ForceLoopParameters) -> float:
+    """Time until the velocity loops reach a force on the stiffest surface, s; infinite where the arm cannot.
+
+    A surface that is approached, or that moves, has to be reached at all.  What is not fed forward is wound up by the
+    integral gains K at the joints: dF/dt = v l.K l / |l|^4.  The torque of a force is fed forward once its place is
+    known.
+
+    Parameters
+    ----------
+    axis : of the force.
+    wound : K (n, n), N m/rad.
+    own : parameters of the force loop.
+    """
+    sensed, place, square = axis.sensed, axis.place, float(axis.along @ axis.along)
+    if sensed is None or place is None or not square:
+        return 0.0
+    free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
+    if free < FORCE.creep / own.limits.settling_time or touching < own.limits.surface_speed:
+        return math.inf
+    if place.is_pinned or not own.is_estimated:
+        return 0.0
+    stiffness = float(axis.along @ wound @ axis.along) / (square * square)
+    return axis.desired / max(touching * stiffness, FORCE.negligible)
+
+
+def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> float:
+    """Error of a force, N, that is left alone: a smaller one than friction lets the arm correct."""
+    return min(FORCE.kept * own.limits.tolerance * abs(desired), FORCE.finest_motion / yielding(sensed, own))
+
+
+class Push(NamedTuple):
+    """What pushes the arm.
+
+    Attributes
+    ----------
+    least : smallest force, N, that explains the torques, less what is uncertain of them.
+    torques : of it on the joints (n,), N m.
+    lever : largest torque per force, m.
+    """
+
+    least: float
+    torques: Array
+    lever: float
+
+    @classmethod
+    def at(cls, torques: Array, torque_sd: Array, jacobian: Array) -> "Push":
+        """What pushes with these torques (n,), N m, at a point with this Jacobian (3, n)."""
+        lever = max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), FORCE.least_lever)
+        size = math.sqrt(torques.dot(torques)) - FORCE.certain * math.sqrt(torque_sd.dot(torque_sd))
+        return cls(max(size, 0.0) / lever, torques, lever)
+
+    def row(self, allowed: float, gain: float, fastest: float) -> Row:
+        """No faster against it than a force law, m/s/N, allows up to this force, N; above it away from it."""
+        along = self.torques / math.sqrt(self.torques.dot(self.torques))
+        return Row(along, min(gain * (self.least - allowed) / self.lever, fastest))
+
+
+def likeliest_link(body: RigidBody, q: Sequence[float], torques: Array) -> Array:
+    """Jacobian (3, n) of the middle of the link of which one force explains torques (n,), N m, best."""
+    covers = body.arm.covers
+    middles = [
+        body.point_jacobian(q, name, (FORCE.middle * length, 0.0, 0.0))
+        for name, length in zip(covers.names, covers.length, strict=True)
+    ]
+    return min(
+        middles, key=lambda one: float(np.linalg.norm(torques - one.T @ np.linalg.lstsq(one.T, torques, rcond=None)[0]))
+    )
+
+
+def calm(velocity: Array, inertia: Array, energy: float) -> Array:
+    """Velocities (n,), rad/s, with no more than this kinetic energy, J: something may be in the way."""
+    moving = 0.5 * float(velocity @ inertia @ velocity)
+    return velocity * math.sqrt(energy / moving) if moving > energy else velocity
+
+
+def followed(posture: Array, axis: Axis, body: RigidBody, q: Sequence[float], own: ForceLoopParameters) -> Array:
+    """Velocities of a posture (n,), rad/s, at which the link slides no faster than the force law follows a slope."""
+    assert axis.place is not None
+    point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
+    slide = FORCE.slide_slope * float(np.linalg.norm(body.point_jacobian(q, axis.place.cover, point) @ posture))
+    most = max(own.force_gain) * min(own.limits.tolerance, 1.0) * abs(axis.desired)
+    return posture * (most / slide) if slide > most else posture

@@ -1,0 +1,107 @@
+"""The problem of one period: joint velocities that do what is commanded as well as the limits allow.
+
+Minimise  |v - p|^2 + W sum_i (r_i.v - s_i)^2 + W sum_j max(0, g_j - t_j.v)^2   for   low <= v <= high,
+
+with every row scaled to length 1.  Rows (r, s) are commanded, one-sided rows (t, g) are least velocities, p is the
+posture.  The bounds always hold, so there is always a solution.  W puts the rows far above the posture; rows that
+contradict each other share what is left.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import quadprog
+from numpy.typing import NDArray
+
+from wam_control.force.thresholds import FORCE
+from wam_description.small_matrices import inverse, solution
+
+Array = NDArray[np.float64]
+RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
+
+
+class Row(NamedTuple):
+    """A velocity along a direction of the joint space.
+
+    Attributes
+    ----------
+    along : velocity along it per joint velocity (n,).
+    speed : commanded, or the least one of a one-sided row, m/s or rad/s.
+    """
+
+    along: Array
+    speed: float
+
+    @property
+    def size(self) -> float:
+        """Length of `along`."""
+        return math.sqrt(self.along.dot(self.along))
+
+
+class Solution(NamedTuple):
+    """Joint velocities (n,), rad/s, with and without the limits; the same object where no limit is active."""
+
+    velocity: Array
+    unlimited: Array
+
+
+def solve(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Array, high: Array) -> Solution:
+    """The joint velocities of one period.
+
+    Parameters
+    ----------
+    rows : commanded.
+    posture : velocities of the posture (n,), rad/s.
+    least : one-sided rows.
+    low, high : bounds (n,), rad/s, low <= high.
+    """
+    rows = [row for row in rows if row.size > FORCE.shortest_lever]
+    if len(rows) == 1:  # in closed form, so that one axis has the bits of its law
+        along, speed = rows[0]
+        unlimited = posture + along * ((speed - along.dot(posture)) / along.dot(along))
+    elif rows:
+        unlimited = solution(*_normal(rows, posture))
+    else:
+        unlimited = posture
+    broken = [row for row in least if row.size > FORCE.shortest_lever]
+    is_inside = bool((unlimited >= low).all() and (unlimited <= high).all())
+    if is_inside and all(along.dot(unlimited) >= speed for along, speed in broken):
+        return Solution(unlimited, unlimited)
+    return Solution(_limited(rows, posture, broken, low, high), unlimited)
+
+
+def _limited(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Array, high: Array) -> Array:
+    """The same with limits: each one-sided row has a slack of its own."""
+    n, m = len(posture), len(least)
+    matrix, right = _normal(rows, posture)
+    quadratic = RANK * np.eye(n + m)
+    quadratic[:n, :n] = matrix
+    sides = np.zeros((n + m, 2 * n + m))
+    sides[:n, :n], sides[:n, n : 2 * n] = np.eye(n), -np.eye(n)
+    for j, row in enumerate(least):
+        sides[:n, 2 * n + j], sides[n + j, 2 * n + j] = row.along / row.size, 1.0
+    bounds = np.concatenate([low, -high, [row.speed / row.size for row in least]])
+    found = quadprog.solve_qp(quadratic, np.concatenate([right, np.zeros(m)]), sides, bounds)[0][:n]
+    result: Array = np.clip(found, low, high)
+    return result
+
+
+def _normal(rows: Sequence[Row], posture: Array) -> tuple[Array, Array]:
+    """Matrix (n, n) and right side (n,) of the problem without limits."""
+    matrix, right = np.eye(len(posture)), posture
+    for along, speed in rows:
+        weighted = along * (RANK / along.dot(along))
+        matrix = matrix + np.outer(weighted, along)
+        right = right + speed * weighted
+    return matrix, right
+
+
+def linear(rows: Sequence[Array], n: int) -> tuple[Array, Array]:
+    """The solution without limits, v = M s + N p, for the guard: M (n, p) and N (n, n) of rows (n,)."""
+    used = [Row(row, 0.0) for row in rows]
+    kept = [row for row in used if row.size > FORCE.shortest_lever]
+    hold = inverse(_normal(kept, np.zeros(n))[0])
+    drive = [row.along * (RANK / row.size**2) if row.size > FORCE.shortest_lever else 0.0 * row.along for row in used]
+    return hold @ np.array(drive).T, hold
