@@ -114,9 +114,9 @@ class ForceMeasurement:
         self.restart()
 
     @property
-    def free(self) -> list[float]:
+    def free(self) -> Array:
         """Torques of the world on the joints (n,), N m, that count as those of a free arm: the tare and the zero."""
-        return list(map(add, self._tare, self._zero))
+        return self._tare + self._zero
 
     @property
     def resting(self) -> Array:
