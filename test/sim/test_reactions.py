@@ -38,9 +38,9 @@ STEPS = """
 - {name: brake, seconds: 0.2, request: disable}
 """
 REFUSED = {
-    "along the arm": ("not_sensed", "standard deviation"),
+    "along the arm": ("refused", "may be off by"),
     "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
-    "one place twice": ("task_refused", "here they can do 1 at once"),
+    "one place twice": ("refused", "may be off by"),
 }
 
 

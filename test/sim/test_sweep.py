@@ -83,7 +83,7 @@ def test_the_error_is_the_same_in_every_frame_and_all_of_the_force_where_nothing
 
 def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path) -> None:
     found = pressed(tmp_path, "link", [20.0, 0.0, 0.0])
-    assert found.failure.startswith("20 N in link refused: the force is measured with a standard deviation of inf N")
+    assert found.failure.startswith("20 N in link refused: 20 N at 0.914 m of link may be off by inf N")
     assert math.isnan(found.force_rms)
 
 
@@ -116,7 +116,7 @@ steps:
   - {{name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}}
   - {{name: press, seconds: 2.0, {force}, {push}}}
 """)
-        configuration = Configuration.load(packaged("wam"))
+        configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 5.0})
         (point,) = points(configuration, load(file, configuration.shared), [], [()])
         found.append(outcome(point))
     alone, hidden = found
@@ -128,7 +128,7 @@ steps:
 
 
 @pytest.mark.slow
-def test_a_sweep_names_a_force_whose_position_was_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_names_a_force_that_is_uncertain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """35 N along base -z, 36 deg off the normal of the link, were 24 N, and the table had nothing but `force_worst`."""
     file = tmp_path / "inclined.yaml"
     file.write_text("""
@@ -138,7 +138,7 @@ steps:
   - {name: down, seconds: 4.0, posture: [0.0, -2.35, 0.0, 1.3], until_force: 1.5}
   - {name: press, seconds: 3.0, force: {frame: base, newtons: [0.0, 0.0, -35.0]}}
 """)
-    configuration = Configuration.load(packaged("wam"))
+    configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 9.0})
     run = Simulation(configuration, load(file, configuration.shared))
     assert run.play() == run.unmet == ""
     assert run.doubts.startswith("press, position_assumed: something is touched and where it is known from the torques")
@@ -162,7 +162,7 @@ def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) ->
         assert not run.play()
         found.append(run.unmet)
     assert not found[0]
-    assert found[1].startswith("press refused: the force is measured with a standard deviation of inf N")
+    assert found[1].startswith("press refused: 20 N at 0.914 m of link may be off by inf N")
     assert [one.step.name for one in run.played] == ["release", "press"]
 
 
@@ -189,24 +189,6 @@ def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
     found = outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure
     assert found.startswith(failure)
     assert bool(found) == bool(failure)
-
-
-@pytest.mark.slow
-def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> None:
-    """From where a task leaves the arm, which nobody knows before."""
-    file = tmp_path / "late.yaml"
-    file.write_text("""steps:
-- {name: release, seconds: 0.1, request: enable}
-- {name: task, seconds: 0.1, task: {axes: [{position: here, joint: joint3}]}}
-- {name: turn, seconds: SECONDS, posture: [0.4, -1.2, 0.0, 1.2]}
-""")
-    configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": [0.0, -1.2, 0.0, 1.2]})
-    text, found = file.read_text(), []
-    for seconds in (0.3, 0.42):
-        file.write_text(text.replace("SECONDS", str(seconds)))
-        found.append(outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure)
-    assert found[0].startswith("turn not reached: the commanded posture moves faster than the arm follows, joint1 ")
-    assert not found[1]
 
 
 @pytest.mark.slow

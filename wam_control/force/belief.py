@@ -160,8 +160,10 @@ def belief(
         # the acceleration is the mean of a period
         force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
     errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, reach_time)
+    if sensed.force_sd == math.inf:
+        return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
     sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)
     chi2 = 0.0
-    if desired and sd < math.inf:  # friction and position are known per force
+    if desired:  # friction and position are known per force
         chi2 = sensed.unexplained(torques.now) / max(1.0, force / desired) ** 2
     return Belief(force, before, sd, chi2, errors, tolerance(size, own))

@@ -305,8 +305,6 @@ class ForceLoop:
         covers = {axis.place.cover for axis in axes if axis.place}
         probable = contact.probability >= own.link_probability_limit
         touched = contact.cover if probable and contact.cover not in covers else ""
-        if contact.cover and not contact.is_single and len(covers) == 1:
-            touched = contact.cover
         for axis, one, belief in zip(axes, run.axes, known, strict=True):
             if not (axis.is_force and axis.desired):
                 continue
