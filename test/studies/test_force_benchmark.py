@@ -24,7 +24,9 @@ from wam_studies.harness import chosen_cases
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
 Q = (0.0, -1.0, 0.0, 0.8)
 ACROSS = Surface("outer_link", 0.3, (0.0, 0.0, -1.0), 4000.0, 0.3, is_plane=False)
-REPORTED = warning(Code.NOT_REACHED, "force_strays", desired=10.0, allowed=1.0)
+REPORTED = warning(
+    Code.NOT_REACHED, "force_strays", axis="force", unit="N", measured=8.0, desired=10.0, allowed=1.0
+)
 TASK = Task(Q, ACROSS, 10.0)
 
 
