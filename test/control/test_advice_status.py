@@ -20,7 +20,7 @@ def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     seen: list[Event] = []
     run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    refused = [event for event in seen if event.code is Code.NOT_SENSED]
+    refused = [event for event in seen if event.code is Code.REFUSED]
     assert "ways" not in refused[0].values, "at once"
     assert str(refused[-1].values["ways"]).startswith("turn joint")
 

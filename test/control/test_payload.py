@@ -95,7 +95,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
     )
     reasons, node = [], run.nodes["force_loop"]
     while not run.step():
-        reasons.append(sentence(node.reaction))
+        reasons.append(sentence(node.event))
     assert "the force is known to +-0.9" in reasons[-500]
 
 
@@ -167,8 +167,8 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
     run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
     loop, reasons = run.nodes["force_loop"], [""]
     while not run.step():
-        if sentence(loop.reaction) != reasons[-1] and loop.reaction.code is not Code.NOT_FOLLOWED:
-            reasons.append(sentence(loop.reaction))
+        if sentence(loop.event) != reasons[-1] and loop.event.code is not Code.AT_LIMIT:
+            reasons.append(sentence(loop.event))
     assert "it comes to rest first" in reasons[1]
     assert expected in reasons[2]
     assert bool(reasons[2]) is bool(expected)

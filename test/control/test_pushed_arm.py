@@ -53,8 +53,8 @@ def pushed(
                 mujoco.mj_contactForce(model, data, i, wrench)
                 peak = max(peak, abs(float(wrench[0])))
         if periods > 1e3 * (RANGES.release + 2.0):
-            found.add(loop.reaction.code)
-            reason = sentence(loop.reaction) or reason
+            found.add(loop.event.code)
+            reason = sentence(loop.event) or reason
     return peak, found, reason
 
 
@@ -68,7 +68,7 @@ def test_a_rod_that_comes_from_the_side_to_an_arm_that_presses_is_given_way_to(
     """8 N are pressed, 12 N are allowed; at a position that is not known, where it takes the least force for them."""
     peak, reactions, _ = pushed(press(8.0, 3.5), cover, place, pinned)
     assert peak < most
-    assert Code.CONTACT_FORCE in reactions
+    assert Code.PUSHED in reactions
     peak, _, _ = pushed(press(8.0, 3.5), cover, place, pinned, **UNBOUND)
     assert peak > before
 
@@ -77,7 +77,7 @@ def test_an_arm_without_a_command_gives_way_above_the_largest_contact_force() ->
     step = ScenarioStep("rest", 3.5)
     peak, reactions, reason = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 20.0})
     assert peak < 30.0
-    assert Code.CONTACT_FORCE in reactions
+    assert Code.PUSHED in reactions
     assert "gives way by limits.free_travel" in reason
     peak, _, _ = pushed(step, OUTER, 0.35, **{"force_loop:limits.contact_force": 1e6})
     assert peak > 100.0

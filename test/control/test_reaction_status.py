@@ -25,13 +25,13 @@ def named(code: Code, joint: str) -> Event:
 
 
 def test_a_command_that_is_not_reached_comes_before_what_is_less_serious() -> None:
-    late, uncertain = named(Code.NOT_REACHED, "joint4"), named(Code.UNCERTAIN, "joint3")
-    end, push = named(Code.JOINT_END, "joint4"), named(Code.CONTACT_FORCE, "")
+    late, uncertain = named(Code.NOT_REACHED, "joint4"), named(Code.REFUSED, "joint3")
+    end, push = named(Code.AT_LIMIT, "joint4"), named(Code.PUSHED, "")
     found = [OBEYED, uncertain, end, late, named(Code.NOT_REACHED, "joint1")]
     assert list(by_seriousness(found).values()) == [late, uncertain, end]
-    assert next(iter(by_seriousness([*found, push]))) is Code.CONTACT_FORCE
-    blind = named(Code.NOT_SENSED, "")
-    assert by_seriousness([*found, push, blind]) == {Code.NOT_SENSED: blind}
+    assert next(iter(by_seriousness([*found, push]))) is Code.PUSHED
+    blind = named(Code.REFUSED, "")
+    assert by_seriousness([*found, push, blind]) == {Code.REFUSED: blind}
     assert by_seriousness([OBEYED]) == {}
 
 
@@ -83,15 +83,15 @@ def test_a_message_that_is_refused_before_the_node_has_it_is_an_event_of_its_sta
 
 
 def test_what_is_reported_at_the_same_time_has_times_of_its_own() -> None:
-    end, late = named(Code.JOINT_END, "joint1"), named(Code.NOT_REACHED, "joint1")
+    end, late = named(Code.AT_LIMIT, "joint1"), named(Code.NOT_REACHED, "joint1")
     more, other = end.with_values(angle=1.0), late.with_values(ways="turn joint4")
     found = lasting([(0, ()), (1, (end,)), (2, (late, more)), (4, (other,)), (6, ())], 9)
     assert sorted(found, key=lambda one: one.begin) == [RecordedReaction(1, 4, more), RecordedReaction(2, 6, other)]
 
 
 def test_what_holds_for_another_reason_is_another_reaction() -> None:
-    fast = warning(Code.NOT_SENSED, "moved_fast", speed=0.3)
-    loaded, also = (warning(Code.NOT_SENSED, "loaded", force=force) for force in (-2.9, -3.1))
+    fast = warning(Code.REFUSED, "moved_fast", speed=0.3)
+    loaded, also = (warning(Code.REFUSED, "loaded", force=force) for force in (-2.9, -3.1))
     found = lasting([(0, (fast,)), (2, (loaded,)), (4, (also,))], 9)
     assert found == [RecordedReaction(0, 2, fast), RecordedReaction(2, 9, loaded)]
 
@@ -102,15 +102,15 @@ def test_a_command_is_not_met_that_is_refused_or_in_the_end_not_reached() -> Non
     late = RecordedReaction(2 * SECOND, 4 * SECOND, Event(Code.NOT_REACHED))
     taken = RecordedReaction(0, 4 * SECOND, denied)
     seen_late, seen_refused = (one._replace(begin=3 * SECOND) for one in (late, taken))
-    assert unmet([late, late._replace(event=Event(Code.UNCERTAIN))], step) == [seen_late]
+    assert unmet([late, late._replace(event=Event(Code.REFUSED))], step) == [seen_late]
     assert not unmet([late._replace(end=3_500_000_000)], step)
     assert unmet([late, taken], step) == [seen_refused, seen_late]
-    assert not unmet([taken._replace(end=2 * SECOND), late._replace(event=Event(Code.JOINT_END))], step)
+    assert not unmet([taken._replace(end=2 * SECOND), late._replace(event=Event(Code.AT_LIMIT))], step)
 
 
 def test_a_command_is_not_met_with_more_force_than_allowed_in_all_of_its_steady_state() -> None:
     step = RecordedStep("press", 0, 4 * SECOND, {})
-    hard = RecordedReaction(SECOND, 4 * SECOND, Event(Code.CONTACT_FORCE))
+    hard = RecordedReaction(SECOND, 4 * SECOND, Event(Code.PUSHED))
     seen = hard._replace(begin=3 * SECOND)
     assert unmet([hard], step) == [seen]
     assert seen.outcome == "with too much force"

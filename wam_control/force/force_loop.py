@@ -214,8 +214,9 @@ class ForceLoop:
         is_free, contact = contact is not None and not contact.cover, contact or NO_CONTACT
         is_touched = bool(contact.cover) or self._run.is_touching
         self._measurement.step(own, joints, sensors, external, external_sd, is_touched, dt)
-        if task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
-            self._admission.restart(q)
+        has_task = isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand
+        if (has_task and task is None) or (self._run.key == "joints" and torque is None):
+            self._admission.restart(q)  # the arm stays where it is
         commands = self._admission.step(own, q, command, posture, torque, dt, task)
         self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
         self.refusals = commands.refusals

@@ -290,7 +290,7 @@ class MotionWatch:
         if abs(rate) > fastest:
             return warning(Code.AT_LIMIT, "speed", axis=name, unit=unit, speed=abs(rate), allowed=fastest)
         # behind by the time constant of its law while it moves, and by as much as an arm at rest may be
-        allowed = MOTION.arrived + abs(speed) / gain + abs(goal - self._ideal) * FORCE.quarter
+        allowed = MOTION.arrived + (abs(speed) / gain if gain else 0.0) + abs(goal - self._ideal) * FORCE.quarter
         if not self._late.step(abs(at - self._ideal) > allowed, lasting, lasting, dt):
             return None
         return warning(
