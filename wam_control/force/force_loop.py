@@ -376,7 +376,8 @@ class ForceLoop:
                 wanted = self._slowed(axes, rows, wanted)
         least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
         low, high = joint_bounds(self._q, self._body.arm.joints, own)
-        if own.limits.joint_acceleration and self._pushed.event is None:
+        is_yielding = self._pushed.event is not None or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
+        if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
             low, high = accelerated(low, high, self._velocity, own.limits.joint_acceleration * dt)
         velocity, unlimited = solve(rows, wanted, least, low, high)
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
@@ -438,9 +439,9 @@ class ForceLoop:
             band = own.task.joint_deadband if axis.is_joint else own.task.deadband
             if not axis.is_joint and known.force < -band:
                 one.side = -one.side  # an impedance may be pushed from either side
-            drive = axis.of.stiffness * (goal - axis.at) - known.force
+            drive = axis.of.stiffness * (axis.side * goal - axis.at) - known.force
             yielding = math.copysign(max(abs(drive) - band, 0.0), drive)
-            speed = axis.of.rate + yielding / own.task.damping(axis.of)
+            speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
     def _force_speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
@@ -698,7 +699,8 @@ def _output(
 
 def _row(axis: Axis, known: Belief, anchor: float) -> AxisRow:
     commanded = axis.desired if axis.is_force else anchor if axis.of.value is None else axis.of.value
-    measured = known.force if axis.of.is_sensed else axis.at
+    sign = 1.0 if axis.is_force else axis.side
+    measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
     return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
 
