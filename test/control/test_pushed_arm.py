@@ -10,7 +10,8 @@ from arms import CONFIGURATION
 from test_force_lasting import BODY, DIRECTION, OUTER, POSE, press
 
 from wam_control.task.scenario import ScenarioStep
-from wam_description.event import Code
+from wam_description.event import Code, Level
+from wam_description.signals import NodeStatus
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import RANGES, triple
@@ -42,7 +43,8 @@ def pushed(
     }
     configuration = with_accepted_gain(CONFIGURATION.with_values(given))
     run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
-    model, data, loop = run.driver.plant.model, run.driver.plant.data, run.nodes["force_loop"]
+    model, data, present = run.driver.plant.model, run.driver.plant.data, [NodeStatus(Level.OK, "")]
+    run.listen("status", lambda _, status: present.append(status), "force_loop")
     geom, wrench, peak, periods = model.geom(NAMES[1]).id, np.zeros(6), 0.0, 0
     found = set[Code]()
     while not run.step():
@@ -52,7 +54,7 @@ def pushed(
                 mujoco.mj_contactForce(model, data, i, wrench)
                 peak = max(peak, abs(float(wrench[0])))
         if periods > 1e3 * (RANGES.release + 2.0):
-            found |= {event.code for event in loop.events}
+            found |= {event.code for event in present[-1].events}
     return peak, found
 
 

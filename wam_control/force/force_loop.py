@@ -92,7 +92,7 @@ class ForceLoop:
         self.refused, self.refusals = 0, dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self._take(servo, parameters)
-        self._begin(None, None)
+        self._run = CommandRun(None, None, arm, timing, np.zeros(len(self._velocity)), False)
 
     def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
         arm = self._body.arm
@@ -262,7 +262,8 @@ class ForceLoop:
                 measurement.zero(limit)
             resting = measurement.resting
         is_moving = task is not None and bool(limit) and FORCE.fast < measurement.speed < math.inf
-        self._run = CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
+        before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
+        self._run.go_on(before)
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[Axis]:
         """The axes of what is commanded, each at its place."""
