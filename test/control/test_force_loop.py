@@ -144,7 +144,9 @@ def test_saturation_limits_the_commanded_speed_exactly(commanded: float, used: f
     assert out.error == pytest.approx(down(commanded), rel=1e-7)
     assert out.limited == pytest.approx(down(used), rel=1e-7)
     free = replace(OWN, force_error_limit=(1e9,), joint_speed_limit=1e9)
-    assert lever(POSE) @ ask(force_loop(ARM, free), World(), commanded).velocity == pytest.approx(GAIN * commanded, rel=1e-7)
+    assert lever(POSE) @ ask(force_loop(ARM, free), World(), commanded).velocity == pytest.approx(
+        GAIN * commanded, rel=1e-7
+    )
 
 
 def test_the_filter_is_a_first_order_lag_that_starts_at_what_is_measured() -> None:
@@ -196,7 +198,9 @@ def test_a_share_of_the_dry_friction_is_fed_forward_along_the_commanded_motion(s
     dithered = replace(own, feedback="contact_estimate")
     assert not any(ask(force_loop(ARM, dithered), World(), 8.0, external=STILL).effort)
     none = replace(OWN, friction_feedforward=0.0)
-    assert not any(ask(force_loop(ARM, none), World(force=2.0), 8.0).effort), "a free arm would be thrown at the surface"
+    assert not any(ask(force_loop(ARM, none), World(force=2.0), 8.0).effort), (
+        "a free arm would be thrown at the surface"
+    )
 
 
 # --- posture
@@ -228,7 +232,9 @@ def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
     assert world.q == pytest.approx(posture, abs=1e-3)
     assert np.max(np.abs(speeds)) == pytest.approx(GIVEN.joint_speed_limit)
     assert np.abs(np.diff(speeds, axis=0)).max() < 1.001 * GIVEN.limits.joint_acceleration * DT
-    assert np.abs(ask(force_loop(ARM, OWN), World(1e-9), posture=posture).velocity).max() > 1.0, "without the limit it jumps"
+    assert np.abs(ask(force_loop(ARM, OWN), World(1e-9), posture=posture).velocity).max() > 1.0, (
+        "without the limit it jumps"
+    )
 
 
 def test_zero_force_releases_the_axis() -> None:
@@ -306,7 +312,7 @@ def reported(torques: np.ndarray, taken: np.ndarray, sd: float = 0.015, **limits
     own = replace(limited(settling_time=LATE * DT, **limits), mode="joint_torque")
     loop, found = force_loop(ARM, replace(own, sensing=replace(OWN.sensing, torque_sd=sd))), []
     for torque, external in zip(torques.tolist(), taken.tolist(), strict=True):
-        sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) + [0.0, external, 0.0, 0.0]).tolist())
+        sensors = State(POSE, STILL, np.add(BODY.gravity_torque(POSE), (0.0, external, 0.0, 0.0)).tolist())
         ask(loop, World(1e-9), sensors=sensors, torque=[0.0, torque, 0.0, 0.0])
         found.append({event.code for event in loop.events})
     return found
