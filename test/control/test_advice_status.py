@@ -4,7 +4,7 @@ import pytest
 
 from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
-from wam_description.event import CAUSE, Code, Event
+from wam_description.event import Code, Event
 from wam_description.event_text import sentence
 from wam_description.signals import BASE, ForceCommand
 from wam_sim.simulation import Simulation
@@ -20,9 +20,10 @@ def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     seen: list[Event] = []
     run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    refused = [event for event in seen if event.code is Code.NOT_SENSED]
-    assert "ways" not in refused[0].values, "at once"
-    assert str(refused[-1].values["ways"]).startswith("turn joint")
+    refused = [event for event in seen if event.code is Code.REFUSED]
+    assert "searched" not in refused[0].values, "at once"
+    assert refused[-1].values["searched"]
+    assert {"turn", "more_force", "pin"} & set(refused[-1].values)
 
 
 def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
@@ -50,6 +51,6 @@ def test_a_force_that_began_while_the_arm_moved_has_the_reason_of_the_arm_at_res
     seen: list[Event] = []
     run.listen("status", lambda _, status: seen.extend(status.events), "force_loop")
     assert run.play() == ""
-    causes = [event.values[CAUSE] for event in seen]
-    assert causes.index("moved_fast") < causes.index("loaded")
-    assert run.unmet.startswith("press refused: the arm at rest already measures")
+    reasons = [(event.cause, event.values.get("part")) for event in seen]
+    assert reasons.index(("moved_fast", None)) < reasons.index(("error", "resting"))
+    assert run.unmet.startswith("press refused: ")

@@ -1,7 +1,7 @@
 """The outer loop on a world that is computed here: the arm follows its velocity command, springs push back."""
 
 import math
-import re
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +10,10 @@ import pytest
 
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
-from wam_control.force.torque_watch import TorqueWatch
 from wam_control.task.motion import GoalMotion
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.event import Code
-from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError, build, values
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
@@ -25,231 +23,164 @@ ARM = CONFIGURATION.shared.arm
 BODY = RigidBody(ARM)
 GAIN, LIMIT = 0.015, 20.0
 PACKAGED = CONFIGURATION.node("force_loop", ForceLoopParameters)
-GIVEN = replace(
-    PACKAGED,
-    sensing=replace(
-        PACKAGED.sensing,
-        torque_sd=0.1,
-        torque_fraction=0.0,
-        zero_limit=0.0,
-        force_sd_limit=1.5,
-        force_sd_fraction=0.15,
-        reported_fraction=0.1,
-    ),
-)
+GIVEN = replace(PACKAGED, guard=replace(PACKAGED.guard, mode="off"), sensing=replace(PACKAGED.sensing, zero_limit=0.0))
+FREE = replace(  # the law alone: no limit, no doubt, no event
+    GIVEN.limits, joint_gain=0.0, joint_acceleration=0.0, contact_force=1e9, whole_force=1e9, impact=0.0,
+    settling_time=1e9, free_travel=1e9, doubt=1e9,
+)  # fmt: skip
 OWN = replace(
     GIVEN,
-    guard=replace(GIVEN.guard, mode="off"),
-    sensing=replace(GIVEN.sensing, force_sd_limit=1e9, apparent_mass_limit=0.0),
-    limits=replace(GIVEN.limits, joint_gain=0.0, contact_force=1e9, impact=0.0, settling_time=1e9, free_travel=1e9),
+    sensing=replace(GIVEN.sensing, apparent_mass_limit=0.0),
+    limits=FREE,
     force_gain=(GAIN,),
     force_error_limit=(LIMIT,),
     force_limit=1e3,
     torque_limit=1e3,
     torque_gain=(0.02,),
     force_filter=0.0,
-    blend_time=0.0,
 )
 COVER, PLACE = OWN.contact_cover, OWN.contact_position
 POSE = [0.3, -1.2, 0.2, 1.0]
+MOVED = [angle + 0.05 for angle in POSE]
 DOWN = (0.0, 0.0, -1.0)
 DT = 5e-3
 STILL = [0.0] * 4
 DRIVEN = [1.0] * 4  # N m: the motors give torque
+TOUCH = Contact(COVER, PLACE, (0.0, 1.0, 0.0))
 
 
 def force_loop(arm: Arm, own: ForceLoopParameters) -> ForceLoop:
     return ForceLoop(arm, CONFIGURATION.shared.servo, own, CONFIGURATION.shared.timing)
 
 
+def limited(**limits: Any) -> ForceLoopParameters:
+    """The parameters with some limits."""
+    return replace(OWN, limits=replace(FREE, **limits))
+
+
 def lever(q: list[float], n: Any = DOWN, cover: str = COVER, place: float = PLACE) -> np.ndarray:
     """Joint torques per newton along n at a point, from finite differences of where the point is."""
-    h = 1e-6
-    columns = []
-    for i in range(4):
-        more, less = list(q), list(q)
-        more[i] += h
-        less[i] -= h
-        point = (place, *ARM.covers.aside(cover, place))
-        columns.append((BODY.point(more, cover, point) - BODY.point(less, cover, point)) / (2 * h))
-    return np.array(n) @ np.array(columns).T
+    point, h = (place, *ARM.covers.aside(cover, place)), 1e-6 * np.eye(4)
+    columns = [(BODY.point(q + d, cover, point) - BODY.point(q - d, cover, point)) / 2e-6 for d in h]
+    return np.array(columns) @ np.array(n)
 
 
 class World:
-    """Arm with ideal velocity servos in front of a spring of stiffness k, N/m, along n, base frame."""
+    """Arm with ideal velocity servos in front of a spring of stiffness k, N/m, along DOWN."""
 
-    def __init__(self, stiffness: float, n: Any = DOWN, q: list[float] = POSE, force: float = 0.0) -> None:
-        self.stiffness, self.n, self.q = stiffness, np.array(n), list(q)
-        self._surface = self.n @ BODY.point(self.q, COVER, (PLACE, 0, 0)) - force / stiffness
+    def __init__(self, stiffness: float = 400.0, force: float = 0.0, q: list[float] = POSE) -> None:
+        self.stiffness, self.q, self.velocity = stiffness, list(q), STILL
+        self._surface = self._height - force / stiffness
+
+    @property
+    def _height(self) -> float:
+        return float(np.array(DOWN) @ BODY.point(self.q, COVER, (PLACE, 0, 0)))
 
     @property
     def force(self) -> float:
-        """Force of the arm on the world along n, N."""
-        return float(self.stiffness * (self.n @ BODY.point(self.q, COVER, (PLACE, 0, 0)) - self._surface))
+        """Force of the arm on the world along DOWN, N; the spring pulls, too."""
+        return self.stiffness * (self._height - self._surface)
 
     @property
     def sensors(self) -> State:
-        strain = BODY.gravity_torque(self.q) + lever(self.q, self.n) * self.force
-        return State(self.q, STILL, strain.tolist())
+        return State(self.q, STILL, (BODY.gravity_torque(self.q) + lever(self.q) * self.force).tolist())
 
     @property
     def joints(self) -> State:
-        return State(list(self.q), STILL, DRIVEN)
+        return State(list(self.q), self.velocity, DRIVEN)
 
     def move(self, velocity: list[float], dt: float = DT) -> None:
         self.q = [a + b * dt for a, b in zip(self.q, velocity, strict=True)]
-
-
-def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) -> ForceOutput:
-    command = None if force is None else ForceCommand("base", tuple(float(f) for f in force))
-    given: dict[str, Any] = {"contact": NO_CONTACT, "external": None, "posture": None, "torque": None, **more}
-    return loop.step(
-        world.joints,
-        world.sensors,
-        given["contact"],
-        given["external"],
-        given.get("command", command),
-        given["posture"],
-        given["torque"],
-        dt,
-        external_sd=given.get("external_sd"),
-    )
 
 
 def down(newtons: float) -> tuple[float, float, float]:
     return (0.0, 0.0, -newtons)
 
 
+def ask(loop: ForceLoop, world: World, force: Any = None, dt: float = DT, **more: Any) -> ForceOutput:
+    """One period with a force, N, downwards if it is a number, and what else `ForceLoop.step` takes, by its names."""
+    x, y, z = down(force) if isinstance(force, float) else force or (0.0, 0.0, 0.0)
+    command = None if force is None else ForceCommand("base", (float(x), float(y), float(z)))
+    given = {"contact": NO_CONTACT, "external": None, "command": command, "posture": None, "torque": None, **more}
+    return loop.step(**{"joints": world.joints, "sensors": world.sensors, **given, "dt": dt})
+
+
+def moved(loop: ForceLoop, world: World, force: float | None = None, periods: int = 1, **more: Any) -> ForceOutput:
+    """Several periods in which the arm does what the loop commands."""
+    for _ in range(periods):
+        out = ask(loop, world, force, **more)
+        world.move(out.velocity)
+    return out
+
+
+# --- the law of the thesis
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [200.0, 800.0])
 def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) -> None:
-    loop, world, dt = force_loop(ARM, OWN), World(stiffness, force=1.0), 2e-4
+    loop, world, dt = force_loop(ARM, OWN), World(stiffness, force=1.0), 1e-3
     time_constant = 1.0 / (GAIN * stiffness)
     worst = 0.0
     for k in range(round(3.0 * time_constant / dt)):
-        expected = 8.0 - 7.0 * math.exp(-k * dt / time_constant)
-        worst = max(worst, abs(world.force - expected))
-        world.move(ask(loop, world, down(8.0), dt).velocity, dt)
+        worst = max(worst, abs(world.force - 8.0 + 7.0 * math.exp(-k * dt / time_constant)))
+        world.move(ask(loop, world, 8.0, dt).velocity, dt)
     assert worst < 0.01 * 7.0
-    assert world.force == pytest.approx(8.0 - 7.0 * math.exp(-3.0), rel=0.005)
 
 
-@pytest.mark.slow
 def test_force_converges_to_the_commanded_one() -> None:
-    loop, world = force_loop(ARM, replace(OWN, force_filter=0.02)), World(400.0)
+    loop, world = force_loop(ARM, replace(OWN, force_filter=0.02)), World()
     for newtons in (5.0, 10.0, 5.0):
-        for _ in range(600):
-            out = ask(loop, world, down(newtons))
-            world.move(out.velocity)
-        assert world.force == pytest.approx(newtons, abs=1e-4)
-        assert out.measured == pytest.approx(down(newtons), abs=1e-4)
-        assert out.error == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
+        out = moved(loop, world, newtons, 300)
+        assert world.force == pytest.approx(newtons, abs=1e-3)
+        assert out.measured == pytest.approx(down(newtons), abs=1e-3)
+        assert out.error == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
 
 
-@pytest.mark.parametrize(("commanded", "limited"), [(100.0, LIMIT), (-90.0, -LIMIT), (7.0, 7.0), (20.0, 20.0)])
-def test_saturation_limits_the_commanded_speed_exactly(commanded: float, limited: float) -> None:
-    out = ask(force_loop(ARM, OWN), World(400.0), down(commanded))
-    along = lever(POSE)
-    assert along @ out.velocity == pytest.approx(GAIN * limited, rel=1e-7)
+@pytest.mark.parametrize(("commanded", "used"), [(100.0, LIMIT), (-90.0, -LIMIT), (7.0, 7.0), (20.0, 20.0)])
+def test_saturation_limits_the_commanded_speed_exactly(commanded: float, used: float) -> None:
+    out = ask(force_loop(ARM, OWN), World(), commanded)
+    assert lever(POSE) @ out.velocity == pytest.approx(GAIN * used, rel=1e-7)
     assert out.error == pytest.approx(down(commanded), rel=1e-7)
-    assert out.limited == pytest.approx(down(limited), rel=1e-7)
+    assert out.limited == pytest.approx(down(used), rel=1e-7)
     free = replace(OWN, force_error_limit=(1e9,), joint_speed_limit=1e9)
-    unlimited = ask(force_loop(ARM, free), World(400.0), down(commanded))
-    assert along @ unlimited.velocity == pytest.approx(GAIN * commanded, rel=1e-7)
+    assert lever(POSE) @ ask(force_loop(ARM, free), World(), commanded).velocity == pytest.approx(
+        GAIN * commanded, rel=1e-7
+    )
 
 
-def test_a_short_lever_does_not_make_a_joint_race() -> None:
-    """Straight up, a force along the arm has hardly a lever on any joint: what is sensed there is the arm's inertia."""
-    upright = [0.0, -2e-3, 0.0, math.pi / 2 - 5e-3]
-    fastest = []
-    for mass in (2.0, 0.0):
-        sensing = replace(OWN.sensing, apparent_mass_limit=mass)
-        controller = force_loop(ARM, replace(OWN, contact_position=0.4, joint_speed_limit=1e9, sensing=sensing))
-        state = State(upright, [0.0] * 4, DRIVEN)
-        sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
-        press = ForceCommand("base", (0.0, 0.0, 20.0))
-        out = controller.step(state, sensed, NO_CONTACT, None, press, upright, None, 0.005)
-        fastest.append(max(map(abs, out.velocity)))
-    assert fastest[0] < 0.2
-    assert fastest[1] > 10.0 * OWN.joint_speed_limit, "without the limit of the apparent mass"
-
-
-def test_posture_moves_nothing_along_the_force() -> None:
-    along = lever(POSE)
-    for posture in (POSE, [0.5, -1.0, 0.0, 1.2], [-2.0, 1.0, 1.0, -1.0]):
-        out = ask(force_loop(ARM, OWN), World(400.0), down(6.0), posture=posture)
-        assert along @ out.velocity == pytest.approx(GAIN * 6.0, rel=1e-7)
-
-
-@pytest.mark.slow
-def test_posture_is_reached_in_the_complement_of_the_force() -> None:
-    posture = [0.35, -1.15, 0.25, 1.1]
-    loop, world = force_loop(ARM, OWN), World(400.0)
-    for _ in range(1500):
-        world.move(ask(loop, world, down(6.0), posture=posture).velocity)
-    assert world.force == pytest.approx(6.0, abs=1e-3)
-    missing = np.subtract(posture, world.q)
-    along = lever(world.q)
-    along /= np.linalg.norm(along)
-    assert np.linalg.norm(missing) > 0.01, "the force has moved the arm off the posture"
-    assert np.linalg.norm(missing - along * (along @ missing)) < 1e-4, "the lever has turned a little on the way"
-
-
-def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
-    loop, world = force_loop(ARM, OWN), World(1e-9)
-    posture = [0.3, -0.2, 0.2, 1.3]
-    speeds = []
-    for _ in range(600):
-        velocity = ask(loop, world, None, posture=posture).velocity
-        speeds.append(max(map(abs, velocity)))
-        world.move(velocity)
-    assert world.q == pytest.approx(posture, abs=1e-6)
-    assert max(speeds) == OWN.joint_speed_limit
-
-
-def test_zero_force_releases_the_axis() -> None:
-    posture = [0.3, -1.1, 0.2, 1.0]
-    outs = [
-        ask(force_loop(ARM, OWN), World(400.0, force=3.0), force, posture=posture)
-        for force in ((0.0, 0.0, 0.0), None, down(3.0))
-    ]
-    released, none, pressing = outs
-    assert released == none
-    assert released.velocity == pytest.approx([OWN.posture_gain * (a - b) for a, b in zip(posture, POSE, strict=True)])
-    assert released.effort == [0.0] * 4
-    assert pressing.velocity != pytest.approx(released.velocity)
-
-
-def test_no_motion_is_commanded_at_the_start() -> None:
-    assert ask(force_loop(ARM, OWN), World(400.0), None).velocity == [0.0] * 4
-    out = ask(force_loop(ARM, OWN), World(400.0, force=4.0), down(4.0))
-    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9), "the filter starts at what is measured"
-    slow = force_loop(ARM, replace(OWN, force_filter=10.0))
-    assert ask(slow, World(400.0, force=4.0), down(4.0)).measured == pytest.approx(down(4.0), rel=1e-6)
-
-
-def test_the_filter_is_a_first_order_lag() -> None:
+def test_the_filter_is_a_first_order_lag_that_starts_at_what_is_measured() -> None:
     loop = force_loop(ARM, replace(OWN, force_filter=0.1))
-    ask(loop, World(400.0, force=0.0), down(1.0), dt=1e-3)
+    assert ask(loop, World(force=2.0), 1.0, dt=1e-3).measured == pytest.approx(down(2.0), abs=1e-6)
     for _ in range(100):
-        out = ask(loop, World(400.0, force=4.0), down(1.0), dt=1e-3)
-    assert -out.measured[2] == pytest.approx(4.0 * (1.0 - math.exp(-1.0)), rel=0.01)
+        out = ask(loop, World(force=4.0), 1.0, dt=1e-3)
+    assert -out.measured[2] == pytest.approx(4.0 - 2.0 * math.exp(-1.0), rel=0.01)
 
 
 def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> None:
-    loop, force = force_loop(ARM, replace(OWN, mode="open_loop")), np.array([2.0, -3.0, 6.0])
+    loop, force = force_loop(ARM, replace(OWN, mode="open_loop")), (2.0, -3.0, 6.0)
     for feeling in (0.0, 5.0):
-        out = ask(loop, World(400.0, force=feeling), force)
+        out = ask(loop, World(force=feeling), command=ForceCommand("base", force))
         assert out.velocity == []
-        expected = sum(component * lever(POSE, axis) for component, axis in zip(force, np.eye(3), strict=True))
-        assert out.effort == pytest.approx(expected, abs=1e-6)
-    assert ask(loop, World(400.0), None).velocity == []
+        assert out.effort == pytest.approx(lever(POSE, force), abs=1e-6)
+    assert ask(loop, World()).velocity == []
 
 
-def test_the_feedback_loop_feeds_no_torque_of_the_force_forward() -> None:
-    """On a free arm the velocity loop would have to take it back, and until then it throws the arm at the surface."""
-    own = replace(OWN, friction_feedforward=0.0)
-    assert not any(ask(force_loop(ARM, own), World(400.0, force=2.0), (1.0, 2.0, 3.0)).effort)
+def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque", friction_feedforward=0.0))
+    stiffness, commanded = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
+    world = World(1e-9)
+    for _ in range(2000):
+        taken = stiffness * np.subtract(world.q, POSE)
+        sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) + taken).tolist())
+        out = moved(loop, world, sensors=sensors, torque=commanded)
+        assert out.effort == STILL, "nothing is fed forward: on a free arm it would be a throw"
+    assert taken == pytest.approx(commanded, abs=0.02)
+    assert loop.event.code is Code.NONE
+    assert ask(loop, world).velocity == STILL, "where the torque ends, the arm stays"
+    out = ask(force_loop(ARM, loop.parameters), World(1e-9), torque=[100.0, -100.0, 1.0, 0.0])
+    (limit,), (gain,) = OWN.torque_error_limit, OWN.torque_gain
+    assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.7, 0.3])
@@ -258,469 +189,487 @@ def test_a_share_of_the_dry_friction_is_fed_forward_along_the_commanded_motion(s
     own = replace(OWN, friction_feedforward=share, posture_gain=0.0)
     ratio = np.linalg.inv(np.reshape(ARM.joint_from_motor, (4, 4)))
     for commanded in (8.0, -8.0):
-        out = ask(force_loop(ARM, own), World(400.0), down(commanded))
+        out = ask(force_loop(ARM, own), World(), commanded)
         velocity = np.array(out.velocity)
         motors = ratio.T @ (np.array(ARM.motors.dynamic_friction) * np.tanh(ratio @ velocity / 0.04))
         joints = np.array(ARM.joints.dynamic_friction) * np.tanh(velocity / 0.002)
         assert out.effort == pytest.approx(share * (motors + joints))
         assert np.abs(out.effort).max() > 0.5, "N m"
     dithered = replace(own, feedback="contact_estimate")
-    assert not any(ask(force_loop(ARM, dithered), World(400.0), down(8.0), external=STILL).effort)
-
-
-@pytest.mark.slow
-def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
-    stiffness, commanded = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
-    world = World(1e-9)
-    for _ in range(4000):
-        external = -stiffness * np.subtract(world.q, POSE)
-        sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) - external).tolist())
-        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, None, commanded, DT)
-        assert out.effort == STILL, "nothing is fed forward: on a free arm it would be a throw"
-        world.move(out.velocity)
-    assert stiffness * np.subtract(world.q, POSE) == pytest.approx(commanded, rel=1e-3)
-    assert loop.reaction.code is Code.NONE
-
-
-LATE = 200  # periods of the settling time
-WATCHING = replace(OWN, mode="joint_torque", limits=replace(OWN.limits, settling_time=LATE * DT))
-
-
-def reactions(torques: list[float], taken: list[float], sd: float = 0.0) -> list[Code]:
-    """Of a joint in each period, while its commanded and measured torque, N m, are these."""
-    watch, sensing = TorqueWatch("joint2"), replace(OWN.sensing, reported_fraction=0.1)
-    own = replace(WATCHING, sensing=sensing)
-    return [watch.step(a, b, sd, own, DT)[0] for a, b in zip(torques, taken, strict=True)]
-
-
-@pytest.mark.parametrize("taken", [0.0, 1.5])
-def test_a_joint_torque_that_is_not_reached_is_reported_in_time(taken: float) -> None:
-    loop = force_loop(ARM, WATCHING)
-    external = [0.0, taken, 0.0, 0.0]
-    sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - external).tolist())
-    for period in range(LATE + 3):
-        loop.step(World(1e-9).joints, sensors, NO_CONTACT, None, None, None, [0.0, -1.0, 0.0, 0.0], DT)
-        assert period > LATE - 2 or loop.reaction.code is Code.NONE
-    assert loop.reaction.code is Code.NOT_REACHED
-    assert f"joint2: {-taken + 0.0:.2g} N m are measured and -1 N m commanded; the torque has been off" in sentence(
-        loop.reaction
+    assert not any(ask(force_loop(ARM, dithered), World(), 8.0, external=STILL).effort)
+    none = replace(OWN, friction_feedforward=0.0)
+    assert not any(ask(force_loop(ARM, none), World(force=2.0), 8.0).effort), (
+        "a free arm would be thrown at the surface"
     )
 
 
-def test_a_joint_torque_that_is_not_reached_is_reported_next_to_one_that_is_uncertain_and_a_joint_at_its_end() -> None:
-    sensing = replace(OWN.sensing, torque_sd=0.04)
-    limits = replace(WATCHING.limits, joint_gain=PACKAGED.limits.joint_gain)
-    loop = force_loop(ARM, replace(WATCHING, sensing=sensing, limits=limits))
-    pose = [*POSE[:3], ARM.joints.upper[3] - limits.joint_margin]
-    sensors = State(pose, STILL, (BODY.gravity_torque(pose) - np.array([0.0, 0.0, -0.3, 0.0])).tolist())
-    for _ in range(LATE + 3):
-        loop.step(State(pose, STILL, DRIVEN), sensors, NO_CONTACT, None, None, None, [0.0, 0.0, 0.3, 2.0], DT)
-    assert list(loop.reactions) == [
-        Code.NOT_REACHED,
-        Code.UNCERTAIN,
-        Code.JOINT_END,
-    ]
-    assert loop.reaction == next(iter(loop.reactions.values()))
-    who = [event.values.get("joint", event.values.get("axis")) for event in loop.reactions.values()]
-    assert who == ["joint4", "joint3", "joint4"]
+# --- posture
 
 
-TIME = np.arange(0.0, 12.0, DT)
+def test_posture_moves_nothing_along_the_force() -> None:
+    for posture in (POSE, [0.5, -1.0, 0.0, 1.2], [-2.0, 1.0, 1.0, -1.0]):
+        out = ask(force_loop(ARM, OWN), World(), 6.0, posture=posture)
+        assert lever(POSE) @ out.velocity == pytest.approx(GAIN * 6.0, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("torques", "taken"),
-    [
-        (2.0 + 0.0 * TIME, 0.0 * TIME),
-        (np.where(TIME % 2.0 < 1.0, 2.0, 1.5), 0.0 * TIME),
-        (4.0 * np.sin(2.0 * math.pi * 0.3 * TIME), 0.0 * TIME),
-        (np.minimum(0.4 * TIME, 4.0), 0.0 * TIME),
-        (2.0 + 0.0 * TIME, 0.3 * np.random.default_rng(1).normal(size=len(TIME))),
-        (1.5 + 0.0 * TIME, 1.5 + 1.8 * np.sin(2.0 * math.pi * 0.7 * TIME)),  # a limit cycle
-        (0.0 * TIME, 3.0 + 0.0 * TIME),  # a push on a joint that is to give way
-    ],
-)
-def test_a_joint_torque_that_is_not_taken_is_reported_whatever_the_command_does(
-    torques: np.ndarray, taken: np.ndarray
-) -> None:
-    found = reactions(torques.tolist(), taken.tolist(), 0.02)
-    assert Code.NOT_REACHED not in found[: LATE - 2]
-    assert found[3 * LATE :] == [Code.NOT_REACHED] * (len(found) - 3 * LATE)
+def test_posture_is_reached_in_the_complement_of_the_force() -> None:
+    posture = [0.35, -1.15, 0.25, 1.1]
+    loop, world = force_loop(ARM, OWN), World()
+    moved(loop, world, 6.0, 600, posture=posture)
+    assert world.force == pytest.approx(6.0, abs=1e-3)
+    missing, along = np.subtract(posture, world.q), lever(world.q)
+    along /= np.linalg.norm(along)
+    assert np.linalg.norm(missing) > 0.01, "the force has moved the arm off the posture"
+    assert np.linalg.norm(missing - along * (along @ missing)) < 1e-3, "the lever has turned a little on the way"
 
 
-def test_a_joint_torque_that_is_right_is_not_reported_and_no_more_once_it_is() -> None:
-    varying = 2.0 + 0.5 * np.sin(2.0 * math.pi * 0.5 * TIME)
-    noisy = varying + 0.1 * np.random.default_rng(2).normal(size=len(TIME))
-    assert set(reactions(varying.tolist(), noisy.tolist(), 0.05)) == {Code.NONE}
-    later = np.where(np.arange(len(TIME)) < 2 * LATE, 0.0, 2.0)
-    found = reactions([2.0] * len(TIME), later.tolist(), 0.02)
-    back = 2 * LATE + LATE // 4
-    assert found[2 * LATE] is Code.NOT_REACHED
-    assert set(found[back:]) == {Code.NONE}
+def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
+    loop, world = force_loop(ARM, GIVEN), World(1e-9)
+    posture, speeds = [0.3, -0.2, 0.2, 1.3], [STILL]
+    for _ in range(400):
+        speeds.append(moved(loop, world, posture=posture).velocity)
+        assert loop.event.code is Code.NONE
+    assert world.q == pytest.approx(posture, abs=1e-3)
+    assert np.max(np.abs(speeds)) == pytest.approx(GIVEN.joint_speed_limit)
+    assert np.abs(np.diff(speeds, axis=0)).max() < 1.001 * GIVEN.limits.joint_acceleration * DT
+    assert np.abs(ask(force_loop(ARM, OWN), World(1e-9), posture=posture).velocity).max() > 1.0, (
+        "without the limit it jumps"
+    )
 
 
-def test_a_joint_torque_that_is_not_known_well_enough_is_reported() -> None:
-    for torque, reaction in ((12.0, Code.NONE), (6.0, Code.UNCERTAIN)):
-        assert reactions([torque] * LATE, [torque] * LATE, 1.0)[-1] is reaction
+def test_zero_force_releases_the_axis() -> None:
+    zero, none, pressing = (ask(force_loop(ARM, OWN), World(force=3.0), f, posture=MOVED) for f in (0.0, None, 3.0))
+    assert zero == none
+    assert zero.velocity == pytest.approx([OWN.posture_gain * 0.05] * 4)
+    assert pressing.velocity != pytest.approx(zero.velocity)
+    assert ask(force_loop(ARM, OWN), World()).velocity == STILL, "without a command nothing moves"
 
 
-def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() -> None:
-    """Of 0.5 kg at the tool; the arm was elsewhere before, and had no contact."""
-    weight = BODY.tool_jacobian(POSE).T @ np.array([0.0, 0.0, -0.5 * 9.81])
-    loop = force_loop(ARM, replace(WATCHING, sensing=replace(OWN.sensing, zero_limit=0.5)))
-    sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - weight).tolist())
-    for torque in (None, [0.0, 0.0, 0.0, 2.0]):
-        for _ in range(LATE):
-            out = loop.step(World(1e-9).joints, sensors, NO_CONTACT, None, None, None, torque, DT)
-    assert loop.reaction.code is Code.NOT_SENSED
-    assert "as with 0.5 kg at the tool" in sentence(loop.reaction)
-    assert out.velocity == STILL
-
-
-def test_a_command_that_has_no_effect_in_a_mode_is_refused() -> None:
-    loop = force_loop(ARM, WATCHING)
-    moved = [angle + 0.05 for angle in POSE]
-    for given, refused in (
-        ({"posture": POSE, "torque": [1.0, 0.0, 0.0, 0.0]}, set()),
-        ({"posture": POSE}, set()),
-        ({"posture": moved}, {"joint_posture_command"}),
-        ({"posture": moved}, {"joint_posture_command"}),  # until it ends
-        ({}, set()),
-        ({"command": ForceCommand("base", down(5.0))}, {"force_command"}),
-        ({"command": ForceCommand("base", down(0.0))}, set()),
-    ):
-        ask(loop, World(400.0), None, **given)
-        assert set(loop.refusals) == refused
-    hybrid = force_loop(ARM, OWN)
-    ask(hybrid, World(400.0), None, torque=[1.0, 0.0, 0.0, 0.0], posture=moved)
-    why = "joint_torque_command has no effect in the mode hybrid; set force_loop:mode to joint_torque, or end the"
-    assert sentence(hybrid.refusals["joint_torque_command"]).startswith(why)
-
-
-MOVED = [angle + 0.05 for angle in POSE]
+def test_a_force_that_ends_leaves_the_arm_where_it_is() -> None:
+    """Not at the posture of old; and it is pulled back there."""
+    loop, world = force_loop(ARM, OWN), World()
+    moved(loop, world, 6.0, 100, posture=POSE)
+    for _ in range(2):
+        out = ask(loop, world, posture=MOVED)
+    assert out.velocity == pytest.approx(STILL, abs=1e-9)
+    assert not any(out.effort)
+    world.q = [angle + 0.01 for angle in world.q]
+    assert ask(loop, world, posture=MOVED).velocity == pytest.approx([-0.01 * OWN.posture_gain] * 4)
 
 
 @pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
 def test_a_posture_in_a_mode_that_follows_none_is_refused_if_the_arm_would_have_to_move(mode: str) -> None:
     for first in (POSE, MOVED):
-        loop = force_loop(ARM, replace(WATCHING, mode=mode))
-        ask(loop, World(400.0), None)
+        loop, world = force_loop(ARM, replace(OWN, mode=mode)), World()
+        ask(loop, world)
         for posture in (first, MOVED):
-            out = ask(loop, World(400.0), None, posture=posture)
-            assert not any(out.velocity)
-            refusals = {topic: sentence(event) for topic, event in loop.refusals.items()}
-            refusal = refusals.get("joint_posture_command", "")
-            why = f"joint_posture_command has no effect in the mode {mode}; set force_loop:mode to hybrid, or end"
-            assert refusal.startswith(why) if posture is MOVED else not refusal
+            assert not any(ask(loop, world, posture=posture).velocity)
+            assert ("joint_posture_command" in loop.refusals) is (posture is MOVED)
 
 
 @pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
 def test_a_posture_that_is_set_to_where_the_arm_is_does_not_ask_for_a_motion(mode: str) -> None:
     """As a scenario does after a force, and with the last increment of a motion before a torque."""
-    loop, world = force_loop(ARM, replace(WATCHING, mode=mode)), World(400.0)
-    postures = [*[POSE] * 20, *[[POSE[0] + 0.2, *POSE[1:]]] * 20]
-    for k, posture in enumerate(postures):
-        q = [POSE[0] + 0.01 * k, *POSE[1:]]  # turned by the torques
-        joints = world.joints._replace(position=q)
-        loop.step(joints, world.sensors, NO_CONTACT, None, None, posture, None, DT)
+    loop = force_loop(ARM, replace(OWN, mode=mode))
+    for k, posture in enumerate([*[POSE] * 20, *[[POSE[0] + 0.2, *POSE[1:]]] * 20]):
+        ask(loop, World(q=[POSE[0] + 0.01 * k, *POSE[1:]]), posture=posture)  # turned by the torques
         assert "joint_posture_command" not in loop.refusals
 
 
-def test_with_a_task_other_commands_are_refused_as_far_as_it_leaves_nothing_for_them() -> None:
-    force = ForceCommand("base", down(5.0))
+def test_a_command_that_has_no_effect_is_refused() -> None:
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
+    for given, refused in (
+        ({"posture": POSE, "torque": [1.0, 0.0, 0.0, 0.0]}, set()),
+        ({"posture": POSE}, set()),
+        ({"posture": MOVED}, {"joint_posture_command"}),
+        ({"posture": MOVED}, {"joint_posture_command"}),  # until it ends
+        ({}, set()),
+        ({"force": 5.0}, {"force_command"}),
+        ({"force": 0.0}, set()),
+    ):
+        ask(loop, World(), **given)
+        assert set(loop.refusals) == refused
+    hybrid = force_loop(ARM, OWN)
+    ask(hybrid, World(), torque=[1.0, 0.0, 0.0, 0.0], posture=MOVED)
+    assert set(hybrid.refusals) == {"joint_torque_command"}
     for count, refused in ((3, {"force_command"}), (4, {"force_command", "joint_posture_command"})):
-        axes = tuple(TaskAxis(AxisKind.POSITION, k, value=None) for k in range(count))
+        task = TaskCommand("base", tuple(TaskAxis(AxisKind.POSITION, k, value=None) for k in range(count)))
         loop = force_loop(ARM, OWN)
         for posture in (POSE, MOVED):
-            world = World(400.0)
-            loop.step(
-                world.joints, world.sensors, NO_CONTACT, None, force, posture, None, DT, TaskCommand("base", axes)
-            )
+            ask(loop, World(), 5.0, posture=posture, task=task)
         assert set(loop.refusals) == refused
-        text = f"force_command has no effect with a task of {count} axes on 4 joints; end one of them"
-        assert sentence(loop.refusals["force_command"]) == text
 
 
-@pytest.mark.parametrize(("speed", "is_late"), [(1.0, False), (1.2, False), (1.3, True)])
-def test_a_posture_that_moves_faster_than_the_arm_follows_is_reported(speed: float, is_late: bool) -> None:
-    loop, world = force_loop(ARM, replace(OWN, joint_speed_limit=0.5)), World(1e-9)
-    found = []
-    for k in range(200):
-        posture = [POSE[0] + 0.5 * speed * DT * k, *POSE[1:]]
-        world.move(ask(loop, world, None, posture=posture).velocity)
-        found.append(loop.reaction.code)
-    assert set(found) == {Code.NONE, *([Code.NOT_FOLLOWED] if is_late else [])}
-    assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in sentence(loop.reaction)) is is_late
+# --- what is reported
+
+
+LATE = 200  # periods of the settling time
+TIME = np.arange(0.0, 4.0 * LATE * DT, DT)
+
+
+def reported(torques: np.ndarray, taken: np.ndarray, sd: float = 0.015, **limits: Any) -> list[set[Code]]:
+    """Of a joint that stays where it is, in each period, while its commanded and taken torque, N m, are these."""
+    own = replace(limited(settling_time=LATE * DT, **limits), mode="joint_torque")
+    loop, found = force_loop(ARM, replace(own, sensing=replace(OWN.sensing, torque_sd=sd))), []
+    for torque, external in zip(torques.tolist(), taken.tolist(), strict=True):
+        sensors = State(POSE, STILL, np.add(BODY.gravity_torque(POSE), (0.0, external, 0.0, 0.0)).tolist())
+        ask(loop, World(1e-9), sensors=sensors, torque=[0.0, torque, 0.0, 0.0])
+        found.append({event.code for event in loop.events})
+    return found
 
 
 @pytest.mark.slow
-def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported() -> None:
-    limits = replace(OWN.limits, settling_time=0.5)
-    loop, world = force_loop(ARM, replace(OWN, limits=limits, force_rate_limit=2.0)), World(400.0)
-    found, way = [], "; the set point is {} N on its way to the command, 4 N, at force_rate_limit, 2 N/s: raise that"
-    for _ in range(round(4.0 / DT)):
-        world.move(ask(loop, world, down(4.0)).velocity)
-        found.append(loop.reactions)
-    late = [Code.NOT_REACHED in one for one in found]
-    assert late.index(True) == pytest.approx(0.5 / DT, abs=2)
-    assert sentence(found[late.index(True)][Code.NOT_REACHED]).startswith(way.format("1")[2:])
-    assert not any(late[round(2.0 / DT) :]), "the set point is the command"
-    loop.step(world.joints, world.sensors, NO_CONTACT, None, ForceCommand("base", down(60.0)), None, None, DT)
-    assert all("on its way to the command, 60 N" in sentence(event) for event in loop.reactions.values())
-    turning = replace(OWN, mode="joint_torque", limits=limits, torque_rate_limit=1.0)
-    loop = force_loop(ARM, turning)
-    for _ in range(round(0.6 / DT)):
-        loop.step(world.joints, world.sensors, NO_CONTACT, None, None, None, [0.0, -2.0, 0.0, 0.0], DT)
-    assert "to the command, 2 N m, at torque_rate_limit, 1 N m/s" in sentence(loop.reactions[Code.NOT_REACHED])
+@pytest.mark.parametrize(
+    ("torques", "taken"),
+    [
+        (2.0 + 0.0 * TIME, 0.0 * TIME),
+        (2.0 + 0.0 * TIME, 1.5 + 0.0 * TIME),
+        (np.where(TIME % 2.0 < 1.0, 2.0, 1.5), 0.0 * TIME),
+        (4.0 * np.sin(2.0 * math.pi * 0.3 * TIME), 0.0 * TIME),
+        (np.minimum(0.4 * TIME + 0.1, 4.0), 0.0 * TIME),
+        (2.0 + 0.0 * TIME, 0.3 * np.random.default_rng(1).normal(size=len(TIME))),
+    ],
+)
+def test_a_joint_torque_that_is_not_taken_is_reported_whatever_the_command_does(
+    torques: np.ndarray, taken: np.ndarray
+) -> None:
+    found = reported(torques, taken)
+    assert not any(found[: LATE - 2])
+    assert all(Code.NOT_REACHED in codes for codes in found[3 * LATE :])
+
+
+@pytest.mark.slow
+def test_a_joint_torque_that_is_right_is_not_reported_and_no_more_once_it_is() -> None:
+    varying = 2.0 + 0.5 * np.sin(2.0 * math.pi * 0.5 * TIME)
+    noisy = varying + 0.02 * np.random.default_rng(2).normal(size=len(TIME))
+    assert not any(reported(varying, noisy))
+    found = reported(0.0 * TIME + 2.0, np.where(TIME < 2 * LATE * DT, 0.0, 2.0))
+    assert Code.NOT_REACHED in found[2 * LATE]
+    assert not any(Code.NOT_REACHED in codes for codes in found[2 * LATE + LATE // 4 + 2 :])
+
+
+@pytest.mark.parametrize(("torque", "codes"), [(12.0, set()), (6.0, {Code.REFUSED})])
+def test_a_joint_torque_that_is_not_known_to_a_tenth_of_it_is_refused(torque: float, codes: set[Code]) -> None:
+    assert reported(torque + 0.0 * TIME[:10], torque + 0.0 * TIME[:10], sd=1.0, doubt=1.0)[-1] == codes
+
+
+@pytest.mark.parametrize(("speed", "code"), [(1.0, Code.NONE), (1.3, Code.AT_LIMIT)])
+def test_a_posture_that_moves_faster_than_the_arm_may_is_reported(speed: float, code: Code) -> None:
+    loop, world = force_loop(ARM, replace(OWN, joint_speed_limit=0.5)), World(1e-9)
+    for k in range(200):
+        rate = [0.5 * speed, 0.0, 0.0, 0.0]
+        moved(loop, world, posture=[POSE[0] + rate[0] * DT * k, *POSE[1:]], posture_rate=rate)
+        assert loop.event.code is code
 
 
 @pytest.mark.parametrize(
     ("gain", "way", "is_free", "is_short"),
-    [(8.0, 0.9, True, False), (4.0, 0.9, True, False), (0.5, 0.9, True, True), (0.0, 0.9, True, True),
-     (8.0, 0.9, False, True), (0.0, 0.04, True, False)],
-)  # fmt: skip
+    [(8.0, 0.9, True, False), (4.0, 0.9, True, False), (8.0, 0.9, False, True), (0.0, 0.04, True, False)],
+)
 def test_a_posture_that_is_not_reached_is_reported(gain: float, way: float, is_free: bool, is_short: bool) -> None:
-    loop, world = force_loop(ARM, replace(OWN, posture_gain=gain)), World(1e-9)
+    own = replace(limited(settling_time=2.0), posture_gain=gain)
+    loop, world = force_loop(ARM, own), World(1e-9)
     motion = GoalMotion(POSE, [POSE[0], POSE[1] + way, *POSE[2:]], 1.0)
-    for k in range(round(1.0 / DT) + 1):
-        velocity = ask(loop, world, None, posture=motion.at(k * DT).position).velocity
+    for k in range(round(2.0 / DT) + 1):
+        velocity = ask(loop, world, posture=motion.at(k * DT).position).velocity
         if is_free:
             world.move(velocity)
-    assert (loop.reaction.code is Code.NOT_REACHED) is is_short
-    if is_short:
-        name, advice = ARM.joints.names[1], f"raise force_loop:posture_gain, {gain:g} 1/s"
-        assert re.match(
-            rf"{name} is \S+ rad away from the commanded posture; allowed: \S+ rad, 0.05 rad", sentence(loop.reaction)
-        )
-        assert advice in sentence(loop.reaction)
-    ask(loop, world, down(6.0), posture=motion.at(2.0).position)
-    assert "posture" not in sentence(loop.reaction), "a force moves the arm away from it"
+    assert (loop.event.code is Code.NOT_REACHED) is is_short
+    assert loop.event.values.get("axis") == (ARM.joints.names[1] if is_short else None)
+    ask(loop, world, 6.0, posture=motion.at(2.0).position)
+    assert loop.event.code is Code.NONE, "a force moves the arm away from it"
 
 
-def test_under_the_brakes_neither_a_posture_nor_a_force_is_late() -> None:
-    limits = replace(OWN.limits, settling_time=0.1)
-    loop, world = force_loop(ARM, replace(OWN, limits=limits, force_rate_limit=1.0)), World(1e-9)
+@pytest.mark.parametrize(("mode", "rate", "given"), [
+    ("hybrid", {"force_rate_limit": 2.0}, {"force": 4.0}),
+    ("joint_torque", {"torque_rate_limit": 1.0}, {"torque": [0.0, -2.0, 0.0, 0.0]}),
+])  # fmt: skip
+def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported(
+    mode: str, rate: dict[str, float], given: dict[str, Any]
+) -> None:
+    loop, world = force_loop(ARM, replace(limited(settling_time=0.5), mode=mode, **rate)), World()
+    late = []
+    for _ in range(round(2.5 / DT)):
+        moved(loop, world, **given)
+        late.append(any(event.cause == "rising" for event in loop.events))
+    assert late.index(True) == pytest.approx(0.5 / DT, abs=2)
+    assert not any(late[round(2.1 / DT) :]), "the set point is the command"
+
+
+def test_with_the_brakes_nothing_moves_and_nothing_is_late() -> None:
+    own = replace(limited(settling_time=0.1), force_rate_limit=1.0)
+    loop, world = force_loop(ARM, own), World(1e-9)
     goal = [POSE[0], POSE[1] + 1.0, *POSE[2:]]
     braked = world.joints._replace(effort=[0.0] * 4)
     for _ in range(round(0.5 / DT)):
-        loop.step(braked, world.sensors, NO_CONTACT, None, ForceCommand("base", down(6.0)), goal, None, DT)
-        assert Code.NOT_REACHED not in loop.reactions
-    for _ in range(5):
-        ask(loop, world, None, posture=goal)
-        assert loop.reaction.code is Code.NONE
+        ask(loop, world, 6.0, joints=braked, posture=goal)
+        assert loop.event.code is Code.NONE
+    ask(loop, world, posture=goal)
+    assert loop.event.code is Code.NONE
 
 
-def test_a_posture_that_is_set_at_once_is_reached_as_fast_as_the_arm_may_go() -> None:
-    loop, world, goal = force_loop(ARM, OWN), World(1e-9), [POSE[0], POSE[1] + 1.2, *POSE[2:]]
-    for _ in range(round(2.0 / DT)):
-        world.move(ask(loop, world, None, posture=goal).velocity)
-        assert loop.reaction.code is Code.NONE
-    assert world.q == pytest.approx(goal, abs=1e-3)
+# --- limits and doubt
 
 
-def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
-    assert ask(loop, World(1e-9), None).velocity == [0.0] * 4
-    out = ask(loop, World(1e-9), None, torque=[100.0, -100.0, 1.0, 0.0])
-    (limit,), (gain,) = OWN.torque_error_limit, OWN.torque_gain
-    assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
+def test_a_force_without_a_lever_commands_no_motion_along_it() -> None:
+    out = ask(force_loop(ARM, OWN), World(q=[0.0, 0.0, 0.0, math.pi / 2]), 5.0)  # arm straight up
+    assert out.velocity == pytest.approx(STILL, abs=1e-9)
+    assert np.all(np.isfinite(out.effort))
 
 
-@pytest.mark.slow
-def test_a_stale_force_command_is_dropped_and_the_arm_holds_its_position() -> None:
-    loop, world = force_loop(ARM, OWN), World(400.0)
-    for _ in range(1500):
-        world.move(ask(loop, world, down(6.0), posture=POSE).velocity)
-    pressed = list(world.q)
-    assert world.force == pytest.approx(6.0, abs=1e-3)
-    assert not any(ask(loop, world, None, posture=[0.5, 0.0, 0.0, 0.0]).effort)
-    out = ask(loop, world, None, posture=[0.5, 0.0, 0.0, 0.0])
-    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9)  # holds here, not at the posture of old
-    assert world.q == pressed
-    again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0])
-    assert max(map(abs, again.velocity)) > 0.03
+def test_on_a_surface_stiffer_than_the_gain_allows_the_force_does_not_jump() -> None:
+    """The law alone, 0.03 m/s/N at a filter of 20 ms, is unstable there."""
+    highest = []
+    for limits in (GIVEN.limits, replace(GIVEN.limits, impact=0.0, joint_acceleration=0.0)):
+        loop, world = force_loop(ARM, replace(GIVEN, contact_source="pinned", limits=limits)), World(4000.0)
+        found = []
+        for _ in range(400):
+            moved(loop, world, 10.0)
+            found.append(world.force)
+        highest.append(max(found))
+    assert highest[0] < 1.5 * 10.0
+    assert highest[1] > 1.5 * 10.0, "without the limits"
 
 
-def test_after_a_stale_command_the_arm_is_pulled_back_to_where_the_command_ended() -> None:
-    loop, world = force_loop(ARM, OWN), World(400.0)
-    ask(loop, world, down(6.0))
-    ask(loop, world, None)
-    world.q = [angle + 0.01 for angle in POSE]  # pushed away
-    for _ in range(3):
-        out = ask(loop, world, None)
-    assert out.velocity == pytest.approx([-0.01 * OWN.posture_gain] * 4)
-
-
-def test_joint_torque_without_a_command_holds_still_whatever_the_posture() -> None:
-    loop = force_loop(ARM, OWN)
-    ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3])
-    loop.tune(replace(OWN, mode="joint_torque"))
-    assert ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3]).velocity == [0.0] * 4
-
-
-def rotation(cover: str, q: list[float] = POSE) -> np.ndarray:
-    return BODY.cover_pose(q, cover).rotation
-
-
-def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
-    loop, world = force_loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0, force=9.0)
-    torques = (-4.0 * lever(POSE)).tolist()
-    touch = Contact(COVER, PLACE, (0.0, 1.0, 0.0))
-    out = ask(loop, world, down(6.0), contact=touch, external=torques)
-    assert out.measured == pytest.approx(down(4.0), abs=1e-6)
-    assert out.error == pytest.approx(down(2.0), abs=1e-6)
-    again = ask(loop, world, down(6.0), external=torques)
-    assert again.error == pytest.approx(down(2.0), abs=1e-6), "a force that is held stays measured below the detection"
-    fresh = force_loop(ARM, replace(OWN, feedback="contact_estimate"))
-    never = ask(fresh, world, down(6.0), external=torques)
-    assert never.error == pytest.approx(down(6.0)), "no contact is no force"
-
-
-def test_tare_acts_on_the_estimate_too() -> None:
-    loop, world = force_loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0)
-    touch = Contact(COVER, PLACE, (0.0, 1.0, 0.0))
-    torques = (-4.0 * lever(POSE)).tolist()
-    ask(loop, world, None, contact=touch, external=torques)
-    assert loop.tare() == ""
-    assert ask(loop, world, down(6.0), contact=touch, external=torques).measured == pytest.approx(down(0.0), abs=1e-9)
-
-
-def test_the_force_acts_where_contact_is_detected() -> None:
-    loop = force_loop(ARM, OWN)
-    out = ask(loop, World(400.0), down(2.0), contact=Contact("inner_link", 0.4, (0.0, 0.0, 1.0)))
-    assert out.axis.lever == pytest.approx(lever(POSE, DOWN, "inner_link", 0.4), abs=1e-6)
-    elsewhere = ask(loop, World(400.0), down(2.0))
-    assert elsewhere.axis.lever == pytest.approx(lever(POSE), abs=1e-6)
-
-
-@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize(
-    ("position_sd", "probability", "is_used"), [(0.01, 0.99, True), (0.05, 0.99, False), (0.01, 0.5, False)]
+    ("change", "part"),
+    [
+        ({"sensing": replace(OWN.sensing, torque_sd=1.0)}, "torques"),
+        ({"contact_position_sd": 0.3}, "friction"),  # with other levers at other places
+        ({"contact_position_sd": 0.1, "sensing": replace(OWN.sensing, friction=2.0)}, "place"),
+        ({"limits": replace(FREE, doubt=1.0, surface_speed=0.1)}, "moving_surface"),
+        ({"limits": replace(FREE, doubt=1.0, settling_time=1e-3)}, "slow_arm"),
+    ],
 )
-def test_an_uncertain_contact_position_is_replaced_by_the_configured_one(
-    position_sd: float, probability: float, is_used: bool, feedback: str
+def test_a_force_that_would_be_off_by_more_than_tolerated_is_refused_and_the_arm_holds(
+    change: dict[str, Any], part: str
 ) -> None:
-    """A refusal where the estimate is what the loop lives on; with joint sensors the estimate is not required."""
-    loop = force_loop(ARM, replace(OWN, feedback=feedback))
-    contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), position_sd, probability)
-    for _ in range(2):
-        out = ask(loop, World(400.0), down(6.0), contact=contact)
-    there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
-    assert out.axis.lever == pytest.approx(there, abs=1e-6)
-    assert ("contact_cover and contact_position are used" in loop.fallback) is not is_used
-    is_refused = not is_used and feedback == "contact_estimate"
-    assert ("contact/hypotheses" in loop.refusals) is is_refused
-    assert loop.refused == is_refused
-    ask(loop, World(400.0), down(6.0))
-    assert (loop.fallback, loop.refusals) == ("", {})
+    own = replace(limited(doubt=1.0), **{"contact_source": "pinned", **change})
+    loop, world = force_loop(ARM, own), World()
+    out = moved(loop, world, 8.0, 20)
+    assert (loop.event.code, loop.event.holds, loop.event.cause) == (Code.REFUSED, True, "error")
+    assert loop.event.values["part"] == part
+    assert world.q == pytest.approx(POSE, abs=1e-9)
+    assert loop.refusals["force_command"] == loop.event
+    assert not any(out.effort)
+    loop = force_loop(ARM, replace(own, limits=replace(own.limits, doubt=math.inf)))
+    assert any(ask(loop, World(), 8.0).velocity), "unless more doubt is allowed"
+    loop = force_loop(ARM, limited(doubt=1.0))
+    assert any(ask(loop, World(), 8.0).velocity)
+    assert loop.event.code is Code.NONE
 
 
-def test_a_certain_contact_position_is_kept_as_long_as_the_contact_lasts() -> None:
-    """Going back and forth between it and the configured one would make a step of the measured force each time."""
-    loop = force_loop(ARM, OWN)
-    certain, uncertain = (
-        Contact("inner_link", 0.4, (0.0, 0.0, 1.0), position_sd, 0.99) for position_sd in (0.01, 0.05)
-    )
-    there, configured = lever(POSE, DOWN, "inner_link", 0.4), lever(POSE)
-    for contact, expected in (
-        (uncertain, configured),
-        (certain, there),
-        (uncertain, there),
-        (NO_CONTACT, configured),
-        (uncertain, configured),
-    ):
-        out = ask(loop, World(400.0), down(2.0), contact=contact)
-        assert out.axis.lever == pytest.approx(expected, abs=1e-6)
+def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() -> None:
+    """Of 0.5 kg at the tool; the arm was elsewhere before, and had no contact."""
+    weight = BODY.tool_jacobian(POSE).T @ np.array([0.0, 0.0, -0.5 * 9.81])
+    sensing = replace(OWN.sensing, zero_limit=0.5)
+    loop = force_loop(ARM, replace(limited(doubt=1.0), mode="joint_torque", sensing=sensing))
+    sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - weight).tolist())
+    for torque in (None, [0.0, 0.0, 0.0, 2.0]):
+        for _ in range(LATE):
+            out = ask(loop, World(1e-9), sensors=sensors, torque=torque)
+    assert loop.event.holds
+    assert loop.event.values["part"] == "resting"
+    assert out.velocity == pytest.approx(STILL)
+
+
+# --- where the force acts, and what counts as zero
+
+
+def rotation(cover: str) -> np.ndarray:
+    return BODY.cover_pose(POSE, cover).rotation
 
 
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize("mode", ["hybrid", "open_loop"])
 def test_a_force_in_a_cover_frame_is_the_same_force_in_the_base_frame(feedback: str, mode: str) -> None:
-    own = replace(OWN, feedback=feedback, mode=mode)
+    own = replace(OWN, feedback=feedback, mode=mode, contact_source="estimated")
     in_cover = np.array([1.0, -4.0, 2.0])
-    in_base = rotation("outer_link") @ in_cover
-    touch = Contact("outer_link", 0.2, (0.3, 1.0, -0.2))
-    commands = [ForceCommand(frame, tuple(force)) for frame, force in (("outer_link", in_cover), ("base", in_base))]
-    outs = [
-        ask(force_loop(ARM, own), World(400.0, force=2.0), None, contact=touch, command=command) for command in commands
-    ]
-    assert outs[0].velocity == pytest.approx(outs[1].velocity, abs=1e-12)
-    assert outs[0].effort == pytest.approx(outs[1].effort, abs=1e-12)
-    for here, there in ((outs[0].measured, outs[1].measured), (outs[0].limited, outs[1].limited)):
-        assert rotation("outer_link") @ here == pytest.approx(there, abs=1e-12)
+    touch = Contact(COVER, 0.2, (0.3, 1.0, -0.2))
+    commands = [(COVER, in_cover), ("base", rotation(COVER) @ in_cover)]
+    here, there = (
+        ask(force_loop(ARM, own), World(force=2.0), contact=touch, command=ForceCommand(frame, tuple(force)))
+        for frame, force in commands
+    )
+    assert here.velocity == pytest.approx(there.velocity, abs=1e-12)
+    assert here.effort == pytest.approx(there.effort, abs=1e-12)
+    for one, other in ((here.measured, there.measured), (here.limited, there.limited)):
+        assert rotation(COVER) @ one == pytest.approx(other, abs=1e-12)
 
 
-def test_tare_takes_the_present_torques_as_zero() -> None:
-    loop = force_loop(ARM, OWN)
-    ask(loop, World(400.0, force=3.0), None)
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+def test_a_contact_position_is_used_while_the_contact_lasts_once_its_link_was_certain(feedback: str) -> None:
+    """Going back and forth between it and the configured one would make a step of the measured force each time."""
+    loop = force_loop(ARM, replace(OWN, contact_source="estimated", feedback=feedback))
+    certain, doubtful = (Contact("inner_link", 0.4, (0.0, 0.0, 1.0), 0.01, p) for p in (0.99, 0.5))
+    there, configured = lever(POSE, DOWN, "inner_link", 0.4), lever(POSE)
+    order = ((doubtful, configured), (certain, there), (doubtful, there), (NO_CONTACT, configured))
+    for contact, expected in (*order, (doubtful, configured)):
+        out = ask(loop, World(), 2.0, contact=contact, external=STILL)
+        assert out.axes[0].along == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_estimate_far_off_the_normal_is_not_used_and_that_is_told() -> None:
+    own = replace(OWN, contact_source="estimated", feedback="contact_estimate")
+    loop, along = force_loop(ARM, own), rotation(COVER) @ [6.0, -1.0, 0.0]
+    contact = Contact(COVER, 0.1, (0.0, 0.0, 1.0), 0.01, 0.99)
+    out = ask(loop, World(), contact=contact, external=STILL, command=ForceCommand("base", tuple(along)))
+    assert out.axes[0].place is not None
+    assert out.axes[0].place.position == PLACE
+    assert "contact/hypotheses" in loop.refusals
+    assert loop.fallback
+    ask(loop, World(), 2.0, external=STILL)
+    assert (loop.fallback, loop.refusals) == ("", {})
+
+
+def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
+    own = replace(OWN, feedback="contact_estimate")
+    loop, world, torques = force_loop(ARM, own), World(force=9.0), (-4.0 * lever(POSE)).tolist()
+    for contact in (TOUCH, NO_CONTACT):  # a force that is held stays measured below the detection
+        out = ask(loop, world, 6.0, contact=contact, external=torques)
+        assert out.measured == pytest.approx(down(4.0), abs=1e-6)
+        assert out.error == pytest.approx(down(2.0), abs=1e-6)
+    never = ask(force_loop(ARM, own), world, 6.0, external=torques)
+    assert never.error == pytest.approx(down(6.0)), "no contact is no force"
+
+
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+def test_tare_takes_the_present_torques_as_zero_again_and_again(feedback: str) -> None:
+    loop = force_loop(ARM, replace(OWN, feedback=feedback))
+
+    def at(newtons: float, commanded: float | None) -> ForceOutput:
+        external = (-newtons * lever(POSE)).tolist()
+        return ask(loop, World(force=newtons), commanded, contact=TOUCH, external=external)
+
+    at(3.0, None)
     assert loop.tare() == ""
-    assert ask(loop, World(400.0, force=3.0), down(5.0)).measured == pytest.approx(down(0.0), abs=1e-9)
-    ask(loop, World(400.0, force=3.0), None)
-    assert loop.tare() == "", "again, on top"
-    loop = force_loop(ARM, replace(OWN, force_filter=0.0))
-    ask(loop, World(400.0, force=3.0), None)
-    loop.tare()
-    assert ask(loop, World(400.0, force=7.0), down(5.0)).measured == pytest.approx(down(4.0), abs=1e-6)
+    at(2.0, None)
+    assert loop.tare() == ""
+    assert at(6.0, 5.0).measured == pytest.approx(down(4.0), abs=1e-6)
 
 
 def test_tare_is_refused_while_a_force_is_commanded_the_arm_moves_or_is_where_it_pressed() -> None:
-    loop, world = force_loop(ARM, replace(OWN, contact_source="pinned")), World(400.0, force=3.0)
-    ask(loop, world, down(5.0))
+    loop, world = force_loop(ARM, OWN), World(force=3.0)
+    ask(loop, world, 5.0)
     assert "a force is commanded" in loop.tare()
-    ask(loop, world, None)
+    ask(loop, world)
     assert "still is where it pressed" in loop.tare()
-    away = World(400.0, q=[angle + 0.1 for angle in POSE])
-    moving = away.joints._replace(velocity=[0.5] * 4)
-    for _ in range(20):
-        loop.step(moving, away.sensors, NO_CONTACT, None, None, None, None, DT)
-    assert "the arm moves" in loop.tare()
-    for _ in range(200):
-        ask(loop, away, None)
-    assert loop.tare() == ""
+    away = World(q=[angle + 0.1 for angle in POSE])
+    for speed, reason in ((0.5, "the arm moves"), (0.0, "")):
+        for _ in range(200):
+            ask(loop, away, joints=away.joints._replace(velocity=[speed] * 4))
+        assert loop.tare().startswith(reason)
+        assert bool(loop.tare()) is bool(reason)
 
 
 @pytest.mark.parametrize("limit", [1.0, 0.0])
 def test_what_a_free_arm_at_rest_measures_counts_as_zero_when_a_force_is_commanded(limit: float) -> None:
     """The torques of 0.4 N that do not act: an error of the model."""
-    own = replace(OWN, contact_source="pinned", sensing=replace(OWN.sensing, zero_limit=limit))
-    loop, wrong = force_loop(ARM, own), World(400.0, force=0.4)
+    loop = force_loop(ARM, replace(OWN, sensing=replace(OWN.sensing, zero_limit=limit)))
     for _ in range(100):
-        ask(loop, wrong, None)
+        ask(loop, World(force=0.4))
     for _ in range(20):  # from the first period on, or it would be a touch
-        measured = ask(loop, wrong, down(5.0)).measured
+        measured = ask(loop, World(force=0.4), 5.0).measured
         assert measured == pytest.approx(down(0.0 if limit else 0.4), abs=1e-6)
 
 
 @pytest.mark.parametrize("case", ["touched", "pressed here before", "moving", "too large", "nobody estimates contacts"])
 def test_a_force_that_may_be_true_is_never_taken_as_zero(case: str) -> None:
-    own = replace(OWN, contact_source="pinned", sensing=replace(OWN.sensing, zero_limit=1.0))
-    loop = force_loop(ARM, own)
-    world = World(400.0, force=3.0 if case == "too large" else 0.4)
-    touch = Contact(COVER, PLACE, (0.0, 1.0, 0.0)) if case == "touched" else NO_CONTACT
+    loop = force_loop(ARM, replace(OWN, sensing=replace(OWN.sensing, zero_limit=1.0)))
+    world = World(force=3.0 if case == "too large" else 0.4)
     joints = world.joints._replace(velocity=[0.5] * 4) if case == "moving" else world.joints
-    estimate = None if case == "nobody estimates contacts" else touch
+    contact = {"touched": TOUCH, "nobody estimates contacts": None}.get(case, NO_CONTACT)
     if case == "pressed here before":
-        ask(loop, World(400.0, force=4.0), down(5.0), contact=Contact(COVER, PLACE, (0.0, 1.0, 0.0)))
-    for command in (None, ForceCommand("base", down(5.0))):
+        ask(loop, World(force=4.0), 5.0, contact=TOUCH)
+    for newtons in (None, 5.0):
         for _ in range(100):
-            out = loop.step(joints, world.sensors, estimate, None, command, None, None, DT)
+            out = ask(loop, world, newtons, joints=joints, contact=contact)
     assert -out.measured[2] == pytest.approx(world.force, rel=1e-3)
 
 
-def test_a_force_without_a_lever_commands_no_motion_along_it() -> None:
-    stretched = [0.0, 0.0, 0.0, math.pi / 2]  # arm straight up
-    out = ask(force_loop(ARM, OWN), World(400.0, q=stretched), down(5.0))
-    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-12)
-    assert np.all(np.isfinite(out.effort))
-
-
 def test_missing_sensors_count_as_no_force() -> None:
-    loop = force_loop(ARM, OWN)
-    command = ForceCommand("base", (0.0, 0.0, -5.0))
-    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, None, None, DT)
+    out = ask(force_loop(ARM, OWN), World(), 5.0, sensors=None)
     assert out.measured == pytest.approx((0.0, 0.0, 0.0))
     assert all(math.isfinite(value) for value in (*out.velocity, *out.effort))
+
+
+# --- a force along another axis begins as in a new loop
+
+
+Period = tuple[float, float, str, Contact, bool]  # turn, N along DOWN, link it is on, estimate, commanded
+ON_OUTER = Contact("outer_link", 0.28, (0.0, 5.0, 0.0), 0.001, 0.99)
+ON_INNER = Contact("inner_link", 0.3, (0.0, 8.0, 0.0), 0.001, 0.99)
+
+
+def sliding(begin: float = 0.0, commanded: bool = True) -> Iterator[Period]:
+    for k in range(80):
+        yield begin + 0.002 * k, 5.0, "outer_link", ON_OUTER, commanded
+
+
+def moved_between() -> Iterator[Period]:
+    yield from sliding()
+    yield from sliding(0.16, commanded=False)
+
+
+def elsewhere() -> Iterator[Period]:
+    for _ in range(30):
+        yield 0.1, 0.0, "outer_link", NO_CONTACT, True
+    for _ in range(30):
+        yield 0.2, 8.0, "inner_link", ON_INNER, True
+
+
+def pressed_on() -> Iterator[Period]:
+    yield from sliding(0.3)
+
+
+def on_the_inner_link() -> Iterator[Period]:
+    for _ in range(80):
+        yield 0.3, 8.0, "inner_link", ON_INNER, True
+
+
+def played(loop: ForceLoop, periods: Iterator[Period], frame: str) -> list[ForceOutput]:
+    """Outputs for given forces and turns by which the outer link slides along; the command is 5 N along DOWN."""
+    outputs = []
+    for turn, force, link, contact, commanded in periods:
+        q = [POSE[0], POSE[1] + turn, POSE[2], POSE[3] - 2.0 * turn]
+        turned = np.eye(3) if frame == "base" else BODY.cover_pose(q, frame).rotation
+        command = ForceCommand(frame, tuple((turned.T @ np.array(down(5.0))).tolist())) if commanded else None
+        sensors = State(q, STILL, (BODY.gravity_torque(q) + force * lever(q, DOWN, link, 0.28)).tolist())
+        outputs.append(ask(loop, World(q=q), sensors=sensors, contact=contact, command=command, posture=q))
+    return outputs
+
+
+WITHOUT = replace(GIVEN.limits, impact=0.0, free_travel=1e9, joint_acceleration=0.0)
+BEGIN = replace(GIVEN, limits=WITHOUT, contact_source="pinned", force_filter=0.0, friction_feedforward=0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("parameters", "before", "after", "code"),
+    [
+        (BEGIN, sliding, pressed_on, Code.NONE),
+        (BEGIN, moved_between, pressed_on, Code.NONE),
+        (replace(BEGIN, limits=replace(WITHOUT, doubt=0.01)), sliding, pressed_on, Code.REFUSED),
+        (replace(BEGIN, contact_source="estimated"), elsewhere, on_the_inner_link, Code.UNEXPLAINED),
+    ],
+)
+def test_a_force_in_another_frame_begins_as_in_a_new_loop(
+    parameters: ForceLoopParameters,
+    before: Callable[[], Iterator[Period]],
+    after: Callable[[], Iterator[Period]],
+    code: Code,
+) -> None:
+    used, new = force_loop(ARM, parameters), force_loop(ARM, parameters)
+    played(used, before(), "base")
+    found, expected = (played(loop, after(), "outer_link") for loop in (used, new))
+    assert used.event.code is new.event.code is code
+    for one, other in zip(found[1:], expected[1:], strict=True):  # the torques of the period before still count
+        assert one.axes[0].place == other.axes[0].place
+        assert one.velocity == pytest.approx(other.velocity, abs=1e-12)
+        assert one.effort == pytest.approx(other.effort, abs=1e-12)
+
+
+# --- parameters
 
 
 @pytest.mark.parametrize(
@@ -732,6 +681,7 @@ def test_missing_sensors_count_as_no_force() -> None:
         ({"force_gain": [-0.1]}, "'force_gain' is -0.1 m/s/N; allowed: 0 to 100"),
         ({"force_filter": math.nan}, "'force_filter' is nan s"),
         ({"contact_position": "tip"}, "'contact_position' is 'tip' m; allowed: a number"),
+        ({"feedback": "joint_position"}, "'joint_position' but spring_stiffness is 0 at each joint"),
     ],
 )
 def test_a_parameter_set_that_does_not_fit_is_refused_by_name(change: dict[str, Any], text: str) -> None:
@@ -746,18 +696,3 @@ def test_feedback_of_sensors_that_are_not_mounted_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"arm\.joint_sensors is false; use 'contact_estimate'"):
         force_loop(bare, OWN)
     force_loop(bare, replace(OWN, feedback="contact_estimate"))
-
-
-def test_feedback_of_springs_that_nobody_knows_is_refused() -> None:
-    deaf = r"feedback is 'joint_position' but spring_stiffness is 0 at each joint, .* or use 'joint_sensors'"
-    with pytest.raises(ParameterError, match=deaf):
-        force_loop(ARM, replace(OWN, feedback="joint_position"))
-    loop = force_loop(ARM, OWN)
-    with pytest.raises(ParameterError, match=deaf):
-        loop.tune(replace(OWN, feedback="joint_position"))
-    assert loop.parameters == OWN
-    known = replace(OWN, feedback="joint_position", spring_stiffness=(0.0, 1464.0, 0.0, 0.0))
-    loop.tune(known)
-    with pytest.raises(ParameterError, match=deaf):
-        loop.tune(replace(known, spring_stiffness=OWN.spring_stiffness))
-    assert loop.parameters == known

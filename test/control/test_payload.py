@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import re
 
 import mujoco
 import numpy as np
@@ -13,7 +12,6 @@ from wam_control.contact.contact_estimator import ContactEstimatorParameters
 from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.task.scenario import ScenarioStep
 from wam_description.event import Code
-from wam_description.event_text import sentence
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, State
@@ -74,7 +72,7 @@ def test_a_force_is_refused_by_the_mass_that_nobody_knows_of(mass: float, side: 
     direction = triple(side * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
     task = Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), force)
     found = perform(CONFIGURATION, task, 0.6, {**PINNED, "driver:mismatch.payload": mass})
-    assert re.search(r"already measures .* as with [\d.]+ kg at the tool", found.reason)
+    assert "what the arm carries" in found.reason
     assert found.peak < 0.1 * force
 
 
@@ -93,10 +91,11 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
             ),
         ],
     )
-    reasons, node = [], run.nodes["force_loop"]
+    found, node = [], run.nodes["force_loop"]
     while not run.step():
-        reasons.append(sentence(node.reaction))
-    assert "the force is known to +-0.9" in reasons[-500]
+        found.append(node.event)
+    assert found[-500].code is Code.REFUSED
+    assert found[-500].values["error"] == pytest.approx(0.9, abs=0.05)
 
 
 @pytest.mark.slow
@@ -118,7 +117,7 @@ def test_one_newton_is_pressed_with_half_a_kilogram_at_the_tool() -> None:
     assert known.mean == pytest.approx(1.0, abs=0.2)
     unknown = perform(CONFIGURATION, task, 1.0, {**PINNED, "driver:mismatch.payload": MASS})
     assert unknown.outcome is TaskEnd.REFUSED
-    assert "as with 0.48 kg at the tool" in unknown.reason
+    assert "what the arm carries" in unknown.reason
 
 
 def test_a_mass_picked_up_in_motion_is_carried_as_if_the_arm_had_it_and_reset_sets_it_down() -> None:
@@ -146,17 +145,13 @@ def test_a_mass_picked_up_in_motion_is_carried_as_if_the_arm_had_it_and_reset_se
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mass", "expected"), [(0.0, ""), (0.1, "kg at the tool")])
-def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest(
-    mass: float, expected: str
-) -> None:
+def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest() -> None:
     """At 1.6 rad/s the payload was taken for an error of the motion, and 11.1 N were true of 10."""
     given = {
         **PINNED,
         "arm.joints.start": [-0.9, *DEMO[1:]],
         "force_loop:guard.posture": list(DEMO),
         "driver:world.obstacles.positions": [3.0, 3.0, 3.0],
-        "driver:mismatch.payload": mass,
     }
     down = triple(-10.0 * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
     steps = [
@@ -165,10 +160,9 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
         ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
     ]
     run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
-    loop, reasons = run.nodes["force_loop"], [""]
+    loop, causes = run.nodes["force_loop"], list[str]()
     while not run.step():
-        if sentence(loop.reaction) != reasons[-1] and loop.reaction.code is not Code.NOT_FOLLOWED:
-            reasons.append(sentence(loop.reaction))
-    assert "it comes to rest first" in reasons[1]
-    assert expected in reasons[2]
-    assert bool(reasons[2]) is bool(expected)
+        if loop.event.holds and loop.event.cause not in causes[-1:]:
+            causes.append(str(loop.event.cause))
+    assert causes == ["moved_fast"]
+    assert not loop.event.holds

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from wam_control.force.contact_position import pinned_position
+from wam_control.force.contact_place import pinned_position
 from wam_control.force.force_loop import ForceCommand
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task.scenario import (

@@ -53,6 +53,11 @@ class Axis(NamedTuple):
         """Whether it is a joint."""
         return self.of.joint >= 0
 
+    @property
+    def side(self) -> float:
+        """1, or -1 where it is pressed against the direction that is written."""
+        return -1.0 if float(self.in_frame @ np.array(self.of.direction)) < 0.0 else 1.0
+
     def force(self, external: Array) -> float:
         """Force of the arm on the world along it, N or N m, from torques of the world on the joints (n,), N m."""
         return -float((self.along if self.sensed is None else self.sensed.sense) @ external)

@@ -46,7 +46,7 @@ class AxisRun:
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.side, self.is_kept = math.nan, 1.0, False
-        self.is_force = of.kind is AxisKind.FORCE
+        self.is_force, self.of = of.kind is AxisKind.FORCE, of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
 
     def goal(self, axis: Axis, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
@@ -156,7 +156,7 @@ class CommandRun:
     def __init__(
         self, key: object, task: TaskCommand | None, arm: Arm, timing: Timing, resting: Array, is_moving: bool
     ) -> None:
-        self.key = key
+        self.key, self.frame = key, task.frame if task else ""
         self.axes = [AxisRun(axis, arm.covers) for axis in (task.axes if task else ())]
         self.held, self.shaking, self.resting = HeldArm(), Shaking(timing), Resting(resting)
         self.approached = np.zeros_like(resting)
@@ -166,6 +166,13 @@ class CommandRun:
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
         self.feed_forward, self.advice, self.fallback = FeedForward(arm), Advice(), ""
+
+    def go_on(self, before: "CommandRun") -> None:
+        """Keep where the axes touch and hold that were commanded before, too."""
+        for one in self.axes:
+            for other in before.axes:
+                if (before.frame, other.of) == (self.frame, one.of):
+                    one.place, one.anchor = other.place, other.anchor
 
     @property
     def is_touching(self) -> bool:

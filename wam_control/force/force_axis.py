@@ -69,7 +69,7 @@ class ForceAxis(NamedTuple):
     sense : force per torque on each joint (n,), 1/m; sense @ press is 1.
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
-    friction_sd, place_sd : part of it by tangential forces and by the position, N.
+    friction_sd, place_sd : part of it by tangential and other forces, and by the position, N.
     carried : sensed force per acceleration of each joint (n,), kg m: of the arm itself, nothing touched.
     apparent_mass : the same per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
@@ -230,9 +230,8 @@ class ForceAxes:
         shifted = friction @ slide  # friction at another position has another lever
         moved = np.outer(shift, shift) + shifted.T @ shifted
         spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
-        spread += tangential.T @ tangential
-        for torque in others:
-            spread += np.outer(torque, torque)
+        across = np.vstack([tangential, *others])
+        spread += across.T @ across
         moved *= position_sd**2
         weight = inverse(spread + moved)
         inertia = self.inertia(q)
@@ -243,7 +242,7 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        friction_sd = float(np.linalg.norm(tangential @ sense))
+        friction_sd = float(np.linalg.norm(across @ sense))
         place_sd = math.sqrt(float(sense @ moved @ sense))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(

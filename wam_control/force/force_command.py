@@ -112,6 +112,7 @@ class CommandAdmission:
             refusals["joint_posture_command"] = beyond
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
         self._add_without_effect(refusals, parameters.mode, q, force, posture, torque, task)
+        posture = None if self._is_ignored else posture
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:

@@ -92,7 +92,7 @@ class ForceLoop:
         self.refused, self.refusals = 0, dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self._take(servo, parameters)
-        self._begin(None, None)
+        self._run = CommandRun(None, None, arm, timing, np.zeros(len(self._velocity)), False)
 
     def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
         arm = self._body.arm
@@ -214,8 +214,9 @@ class ForceLoop:
         is_free, contact = contact is not None and not contact.cover, contact or NO_CONTACT
         is_touched = bool(contact.cover) or self._run.is_touching
         self._measurement.step(own, joints, sensors, external, external_sd, is_touched, dt)
-        if task is None and isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand:
-            self._admission.restart(q)
+        has_task = isinstance(self._run.key, tuple) and self._run.key[0] is TaskCommand
+        if (has_task and task is None) or (self._run.key == "joints" and torque is None):
+            self._admission.restart(q)  # the arm stays where it is
         commands = self._admission.step(own, q, command, posture, torque, dt, task)
         self.refused += sum(event != self.refusals.get(topic) for topic, event in commands.refusals.items())
         self.refusals = commands.refusals
@@ -261,7 +262,8 @@ class ForceLoop:
                 measurement.zero(limit)
             resting = measurement.resting
         is_moving = task is not None and bool(limit) and FORCE.fast < measurement.speed < math.inf
-        self._run = CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
+        before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
+        self._run.go_on(before)
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[Axis]:
         """The axes of what is commanded, each at its place."""
@@ -373,7 +375,8 @@ class ForceLoop:
                 wanted = self._slowed(axes, rows, wanted)
         least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
         low, high = joint_bounds(self._q, self._body.arm.joints, own)
-        if own.limits.joint_acceleration and self._pushed.event is None:
+        is_yielding = self._pushed.event is not None or any(axis.of.kind is AxisKind.IMPEDANCE for axis in axes)
+        if own.limits.joint_acceleration and not is_yielding:  # a stiff hand would make a late arm swing
             low, high = accelerated(low, high, self._velocity, own.limits.joint_acceleration * dt)
         velocity, unlimited = solve(rows, wanted, least, low, high)
         limits = [] if self._pushed.event is None or is_braked else [self._pushed.event]
@@ -435,9 +438,9 @@ class ForceLoop:
             band = own.task.joint_deadband if axis.is_joint else own.task.deadband
             if not axis.is_joint and known.force < -band:
                 one.side = -one.side  # an impedance may be pushed from either side
-            drive = axis.of.stiffness * (goal - axis.at) - known.force
+            drive = axis.of.stiffness * (axis.side * goal - axis.at) - known.force
             yielding = math.copysign(max(abs(drive) - band, 0.0), drive)
-            speed = axis.of.rate + yielding / own.task.damping(axis.of)
+            speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
     def _force_speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
@@ -695,7 +698,8 @@ def _output(
 
 def _row(axis: Axis, known: Belief, anchor: float) -> AxisRow:
     commanded = axis.desired if axis.is_force else anchor if axis.of.value is None else axis.of.value
-    measured = known.force if axis.of.is_sensed else axis.at
+    sign = 1.0 if axis.is_force else axis.side
+    measured = sign * known.force if axis.of.is_sensed else axis.at
     fraction = 1.0 if axis.sensed is None else axis.sensed.speed_fraction
     return float(axis.of.kind), commanded, measured, known.sd if axis.of.is_sensed else math.nan, fraction
 

@@ -185,7 +185,7 @@ class ForceWatch:
             values: dict[str, Value] = {"measured": known.force, "desired": desired, "time": after, "unit": _unit(axis)}
             cause = "force_strays" if self._has_settled else "force_off"
             events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
-        self._has_settled = self._has_settled or is_reached
+        self._has_settled = self._has_settled or (is_reached and not self._off.is_on)
         events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             events += filter(None, [self.oscillation.step(known.force, desired, own, dt)])
@@ -290,7 +290,7 @@ class MotionWatch:
         if abs(rate) > fastest:
             return warning(Code.AT_LIMIT, "speed", axis=name, unit=unit, speed=abs(rate), allowed=fastest)
         # behind by the time constant of its law while it moves, and by as much as an arm at rest may be
-        allowed = MOTION.arrived + abs(speed) / gain + abs(goal - self._ideal) * FORCE.quarter
+        allowed = MOTION.arrived + (abs(speed) / gain if gain else 0.0) + abs(goal - self._ideal) * FORCE.quarter
         if not self._late.step(abs(at - self._ideal) > allowed, lasting, lasting, dt):
             return None
         return warning(

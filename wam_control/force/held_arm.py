@@ -112,8 +112,9 @@ class PushedArm:
             pushes.append(Push.at(rest, torques.sd, likeliest_link(self._body, q, rest)))
         # a force that was allowed, and falls with its command, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
-        self._allowed = allowed = max(allowed, self._allowed * (1.0 - fade))
         hardest = max(pushes, key=lambda push: push.least)
+        fading = min(self._allowed * (1.0 - fade), own.limits.whole_force * hardest.least)
+        self._allowed = allowed = max(allowed, fading)
         if hardest.least > allowed:
             self._since = 0.0
             values: dict[str, Value] = {"force": hardest.least, "allowed": allowed}
