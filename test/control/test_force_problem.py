@@ -68,7 +68,10 @@ def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: in
         return
     drive, hold = linear([row.along for row in case.rows], N)
     speeds = np.array([row.speed for row in case.rows])
-    assert found.velocity == pytest.approx(drive @ speeds + hold @ case.posture, abs=NEAR), "the guard judges the velocity that is commanded"
+    linearly = drive @ speeds + hold @ case.posture
+    assert found.velocity == pytest.approx(linearly, abs=NEAR), "the guard judges what is commanded"
+        "the guard judges the velocity that is commanded"
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))

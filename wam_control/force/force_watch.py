@@ -185,7 +185,7 @@ class ForceWatch:
             values: dict[str, Value] = {"measured": known.force, "desired": desired, "time": after, "unit": _unit(axis)}
             cause = "force_strays" if self._has_settled else "force_off"
             events.append(warning(Code.NOT_REACHED, cause, axis=axis.of.name, allowed=known.tolerance, **values))
-        self._has_settled = self._has_settled or is_reached
+        self._has_settled = self._has_settled or (is_reached and not self._off.is_on)
         events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             events += filter(None, [self.oscillation.step(known.force, desired, own, dt)])
@@ -207,8 +207,9 @@ class ForceWatch:
         }  # fmt: skip
         if self._is_refused:
             return [holding(Code.REFUSED, "error", **values)]
-        # what is off already leaves less of the tolerance to what is not known
-        is_doubtful = math.hypot(known.errors.size, error) > known.tolerance and self.touch.is_there
+        # what is off already leaves less of the tolerance to what is not known; what is off by all of it is not reached
+        off = error if abs(error) <= known.tolerance else 0.0
+        is_doubtful = math.hypot(known.errors.size, off) > known.tolerance and self.touch.is_there
         lasting = own.limits.settling_time
         is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
         return [warning(Code.REFUSED, "uncertain", **values)] if is_on else []
