@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
-from wam_control.force.force_law import BumplessTransfer, ForceLaw
+from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
 from wam_description.event import refused
 from wam_description.event_text import sentence

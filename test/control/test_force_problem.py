@@ -70,8 +70,6 @@ def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: in
     speeds = np.array([row.speed for row in case.rows])
     linearly = drive @ speeds + hold @ case.posture
     assert found.velocity == pytest.approx(linearly, abs=NEAR), "the guard judges what is commanded"
-        "the guard judges the velocity that is commanded"
-    )
 
 
 @pytest.mark.parametrize("seed", range(20))
