@@ -160,7 +160,9 @@ def belief(
         # the acceleration is the mean of a period
         force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
     errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, reach_time)
-    sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)
+    sd = math.inf
+    if sensed.force_sd < math.inf:
+        sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)
     chi2 = 0.0
     if desired and sd < math.inf:  # friction and position are known per force
         chi2 = sensed.unexplained(torques.now) / max(1.0, force / desired) ** 2

@@ -366,7 +366,7 @@ class ForceLoop:
             least += [
                 self._no_harder(axis, belief, factor)
                 for axis, belief in zip(axes, known, strict=True)
-                if axis.sensed is not None and axis.desired and belief.sd < math.inf
+                if axis.sensed is not None and axis.desired and belief.sd < math.inf and self._has_way(found)
             ]
         else:
             run.held.at = None
@@ -394,6 +394,13 @@ class ForceLoop:
             return q
         along = axes[0].along
         return self._run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
+
+    def _has_way(self, found: Sequence[Event]) -> bool:
+        """Whether an arm that holds has not moved as far as it may."""
+        if self._run.held.at is None or any(event.holds and event.code is Code.AT_LIMIT for event in found):
+            return False
+        here, there = (self._body.tool_pose(q).position for q in (self._q, self._run.held.at))
+        return float(np.linalg.norm(here - there)) <= self.parameters.limits.free_travel
 
     def _no_harder(self, axis: Axis, known: Belief, factor: float) -> Row:
         """An arm that holds presses no harder than commanded, as far as the force is known."""

@@ -53,7 +53,7 @@ def approach_speed(axis: Axis, is_touching: bool, own: ForceLoopParameters) -> f
     late: it rises in no less than some latencies of it on the stiffest surface.
     """
     sensed, place, limits = axis.sensed, axis.place, own.limits
-    if not limits.impact or sensed is None or place is None:
+    if not limits.impact or sensed is None or place is None or not sensed.speed_fraction:
         return math.inf
     slowest = FORCE.creep / limits.settling_time
     whole = axis.desired * yielding(sensed, own)
@@ -81,7 +81,7 @@ def reach_time(axis: Axis, wound: Array, own: ForceLoopParameters) -> float:
     own : parameters of the force loop.
     """
     sensed, place, square = axis.sensed, axis.place, float(axis.along @ axis.along)
-    if sensed is None or place is None or not square:
+    if sensed is None or place is None or not sensed.speed_fraction:
         return 0.0
     free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
     if free < FORCE.creep / own.limits.settling_time or touching < own.limits.surface_speed:
