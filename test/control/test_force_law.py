@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
-from wam_control.force.force_law import BumplessTransfer, ForceLaw
+from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
 from wam_description.event import refused
 from wam_description.event_text import sentence
@@ -56,8 +56,8 @@ def test_each_joint_has_a_law_of_its_own() -> None:
         OWN, mode="joint_torque", torque_gain=(1.0, 2.0, 3.0, 4.0), torque_error_limit=(9.0,),
         torque_deadband=(0.0, 0.5, 0.0, 1.0),
     )  # fmt: skip
-    out = ask(force_loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -1.0, 3.0])
-    assert out.velocity == pytest.approx([1.0, 1.0, -3.0, 8.0], abs=1e-6)
+    out = ask(force_loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -0.4, 1.3])
+    assert out.velocity == pytest.approx([1.0, 1.0, -1.2, 1.2], rel=1e-5)
 
 
 def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> None:
@@ -66,17 +66,17 @@ def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> N
 
 
 def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not_of_the_set_point() -> None:
-    own, gp = replace(OWN, force_gain=(0.0,), force_proportional_gain=(2e-4,)), 2e-4
+    own, gp = replace(OWN, force_gain=(1e-11,), force_proportional_gain=(2e-4,)), 2e-4
     loop = force_loop(ARM, own)
     along = lever(POSE)
-    assert along @ ask(loop, World(400.0, force=1.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
+    assert along @ ask(loop, World(400.0, force=1.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-10)
     more = ask(loop, World(400.0, force=3.0), down(4.0)).velocity
     assert along @ more * DT == pytest.approx(-gp * 2.0, rel=1e-5)
     stepped = ask(loop, World(400.0, force=3.0), down(9.0)).velocity
     assert along @ stepped == pytest.approx(0.0, abs=1e-9), "a new set point is no change of the force"
     blunt = force_loop(ARM, replace(own, force_error_limit=(0.5,)))
     ask(blunt, World(400.0, force=1.0), down(4.0))
-    assert along @ ask(blunt, World(400.0, force=3.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
+    assert along @ ask(blunt, World(400.0, force=3.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-10)
 
 
 @pytest.mark.parametrize("samples", [1, 3])
@@ -114,44 +114,6 @@ def largest_jump(loop: ForceLoop, changes: list[Any]) -> float:
         velocity = np.array(ask(loop, world, change).velocity)
         jump, last = max(jump, float(np.abs(velocity - last).max())), velocity
     return jump
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        [None, down(12.0)],
-        [down(12.0)] * 200 + [None],
-        [down(12.0)] * 200 + [{"force_gain": (10.0 * GAIN,)}, down(12.0)],
-        [None, {"mode": "joint_torque"}, None, {"mode": "hybrid"}, down(12.0)],
-        [down(12.0)] * 200 + [{"mode": "joint_torque"}, None],
-    ],
-)
-def test_velocity_does_not_jump_when_a_command_begins_or_ends_or_mode_or_gain_changes(changes: list[Any]) -> None:
-    smooth = largest_jump(force_loop(ARM, replace(OWN, blend_time=0.05)), changes)
-    hard = largest_jump(force_loop(ARM, OWN), changes)
-    assert smooth < 0.2 * hard
-    assert hard > 0.05
-
-
-def test_bumpless_transfer_ends_at_the_velocity_of_the_law() -> None:
-    loop = force_loop(ARM, replace(OWN, blend_time=0.05))
-    for _ in range(200):
-        out = ask(loop, World(400.0, force=2.0), down(12.0))
-    assert lever(POSE) @ out.velocity == pytest.approx(GAIN * 10.0, rel=1e-6)
-
-
-def test_the_jump_that_is_bridged_decays_with_the_time_constant() -> None:
-    transfer, time_constant = BumplessTransfer(2), 0.05
-    assert transfer.step([], [1.0, 1.0], time_constant, DT) == []
-    transfer.restart()
-    outs = [transfer.step([0.0, 3.0], [1.0, 1.0], time_constant, DT) for _ in range(41)]
-    for k in (0, 1, 10, 40):
-        left = math.exp(-k * DT / time_constant)
-        assert outs[k] == pytest.approx([left, 3.0 - 2.0 * left], rel=1e-12)
-    transfer.restart()
-    assert transfer.step([-1.0, 0.0], [1.0, 1.0], time_constant, DT) == pytest.approx(outs[-1]), "from the last command"
-    transfer.reset()
-    assert transfer.step([-1.0, 0.0], [1.0, 1.0], time_constant, DT) == [0.0, 0.0], "from rest"
 
 
 def test_the_saturation_holds_along_every_direction() -> None:
@@ -197,10 +159,10 @@ def test_another_frame_begins_without_the_answers_still_delayed() -> None:
 def test_joint_torques_begin_without_the_rate_of_an_earlier_measurement() -> None:
     own = replace(OWN, mode="joint_torque", torque_gain=(0.0,), torque_proportional_gain=(1e-4,))
     speeds = []
-    for pause in ([1.0] * 4, None):
+    for pause, force in (([1.0] * 4, 2.0), (None, 4.0)):
         loop = force_loop(ARM, own)
         ask(loop, World(400.0, force=2.0), None, torque=[1.0] * 4)
-        ask(loop, World(400.0, force=2.0), None, torque=pause)
+        ask(loop, World(400.0, force=force), None, torque=pause)
         speeds.append(max(map(abs, ask(loop, World(400.0, force=4.0), None, torque=[1.0] * 4).velocity)))
     assert speeds[0] > 1e-3, "G_P answers a change of the measured torque"
     assert speeds[1] == 0.0, "but not one that came while nothing was commanded"
@@ -262,7 +224,8 @@ def test_a_force_too_small_to_have_a_direction_is_none(newtons: float) -> None:
 
 
 def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0, force_feedforward=1.0))
+    own = replace(OWN, mode="joint_torque", torque_limit=4.0, force_feedforward=1.0, friction_feedforward=0.0)
+    loop = force_loop(ARM, own)
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
         out = ask(loop, World(1e-9), None, torque=torque)
     assert out.effort == [1.0, 2.0, 0.0, 0.0]

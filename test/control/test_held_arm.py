@@ -1,198 +1,174 @@
-"""An arm that holds its position gives way to a surface that comes to it, on the simulated arm and by itself."""
+"""An arm that holds its position, or is pushed: it gives way, no further than allowed, and presses no harder."""
 
-import re
+import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
-from test_force_lasting import DIRECTION, OUTER, PLACE, POSE, press
-from test_force_plant import MOTORS
+from numpy.typing import NDArray
+from test_force_belief import POSES, axis_at
+from test_force_loop import ARM, BODY, CONFIGURATION, DRIVEN, DT, POSE, STILL, down, force_loop
 
-from wam_control.force.arm_push import ArmPush
-from wam_control.force.contact_position import torque_of_position
+from wam_control.force.belief import Torques
+from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.given_way import GivenWay
-from wam_control.force.held_arm import HeldArm
-from wam_control.task.scenario import Push, ScenarioStep
+from wam_control.force.held_arm import HeldArm, PushedArm
 from wam_description.event import Code
-from wam_description.event_text import sentence
-from wam_description.rigid_body import RigidBody
-from wam_description.signals import ForceCommand
-from wam_sim.simulation import Simulation
-from wam_studies.force_benchmark.surfaces import Surface, obstacles
-from wam_studies.force_benchmark.tasks import RANGES, triple
-from wam_studies.force_benchmark.trial import with_accepted_gain
+from wam_description.signals import NO_CONTACT, ForceCommand, State
 
-pytestmark = pytest.mark.slow  # seconds each: the plant in contact
-
-BODY = RigidBody(WAM)
-OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
-DOWN = np.array(DIRECTION)
-ASIDE = BODY.cover_pose(POSE, OUTER).rotation[:, 2]
-WAY = OWN.limits.free_travel
-FAR = {"driver:world.obstacles.positions": [3.0, 3.0, 3.0]}
-NOTHING_NEAR = 0.165  # m, further than the arm may move through free space
-
-
-class Moment(NamedTuple):
-    """Place, m, and speed, m/s, of the tool at a time, s, and what the arm reports."""
-
-    time: float
-    tool: np.ndarray
-    speed: float
-    reaction: Code
-    reason: str
-
-
-def came(
-    step: ScenarioStep, begin: float, cover: str = OUTER, place: float = PLACE, away: float = 0.0, **changes: Any
-) -> tuple[float, Code, str]:
-    """Largest force of a surface that comes at 20 mm/s by 30 mm, N, and what the arm reports at the end."""
-    across = -BODY.cover_pose(POSE, cover).rotation[:, 1]
-    surface = Surface(
-        cover, place, triple(across), 4000.0, 0.3, False, triple(-0.03 * across), 0.106, RANGES.release + begin
-    )
-    given = {
-        "arm.joints.start": list(POSE),
-        "force_loop:guard.posture": list(POSE),
-        "force_loop:contact_cover": OUTER,
-        "force_loop:contact_position": PLACE,
-        **obstacles(BODY, POSE, [surface]),
-    }
-    here = np.array(given["driver:world.obstacles.positions"])
-    given["driver:world.obstacles.positions"] = (here + away * across).tolist()
-    configuration = with_accepted_gain(CONFIGURATION.with_values({**given, **changes}))
-    run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
-    peak, loop = 0.0, run.nodes["force_loop"]
-    while not run.step():
-        peak = max(peak, float(np.linalg.norm(run.driver.true_contact.force)))
-        reaction, reason = loop.reaction.code, sentence(loop.reaction)
-    return peak, reaction, reason
-
-
-def force(newtons: float, direction: np.ndarray, seconds: float) -> ScenarioStep:
-    return ScenarioStep("press", seconds, force=ForceCommand("base", triple(newtons * direction)))
-
-
-@pytest.mark.parametrize(
-    ("step", "given", "reaction", "most"),
-    [
-        (force(4.0, DOWN, 3.5), {"driver:mismatch.payload": 0.3}, Code.NOT_SENSED, 8.0),
-        (force(1.0, ASIDE, 3.5), {}, Code.NOT_SENSED, 4.0),
-        (force(8.0, DOWN, 5.5), {"away": NOTHING_NEAR, "begin": 2.8}, Code.NOTHING_TOUCHED, 12.0),
-        (force(8.0, DOWN, 3.0), {"cover": "inner_link", "place": 0.45}, Code.OTHER_LINK, 12.0),
-        # what the motors do not detect yet presses harder
-        (force(1.0, ASIDE, 3.5), MOTORS, Code.NOT_SENSED, 9.0),
-        (
-            force(15.0, DOWN, 3.0),
-            {"cover": "inner_link", "place": 0.45, **MOTORS},
-            Code.OTHER_LINK,
-            22.0,
-        ),
-    ],
+Array = NDArray[np.float64]
+PACKAGED = CONFIGURATION.node("force_loop", ForceLoopParameters)
+OWN = replace(
+    PACKAGED,
+    contact_source="pinned",
+    guard=replace(PACKAGED.guard, mode="off"),
+    sensing=replace(PACKAGED.sensing, zero_limit=0.0),
 )
-def test_a_surface_that_comes_to_an_arm_that_holds_is_pressed_no_harder_than_commanded(
-    step: ScenarioStep, given: dict[str, Any], reaction: Code, most: float
+HOLDS = replace(OWN, limits=replace(OWN.limits, doubt=0.01))  # nothing is known well enough
+MIDDLE = (0.28, *ARM.covers.aside("outer_link", 0.28))
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.002, 0.05, 1.0])
+def test_an_arm_that_holds_goes_back_to_where_it_held_with_no_more_energy_than_an_allowed_impact(shift: float) -> None:
+    held, inertia, at = HeldArm(), np.diag([1.0, 1.0, 0.5, 0.2]), np.array(POSE)
+    assert not held.velocity(POSE, at, inertia, 5.0, OWN).any()
+    q = (at + shift).tolist()
+    found = held.velocity(q, np.array(q), inertia, 5.0, OWN)
+    assert held.at is at, "not to where it is now"
+    assert (found * shift <= 0.0).all()
+    peak = math.sqrt(float(found @ inertia @ found) * OWN.guard.contact_stiffness)
+    assert peak <= OWN.limits.impact * 5.0 * (1.0 + 1e-9)
+    if 0.0 < shift < 0.01:
+        assert found == pytest.approx([-shift * OWN.posture_gain] * 4)
+
+
+class Pushed:
+    """Velocity servos without error, and a hand that pushes at the middle of the outer link with a force."""
+
+    def __init__(self, own: ForceLoopParameters = OWN, press: float = 0.0) -> None:
+        self.loop: ForceLoop = force_loop(ARM, own)
+        self.q, self.force = list(POSE), down(press)
+        self.codes: set[Code] = set()
+
+    @property
+    def at(self) -> Array:
+        return BODY.point(self.q, "outer_link", MIDDLE)
+
+    def go(self, seconds: float, hand: Any = (0.0, 0.0, 0.0)) -> None:
+        """Push with a force of the world, N."""
+        for _ in range(round(seconds / DT)):
+            torques = np.array(hand) @ BODY.point_jacobian(self.q, "outer_link", MIDDLE)
+            sensors = State(self.q, STILL, (BODY.gravity_torque(self.q) - torques).tolist())
+            command = ForceCommand("base", self.force) if any(self.force) else None
+            joints = State(self.q, STILL, DRIVEN)
+            out = self.loop.step(joints, sensors, NO_CONTACT, None, command, None, None, DT)
+            self.codes |= {event.code for event in self.loop.events}
+            self.q = [a + v * DT for a, v in zip(self.q, out.velocity, strict=True)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("own", "press"), [(OWN, 0.0), (OWN, 8.0), (HOLDS, 8.0)])
+@pytest.mark.parametrize("size", [130.0, 300.0])
+def test_an_arm_that_is_pushed_gives_way_no_further_than_allowed_and_comes_back(
+    own: ForceLoopParameters, press: float, size: float
 ) -> None:
-    """It had not pressed before, and stayed where it was: 27 to 69 N, and nothing was said of it.
-
-    What is above the commanded force is the speed of the surface over the gain of the force, 1.4 N.
-    """
-    peak, found, reason = came(step, **{"begin": 0.2, **given})
-    assert peak < most
-    assert found is reaction
-    assert "something touches the arm" in reason
-
-
-def test_a_false_contact_does_not_make_the_arm_wander() -> None:
-    """Torques that nothing pushes with move the arm that holds by the largest way, and no further."""
-    given = GivenWay(BODY)
-    held, q, place = HeldArm(BODY, given), np.array(POSE), (OUTER, PLACE)
-    own = replace(OWN, limits=replace(OWN.limits, free_travel=0.1))
-    torques = np.array([1.0, 3.0, -0.5, 2.0])
-    held.hold(q.tolist())
-    push = ArmPush(torques, np.full(4, 0.025), place, 1.0, 0.015)
-
-    def step() -> np.ndarray:
-        given.step(q.tolist(), 0.005)
-        return np.array(held.step(q.tolist(), [], push, np.eye(4), own)[0])
-
-    for _ in range(3000):
-        velocity = step()
-        q = q + velocity * 0.005
-    assert np.linalg.norm(BODY.tool_pose(q).position - BODY.tool_pose(POSE).position) == pytest.approx(0.1, rel=0.05)
-    assert np.abs(velocity).max() < 1e-9
-    for _ in range(300):  # what overpowers the motors does not make it give way again
-        q = q + np.array([0.0, 0.001, 0.0, 0.0])
-        assert float(step() @ torques) < 1e-9
-    assert held.pushed > 0.0
+    arm = Pushed(own, press)
+    arm.go(0.3)
+    begin = arm.at
+    arm.go(6.0, size * UP)
+    way = float(UP @ (arm.at - begin))
+    assert 0.05 < way < own.limits.free_travel + 0.03
+    assert Code.PUSHED in arm.codes
+    if not press:
+        arm.go(6.0)
+        assert float(np.linalg.norm(arm.at - begin)) < 0.01
+        assert not arm.loop.events
 
 
-def pushed(command: ForceCommand, hand: Push, pulses: int, pose: list[float], **near: Any) -> list[Moment]:
-    """What an arm does that is pushed at times by a hand, from before the first push on."""
-    given = {"arm.joints.start": pose, "force_loop:guard.posture": pose, **near}
-    steps = [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("press", 2.0, force=command)]
-    steps += [ScenarioStep(f"pushed {k}", 2.2, force=command, push=hand) for k in range(pulses)]
-    run = Simulation(CONFIGURATION.with_values(given), steps)
-    loop, found = run.nodes["force_loop"], []
-    while not run.step():
-        time, plant = 1e-9 * run.driver.stamp - RANGES.release - 2.0, run.driver.plant
-        if run.driver.is_outer and time > 0.0:
-            speed = float(np.linalg.norm(BODY.tool_jacobian(plant.q) @ plant.qd))
-            tool = BODY.tool_pose(plant.q).position
-            found.append(Moment(time, tool, speed, loop.reaction.code, sentence(loop.reaction)))
-    return found
+@pytest.mark.slow
+def test_pushes_again_and_again_move_it_no_further_than_one() -> None:
+    """Five times: the tool had moved by 1.77 m."""
+    arm = Pushed(HOLDS, 8.0)
+    arm.go(0.3)
+    begin, ways = arm.at, []
+    for _ in range(5):
+        arm.go(1.0, 60.0 * UP)
+        ways.append(float(np.linalg.norm(arm.at - begin)))
+        arm.go(0.3)
+    assert max(ways) < OWN.limits.free_travel + 0.03
 
 
-def test_what_pushes_an_arm_again_and_again_moves_it_no_further_than_it_may() -> None:
-    """A hand on the inner link, five times: the tool had moved by 1.77 m.  A force is not stated as larger than it is.
-
-    25 N, with 8 N that the arm presses, were stated as 180 N.
-    """
-    pose = [0.0, -1.8, 0.0, 1.45]
-    across = -BODY.cover_pose(pose, OUTER).rotation[:, 1]
-    surface = Surface(OUTER, PLACE, triple(across), 4000.0, 0.3, False)
-    command = ForceCommand(OUTER, (0.0, -8.0, 0.0), torque_of_position((0.0, -8.0, 0.0), PLACE))
-    hand = Push("inner_link", 0.4, (0.0, 0.0, 25.0), 0.2, 1.4, WAM.covers.aside("inner_link", 0.4))
-    moments = pushed(command, hand, 5, pose, **obstacles(BODY, pose, [surface]))
-    assert max(float(np.linalg.norm(one.tool - moments[0].tool)) for one in moments) < WAY + 0.03
-    stated = [
-        float(size) for one in moments for size in re.findall(r"pushes with (?:at least )?([\d.]+) N", one.reason)
-    ]
-    assert stated
-    assert max(stated) < 1.5 * (25.0 + 8.0)
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [5.0, 60.0])
+def test_what_pushes_less_than_allowed_moves_nothing(size: float) -> None:
+    arm = Pushed()
+    begin = arm.at
+    arm.go(1.0, size * UP)
+    assert arm.at == pytest.approx(begin, abs=1e-6)
+    assert not arm.codes
 
 
-def test_an_arm_that_was_pushed_away_goes_back_no_faster_than_it_may_come_to_a_surface() -> None:
-    """From a push on another link it goes back to where it was free; it came at 1.56 rad/s, 1 m/s."""
-    pose = [0.0, -1.0, 0.0, 1.55]
-    hand = Push("inner_link", 0.4, (0.0, 20.0, 0.0), 0.2, 1.4, WAM.covers.aside("inner_link", 0.4))
-    moments = pushed(ForceCommand("base", (0.0, 0.0, 1.0)), hand, 1, pose, **FAR)
-    assert moments[0].reaction is Code.NOT_SENSED
-    assert moments[-1].reaction is Code.OTHER_LINK
-    assert max(float(np.linalg.norm(one.tool - moments[0].tool)) for one in moments) < WAY + 0.03
-    assert max(one.speed for one in moments if one.time > 1.6) < 0.05
+@pytest.mark.slow
+@pytest.mark.parametrize(("hand", "goes"), [(7.0, False), (20.0, True), (40.0, True)])
+def test_an_arm_that_holds_presses_no_harder_than_commanded(hand: float, goes: bool) -> None:
+    """A surface that came to it, and is pressed with more than the command, is let go of."""
+    arm = Pushed(HOLDS, 8.0)
+    begin = arm.at
+    arm.go(0.1, hand * UP)
+    assert arm.loop.event.code is Code.REFUSED
+    assert arm.loop.event.holds
+    assert (float(UP @ (arm.at - begin)) > 0.005) is goes
+    arm.go(5.0)
+    assert arm.at == pytest.approx(begin, abs=0.003), "it goes back"
 
 
-@pytest.mark.parametrize("as_task", [False, True])
-@pytest.mark.parametrize(("is_near", "newtons"), [(True, 10.0), (True, 20.0), (False, 14.0)])
-def test_what_pushes_against_the_commanded_force_is_followed_no_further_than_the_arm_may_go(
-    is_near: bool, newtons: float, as_task: bool
-) -> None:
-    """On its way to a surface and on one: the arm went back by 0.35 m and more within 8 s, as long as it was pushed."""
-    near = obstacles(BODY, POSE, [Surface(OUTER, PLACE, DIRECTION, 4000.0, 0.3, False)]) if is_near else FAR
-    given = {"arm.joints.start": list(POSE), "force_loop:guard.posture": list(POSE), **near}
-    given |= {"force_loop:contact_source": "pinned", "force_loop:contact_position": PLACE}
-    hand = Push(OUTER, PLACE, triple(-newtons * (BODY.cover_pose(POSE, OUTER).rotation.T @ DOWN)), 0.0, 9.0)
-    steps = [ScenarioStep("release", RANGES.release, request="enable"), press(8.0, 0.4, as_task)]
-    run = Simulation(
-        with_accepted_gain(CONFIGURATION.with_values(given)), [*steps, press(8.0, 9.0, as_task, push=hand)]
-    )
-    places, found = [], set()
-    while not run.step():
-        places.append(float(DOWN @ BODY.point(run.driver.plant.q, OUTER, (PLACE, 0.0, 0.0))))
-        found.add(run.nodes["force_loop"].reaction.code)
-    assert max(places) - min(places) < WAY + 0.02
-    assert Code.NOTHING_TOUCHED in found
+def test_without_a_lever_an_arm_holds() -> None:
+    """A force away from the shoulder of a straight arm: no joint turns along it."""
+    arm, before = Pushed(), [0.0, -1.0, 0.0, math.pi / 2.0]
+    arm.q = list(before)
+    x, y, z = (5.0 * arm.at / np.linalg.norm(arm.at)).tolist()
+    arm.force = x, y, z
+    arm.go(0.2)
+    assert arm.loop.event.code is Code.REFUSED
+    assert arm.q == pytest.approx(before, abs=1e-3)
+
+
+def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
+    q, sd, none = POSES[0], np.full(4, 0.015), np.zeros(4)
+    jacobian, pushed = BODY.tool_jacobian(q), PushedArm(BODY)
+
+    def step(force: float, allowed: float = 20.0, periods: int = 1) -> list[float]:
+        torques = Torques(none + force * UP @ jacobian, none, None, sd)
+        for _ in range(periods):
+            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, allowed, 0.03, OWN, DT)
+        return [row.speed for row in rows]
+
+    def direct(force: float) -> float:
+        """Least force that such torques show."""
+        size = np.linalg.norm(force * UP @ jacobian) - 3.0 * np.linalg.norm(sd)
+        return float(size / np.linalg.norm(jacobian, 2))
+
+    assert step(10.0)[0] < 0.0
+    assert pushed.event is None
+    assert step(200.0)[0] > 0.0
+    assert pushed.event is not None
+    assert pushed.event.code is Code.PUSHED
+    assert pushed.event.values == {"cause": "pushed", "force": pytest.approx(direct(200.0)), "allowed": 20.0}
+    step(0.0, periods=39)
+    assert pushed.event is not None
+    step(0.0, periods=3)
+    assert pushed.event is None
+    assert step(0.0) == [], "noise is given no way"
+
+
+def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> None:
+    q, none, pushed = POSES[0], np.zeros(4), PushedArm(BODY)
+    axis = axis_at(q, 40.0)
+    for k in range(400):
+        size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
+        torques = Torques(-size * axis.along, none, None, np.full(4, 0.015))
+        allowed = 1.5 * (40.0 if k < 100 else 5.0)
+        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, allowed, 0.03, OWN, DT)
+        assert pushed.event is None

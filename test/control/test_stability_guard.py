@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from arms import LEVER, changed, one_joint
 
-from wam_control.force.contact_position import anywhere_sd, position_is_certain
+from wam_control.force.contact_place import anywhere_sd
 from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.force.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_control.force.guard import Watch
@@ -358,13 +358,15 @@ def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, flo
     return -x, -y, -z
 
 
-FREE = replace(OWN.limits, joint_gain=0.0, contact_force=1e9, impact=0.0, free_travel=1e3)
+FREE = replace(
+    OWN.limits, joint_gain=0.0, joint_acceleration=0.0, doubt=1e9, contact_force=1e9, impact=0.0, free_travel=1e3
+)
 
 
 @pytest.mark.slow
 def test_the_velocity_obeys_the_factor() -> None:
     loop = Loop(
-        replace(OWN, force_gain=(0.09,), blend_time=0.0, force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE)
+        replace(OWN, force_gain=(0.09,), force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE)
     )
     follow(loop, OWN.guard.posture)
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -6.0))
@@ -413,13 +415,6 @@ def test_an_uncertain_position_counts_as_the_worst() -> None:
     assert follow(loop, [0.0], Contact("tube", 0.4, (0.0, 1.0, 0.0))) > 1.5
     assert follow(loop, [0.0], Contact("tube", math.nan, (0.0, 1.0, 0.0))) == pytest.approx(1.0, rel=0.01)
     assert follow(loop, [0.0]) == pytest.approx(1.0, rel=0.01)
-
-
-def test_a_position_is_certain_where_it_is_known_closely_enough() -> None:
-    assert position_is_certain(0.2, 0.02, 0.03)
-    assert position_is_certain(0.2, math.nan, 0.03), "no uncertainty is published"
-    assert not position_is_certain(0.2, 0.04, 0.03)
-    assert not position_is_certain(math.nan, 0.0, 0.03)
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ def tries(
     place: Place,
     axes: TaskAxes,
     joints: Joints,
-    believe: Callable[[Axis], Belief],
+    believe: Callable[[Sequence[float], Axis], Belief],
     own: ForceLoopParameters,
 ) -> Iterator[Ways]:
     """After each force that is tried, the way where it would be obeyed with a reserve, else nothing.
@@ -63,7 +63,7 @@ def tries(
     place : where it acts.
     axes : of tasks of this arm.
     joints : of the arm.
-    believe : what would be known of a force.
+    believe : what would be known in a pose of a force.
     own : parameters of the force loop.
     """
     (force,) = task.axes
@@ -71,7 +71,7 @@ def tries(
 
     def is_obeyed(pose: Sequence[float], where: Place, size: float) -> bool:
         (axis,) = axes.of(pose, task._replace(axes=(force._replace(value=size),)), [where], [1.0])
-        return FORCE.reserve * believe(axis).doubt <= own.limits.doubt
+        return FORCE.reserve * believe(pose, axis).doubt <= own.limits.doubt
 
     size = force.value or 0.0
     for name, was, angle, pose in _turned(q, joints, own.limits.joint_margin):

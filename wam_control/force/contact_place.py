@@ -55,7 +55,7 @@ class ContactPlace:
 
     def __init__(self, covers: Covers) -> None:
         self._covers = covers
-        self._last: tuple[str, float, float] | None = None
+        self._last: Place | None = None
         self._pinned = ("", 0.0)
         self._slid = 0.0
 
@@ -91,18 +91,13 @@ class ContactPlace:
         cover = axis.cover or parameters.contact_cover
         assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
         where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)
-        return Place(
-            *where,
-            is_known=self._last is not None,
-            is_in_doubt=bool(contact.cover) and not is_identified,
-            rejection=rejection,
-        )
+        return where._replace(is_in_doubt=bool(contact.cover) and not is_identified, rejection=rejection)
 
-    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> tuple[str, float, float]:
+    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> Place:
         """A position and its standard deviation, m; one that is not known is anywhere on the cover."""
         if math.isnan(position):
             position, is_known = self._covers.length_of(cover) / 2.0, False
-        return cover, position, sd if is_known else anywhere_sd(self._covers, cover, position)
+        return Place(cover, position, sd if is_known else anywhere_sd(self._covers, cover, position), is_known=is_known)
 
 
 def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:

@@ -298,7 +298,7 @@ class ForceLoop:
         run.before = q
         for axis in axes[:1]:
             run.resting.judge(self._q, axis, self._measurement, self._axes.forces, float(torques.sd.max()))
-        known = [self._believe(axis, axes) for axis in axes]
+        known = [self._believe(self._q, axis, axes) for axis in axes]
         run.move(moved, axes, self._axes.forces, self._q)
         found: list[Event] = []
         if run.is_moving:
@@ -322,8 +322,8 @@ class ForceLoop:
             run.free_at = q
         return found, known
 
-    def _believe(self, axis: Axis, axes: Sequence[Axis]) -> Belief:
-        """What is known of the force along an axis of those that are commanded."""
+    def _believe(self, q: Sequence[float], axis: Axis, axes: Sequence[Axis]) -> Belief:
+        """What is known in a pose of the force along an axis of those that are commanded."""
         size = abs(axis.desired)
         if axis.is_joint:  # the torques of the joints are one vector
             size = math.hypot(*(one.desired for one in axes if one.is_joint))
@@ -334,7 +334,7 @@ class ForceLoop:
         # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
         sd = axis.place.position_sd * max(known.force / axis.desired, 0.0) if axis.place.is_known else 0.0
         place = axis.place._replace(position_sd=max(sd, own.contact_position_sd))
-        touched = axis._replace(sensed=self._axes.forces.axis(self._q, place.pressed(axis.direction, axis.desired)))
+        touched = axis._replace(sensed=self._axes.forces.axis(q, place.pressed(axis.direction, axis.desired)))
         return known._replace(errors=self._run.believe(touched, size, torques, own, wound).errors)
 
     def _move(
@@ -366,7 +366,7 @@ class ForceLoop:
             least += [
                 self._no_harder(axis, belief, factor)
                 for axis, belief in zip(axes, known, strict=True)
-                if axis.sensed is not None and axis.desired and belief.sd < math.inf
+                if axis.sensed is not None and axis.desired and belief.sd < math.inf and self._has_way(found)
             ]
         else:
             run.held.at = None
@@ -395,6 +395,13 @@ class ForceLoop:
             return q
         along = axes[0].along
         return self._run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
+
+    def _has_way(self, found: Sequence[Event]) -> bool:
+        """Whether an arm that holds has not moved as far as it may."""
+        if self._run.held.at is None or any(event.holds and event.code is Code.AT_LIMIT for event in found):
+            return False
+        here, there = (self._body.tool_pose(q).position for q in (self._q, self._run.held.at))
+        return float(np.linalg.norm(here - there)) <= self.parameters.limits.free_travel
 
     def _no_harder(self, axis: Axis, known: Belief, factor: float) -> Row:
         """An arm that holds presses no harder than commanded, as far as the force is known."""
@@ -583,7 +590,7 @@ class ForceLoop:
                 place,
                 self._axes,
                 self._body.arm.joints,
-                lambda axis: self._believe(axis, [axis]),
+                lambda q, axis: self._believe(q, axis, [axis]),
                 self.parameters,
             )
         )

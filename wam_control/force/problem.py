@@ -82,7 +82,8 @@ def _limited(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Arr
     sides[:n, :n], sides[:n, n : 2 * n] = np.eye(n), -np.eye(n)
     for j, row in enumerate(least):
         sides[:n, 2 * n + j], sides[n + j, 2 * n + j] = row.along / row.size, 1.0
-    bounds = np.concatenate([low, -high, [row.speed / row.size for row in least]])
+    wide = FORCE.rounded_speed  # quadprog takes bounds that are equal for contradictory ones
+    bounds = np.concatenate([low - wide, -high - wide, [row.speed / row.size for row in least]])
     found = quadprog.solve_qp(quadratic, np.concatenate([right, np.zeros(m)]), sides, bounds)[0][:n]
     result: Array = np.clip(found, low, high)
     return result

@@ -25,6 +25,7 @@ class ForceThresholds:
     negligible: float = 1e-12  # of what is 1 where it counts
     shortest_lever: float = 1e-9  # m or 1, of an axis along which nothing moves
     rounding: float = 1e-9  # of sums of periods
+    rounded_speed: float = 1e-7  # rad/s, of the solution of a limited problem
     # touch and link
     touch: float = 0.2  # of the commanded force, from which something is touched
     bouncing_time: float = 0.1  # s after the first touch, in which an impact turns the force

@@ -1,0 +1,164 @@
+"""One number decides: the predicted error of a force by its causes, per tolerated error."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+from numpy.typing import NDArray
+
+from wam_control.force.axes import Axis, TaskAxes
+from wam_control.force.belief import Belief, Errors, Torques, belief, predicted, tolerance, yielding
+from wam_control.force.contact_place import Place
+from wam_control.force.force_axis import ForceAxes, PressedForce
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
+from wam_description.rigid_body import RigidBody
+
+Array = NDArray[np.float64]
+BODY = RigidBody(WAM)
+OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
+PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
+FORCES, OUTER = ForceAxes(WAM, BODY, PLAIN.sensing), "outer_link"
+POSES = ((0.3, -1.2, 0.2, 1.0), (0.0, -1.0, 0.0, 1.2), (0.5, 0.2, -0.4, 0.8))
+SD = np.full(4, OWN.sensing.torque_sd)
+NONE = np.zeros(4)
+
+
+def axis_at(q: Sequence[float], force: float = 10.0, sd: float = 0.01) -> Axis:
+    direction = BODY.cover_pose(q, OUTER).rotation[:, 2].tolist()
+    of = TaskAxis(AxisKind.FORCE, -1, OUTER, 0.28, tuple(direction), force)
+    place = Place(OUTER, 0.28, sd, is_pinned=True, is_known=True)
+    return TaskAxes(WAM, BODY, FORCES).of(q, TaskCommand("base", (of,)), [place], [1.0])[0]
+
+
+def errors(q: Sequence[float], force: float, sd: float = 0.01, **more: float) -> Errors:
+    sensed = axis_at(q, force, sd).sensed
+    assert sensed is not None
+    return predicted(sensed, SD, PLAIN, **more)
+
+
+@pytest.mark.parametrize(
+    ("part", "limits", "given"),
+    [
+        ("torques", {}, {"torque_sd": 1.0}),
+        ("place", {}, {"sd": 0.1}),
+        ("resting", {}, {"resting": -9.0}),
+        ("moving_surface", {"surface_speed": 0.1}, {}),
+        ("moving_surface", {"slide_speed": 1.0}, {}),
+        ("slow_arm", {}, {"reach_time": 2.0}),
+        ("slow_arm", {"settling_time": 1e-3}, {}),
+        ("shaking_arm", {}, {"shaking": 100.0}),
+        ("friction", {}, {"torque_sd": 1e-5, "sd": 0.0}),
+    ],
+)
+def test_each_cause_counts_by_itself_and_is_named_where_it_is_the_largest(
+    part: str, limits: dict[str, float], given: dict[str, Any]
+) -> None:
+    sensed = axis_at(POSES[0], 10.0, given.pop("sd", 0.01)).sensed
+    assert sensed is not None
+    own, torque_sd = replace(PLAIN, limits=replace(PLAIN.limits, **limits)), given.pop("torque_sd", SD[0])
+    found, without = predicted(sensed, np.full(4, torque_sd), own, **given), errors(POSES[0], 10.0)
+    assert found.cause == part
+    assert found.size == pytest.approx(math.sqrt(sum(each**2 for each in found)))
+    if part != "friction":
+        assert getattr(found, part) > getattr(without, part)
+        assert found.size > without.size
+
+
+@pytest.mark.parametrize("q", POSES)
+def test_more_force_is_never_known_worse_per_newton(q: tuple[float, ...]) -> None:
+    for sd, more in ((0.01, {}), (0.1, {"resting": 0.5}), (0.0, {"shaking": 2.0})):
+        doubts = [errors(q, force, sd, **more).size / tolerance(force, PLAIN) for force in (1, 2, 5, 10, 20, 40, 60)]
+        assert all(later <= before * (1.0 + 1e-6) for before, later in pairwise(doubts))
+        assert doubts[-1] < doubts[0]
+
+
+@pytest.mark.parametrize("q", POSES)
+def test_more_of_what_is_not_known_is_never_better(q: tuple[float, ...]) -> None:
+    base = errors(q, 10.0).size
+    worse = [{"sd": 0.03}, {"resting": 0.3}, {"shaking": 1.0}, {"reach_time": 9.0}]
+    assert all(errors(q, 10.0, **more).size > base for more in worse)
+
+
+@pytest.mark.parametrize("q", POSES)
+def test_the_predicted_error_is_that_of_random_torques_friction_and_position(q: tuple[float, ...]) -> None:
+    """The surface pushes back at a place that is off, with friction, and the sensors err."""
+    random, n, axis = np.random.default_rng(2), 5000, axis_at(q, 10.0, 0.02)
+    assert axis.sensed is not None
+    radius, rotation = WAM.covers.radius_of(OUTER), BODY.cover_pose(q, OUTER).rotation
+    across = np.eye(3) - np.outer(axis.direction, axis.direction)
+    found = []
+    for off, sideways, noise in zip(
+        0.02 * random.normal(size=n), random.normal(size=(n, 3)), SD * random.normal(size=(n, 4)), strict=True
+    ):
+        point = np.array([0.28 + off, *WAM.covers.aside(OUTER, 0.28)]) + radius * (rotation.T @ axis.direction)
+        force = 10.0 * axis.direction + 10.0 * PLAIN.sensing.friction * across @ sideways
+        torques = noise - force @ BODY.point_jacobian(q, OUTER, point)
+        found.append(axis.force(torques) - 10.0)
+    sensed = predicted(axis.sensed, SD, PLAIN)
+    assert np.std(found) == pytest.approx(sensed.size, rel=0.08)
+
+
+def test_without_a_lever_nothing_is_known() -> None:
+    straight = (0.0, -1.0, 0.0, math.pi / 2.0)
+    tip = BODY.point(straight, OUTER, (0.3, 0.0, 0.0))
+    axis = FORCES.axis(straight, PressedForce(OUTER, 0.3, 0.0, tip / np.linalg.norm(tip), 10.0))
+    assert predicted(axis, SD, PLAIN).size == math.inf
+
+
+@pytest.mark.parametrize(
+    ("force", "share", "least", "expected"), [(10.0, 0.1, 0.0, 1.0), (-10.0, 0.1, 0.3, 1.0), (1.0, 0.1, 0.3, 0.3)]
+)
+def test_the_tolerance_is_a_share_of_the_force_and_no_less_than_the_least(
+    force: float, share: float, least: float, expected: float
+) -> None:
+    own = replace(OWN, limits=replace(OWN.limits, tolerance=share, least_tolerance=least))
+    assert tolerance(force, own) == pytest.approx(expected)
+    known = Belief(force, force, 0.0, 0.0, Errors(friction=0.3, place=0.4), expected)
+    assert known.doubt == pytest.approx(0.5 / expected)
+    assert known._replace(tolerance=0.0).doubt == math.inf
+
+
+@pytest.mark.parametrize("is_touching", [False, True])
+def test_the_arms_own_motion_is_no_force_until_something_is_touched(is_touching: bool) -> None:
+    axis, acceleration = axis_at(POSES[0]), np.array([2.0, -3.0, 1.0, 4.0])
+    inertial = -FORCES.inertia(POSES[0]) @ acceleration  # as sensors show it
+    torques = Torques(inertial, inertial, acceleration, SD)
+    known = belief(axis, 10.0, torques, PLAIN, is_touching, NONE, 0.0, 0.0)
+    assert (abs(known.force) < 1e-9) is not is_touching
+    at_rest = belief(axis, 10.0, torques._replace(acceleration=None), PLAIN, False, NONE, 0.0, 0.0)
+    assert at_rest.force == pytest.approx(axis.force(inertial)), "motors do not show it"
+
+
+def test_torques_at_rest_count_as_the_force_that_they_look_like() -> None:
+    axis = axis_at(POSES[0])
+    assert axis.sensed is not None
+    none = Torques(NONE, NONE, None, SD)
+    known = belief(axis, 10.0, none, PLAIN, False, -2.0 * axis.sensed.press, 0.0, 0.0)
+    assert known.errors.resting == pytest.approx(2.0)
+    assert known.doubt > 1.0
+    assert belief(axis, 60.0, none, PLAIN, False, -2.0 * axis.sensed.press, 0.0, 0.0).doubt < 1.0
+
+
+def test_a_joint_torque_is_known_as_its_joint_is() -> None:
+    task = TaskCommand("base", joint_axes(AxisKind.FORCE, [1.0, 2.0, 0.0, -3.0]))
+    axes = TaskAxes(WAM, BODY, FORCES).of(POSES[0], task, [Place("", 0.0, 0.0)] * 4, [1.0] * 4)
+    torques = Torques(np.array([0.5, -2.0, 0.0, 3.0]), NONE, None, np.array([0.1, 0.2, 0.3, 0.4]))
+    resting = np.array([0.0, 0.1, 0.0, 0.0])
+    known = [belief(axis, 4.0, torques, PLAIN, False, resting, 0.0, 0.0) for axis in axes]
+    assert [each.force for each in known] == [-0.5, 2.0, 0.0, -3.0]
+    assert [each.sd for each in known] == [0.1, 0.2, 0.3, 0.4]
+    assert [each.doubt for each in known] == pytest.approx([0.25, math.hypot(0.5, 0.25), 0.75, 1.0])
+
+
+def test_a_stiff_surface_yields_as_the_cables_do() -> None:
+    sensed = axis_at(POSES[0]).sensed
+    assert sensed is not None
+    stiff = replace(PLAIN, guard=replace(PLAIN.guard, contact_stiffness=1e12))
+    assert yielding(sensed, stiff) == pytest.approx(sensed.compliance)
+    assert yielding(sensed, PLAIN) == pytest.approx(sensed.compliance + 1.0 / 4000.0)

@@ -1,0 +1,169 @@
+"""What bounds the motion: joint ends, the acceleration, the impact, the rise of a force, and pushes."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+from test_force_belief import BODY, OUTER, OWN, POSES, axis_at
+
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.limits import (
+    Push,
+    accelerated,
+    approach_speed,
+    calm,
+    followed,
+    joint_bounds,
+    likeliest_link,
+    reach_time,
+    resolution,
+)
+from wam_description.transmission_map import TransmissionMap
+
+JOINTS, DT = WAM.joints, 0.005
+MOTORS = replace(OWN, feedback="contact_estimate")
+WOUND = TransmissionMap.of(WAM).at_joints(CONFIGURATION.shared.servo.integral_gain)
+LOWER, UPPER = np.array(JOINTS.lower), np.array(JOINTS.upper)
+
+
+def limited(own: ForceLoopParameters = OWN, **limits: float) -> ForceLoopParameters:
+    return replace(own, limits=replace(own.limits, **limits))
+
+
+def test_no_joint_comes_nearer_to_its_end_than_allowed_however_it_is_driven() -> None:
+    random = np.random.default_rng(1)
+    for seed in range(10):
+        q, sign = random.uniform(LOWER + 0.1, UPPER - 0.1), 1.0 if seed % 2 else -1.0
+        for _ in range(1500):
+            low, high = joint_bounds(q.tolist(), JOINTS, OWN)
+            assert (low <= high).all()
+            assert max(abs(low).max(), abs(high).max()) <= OWN.joint_speed_limit
+            q = q + (high if sign > 0 else low) * DT
+        ends = UPPER - OWN.limits.joint_margin if sign > 0 else LOWER + OWN.limits.joint_margin
+        assert q == pytest.approx(ends, abs=1e-3)
+
+
+def test_a_joint_beyond_its_end_is_brought_back_slowly() -> None:
+    q = UPPER + 0.2
+    for _ in range(2000):
+        low, high = joint_bounds(q.tolist(), JOINTS, OWN)
+        assert (low <= high).all()
+        assert (high >= -0.3).all()
+        q = q + high * DT
+    assert q == pytest.approx(UPPER, abs=1e-3)
+    free = joint_bounds((UPPER + 0.2).tolist(), JOINTS, limited(joint_gain=0.0))
+    assert (free[1] == OWN.joint_speed_limit).all(), "ends that are not watched"
+
+
+def test_the_acceleration_is_bounded_within_the_bounds_of_the_speed() -> None:
+    random = np.random.default_rng(3)
+    for _ in range(300):
+        low, high = np.sort(random.uniform(-1.0, 1.0, (2, 4)), axis=0)
+        before, step = random.uniform(-2.0, 2.0, 4), 0.1
+        least, most = accelerated(low, high, before, step)
+        assert (least <= most).all()
+        assert (least >= low).all()
+        assert (most <= high).all()
+        is_within = (before >= low) & (before <= high)
+        assert (np.abs(least - before)[is_within] <= step + 1e-12).all()
+        assert (np.abs(most - before)[is_within] <= step + 1e-12).all()
+
+
+@pytest.mark.parametrize("q", POSES)
+@pytest.mark.parametrize("own", [OWN, MOTORS])
+def test_an_approach_hits_no_harder_than_allowed_and_a_touch_rises_no_faster_than_it_is_measured(
+    own: ForceLoopParameters, q: tuple[float, ...]
+) -> None:
+    stiffness = own.guard.contact_stiffness
+    for force in (2.0, 10.0, 40.0):
+        axis = axis_at(q, force)
+        assert axis.sensed is not None
+        assert axis.place is not None
+        fraction = axis.sensed.speed_fraction
+        hit = fraction * approach_speed(axis, False, own) * math.sqrt(axis.sensed.impact_mass * stiffness)
+        assert hit == pytest.approx(own.limits.impact * force)
+        rising = fraction * approach_speed(axis, True, own) / (1.0 / stiffness + axis.sensed.compliance)
+        latency = own.force_filter + (own.guard.feedback_lag if own.is_estimated else 0.0)
+        assert rising * 5.0 * latency <= force, "at least 5 latencies"
+        unknown = axis._replace(place=axis.place._replace(is_pinned=False, is_known=False))
+        for is_touching in (False, True):
+            assert approach_speed(unknown, is_touching, own) <= approach_speed(axis, is_touching, own)
+    speeds = [approach_speed(axis_at(q, force), True, own) for force in (1.0, 2.0, 5.0, 20.0)]
+    assert all(b > a for a, b in pairwise(speeds))
+    assert approach_speed(axis_at(q), False, limited(own, impact=0.0)) == math.inf
+
+
+def test_a_surface_that_the_arm_does_not_reach_in_time_is_never_reached() -> None:
+    axis = axis_at(POSES[0])
+    assert axis.place is not None
+    assert reach_time(axis, WOUND, MOTORS) == 0.0, "at a pinned place the torque is fed forward"
+    estimated = axis._replace(place=axis.place._replace(is_pinned=False))
+    assert reach_time(estimated, WOUND, OWN) == 0.0
+    late = reach_time(estimated, WOUND, MOTORS)
+    assert 0.0 < late < math.inf
+    assert reach_time(estimated, 2.0 * WOUND, MOTORS) == pytest.approx(late / 2.0)
+    assert reach_time(axis, WOUND, limited(surface_speed=1.0)) == math.inf
+    assert reach_time(axis, WOUND, limited(impact=1e-4)) == math.inf
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e6])
+def test_what_is_left_alone_is_a_small_part_of_what_is_tolerated(stiffness: float) -> None:
+    own = replace(OWN, guard=replace(OWN.guard, contact_stiffness=stiffness))
+    for force in (1.0, 10.0, 40.0):
+        sensed = axis_at(POSES[0], force).sensed
+        assert sensed is not None
+        assert 0.0 < resolution(sensed, force, own) <= 0.3 * own.limits.tolerance * force
+
+
+@pytest.mark.parametrize("cover", ["outer_link", "inner_link"])
+def test_a_push_is_never_stated_as_larger_than_the_force(cover: str) -> None:
+    random, sd = np.random.default_rng(5), np.full(4, 0.02)
+    for _ in range(300):
+        q = random.uniform(LOWER, UPPER)
+        jacobian = BODY.point_jacobian(q, cover, (0.25, 0.0, 0.0))
+        force = random.normal(size=3)
+        force *= 50.0 / np.linalg.norm(force)
+        push = Push.at(force @ jacobian, sd, jacobian)
+        assert 0.0 <= push.least <= 50.0 * (1.0 + 1e-9)
+        assert Push.at(0.02 * random.normal(size=4), 0.1 * np.ones(4), jacobian).least == 0.0, "noise is no push"
+
+
+def test_an_arm_gives_way_to_what_is_above_the_allowed_force_and_does_not_move_against_it() -> None:
+    jacobian = BODY.point_jacobian(POSES[0], OUTER, (0.28, 0.0, 0.0))
+    push = Push.at(np.array([0.0, -40.0, 0.0, 60.0]) @ np.eye(4), np.zeros(4), jacobian)
+    for part, sense in ((0.5, 1.0), (1.0, 0.0), (2.0, -1.0)):
+        row = push.row(part * push.least, 0.03, 1.5)
+        assert row.along @ push.torques > 0.0, "along the torques of the world"
+        assert np.sign(round(row.speed, 12)) == sense
+    assert push.row(0.0, 1e9, 1.5).speed == 1.5
+
+
+def test_the_link_that_is_pushed_is_the_one_that_explains_the_torques() -> None:
+    for cover, length in zip(WAM.covers.names, WAM.covers.length, strict=True):
+        jacobian = BODY.point_jacobian(POSES[0], cover, (0.5 * length, 0.0, 0.0))
+        found = likeliest_link(BODY, POSES[0], np.array([3.0, -9.0, 6.0]) @ jacobian)
+        assert found == pytest.approx(jacobian)
+
+
+def test_an_arm_that_goes_back_has_no_more_than_the_allowed_energy() -> None:
+    inertia = np.diag([1.0, 2.0, 0.5, 0.1])
+    for speed in (1e-3, 0.1, 3.0):
+        wanted = speed * np.array([1.0, -1.0, 0.5, 2.0])
+        found = calm(wanted, inertia, 0.01)
+        assert 0.5 * found @ inertia @ found <= 0.01 * (1.0 + 1e-9)
+        assert np.cross(found[:3], wanted[:3]) == pytest.approx([0.0] * 3)
+        assert speed > 1e-3 or (found == wanted).all()
+
+
+def test_a_posture_slides_the_link_no_faster_than_the_force_follows() -> None:
+    axis = axis_at(POSES[0], 5.0)
+    point = (0.28, *WAM.covers.aside(OUTER, 0.28))
+    for speed in (1e-3, 1.0):
+        wanted = speed * np.array([1.0, 0.5, -0.5, 1.0])
+        found = followed(wanted, axis, BODY, POSES[0], OWN)
+        slide = float(np.linalg.norm(BODY.point_jacobian(POSES[0], OUTER, point) @ found))
+        assert 0.3 * slide <= max(OWN.force_gain) * OWN.limits.tolerance * 5.0 * (1.0 + 1e-9)
+        assert speed > 1e-3 or (found == wanted).all()

@@ -1,0 +1,116 @@
+"""The problem of one period against its own definition: nothing that is allowed is better."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import quadprog
+from numpy.typing import NDArray
+
+from wam_control.force.problem import RANK, Row, linear, solve
+
+Array = NDArray[np.float64]
+N = 4
+NEAR = 1e-4  # rad/s
+
+
+class Case(NamedTuple):
+    """A random problem."""
+
+    rows: list[Row]
+    posture: Array
+    least: list[Row]
+    low: Array
+    high: Array
+
+
+def random_case(seed: int, rows: int | None = None, pushes: int | None = None) -> Case:
+    random = np.random.default_rng(seed)
+
+    def some(count: int) -> list[Row]:
+        return [Row(random.normal(size=N) * 10.0 ** random.uniform(-2, 0), random.normal()) for _ in range(count)]
+
+    many, few = random.integers(0, 4) if rows is None else rows, random.integers(0, 3) if pushes is None else pushes
+    low, high = np.sort(random.uniform(-1.5, 1.5, (2, N)), axis=0)
+    return Case(some(many), random.normal(size=N), some(few), low, high)
+
+
+def cost(case: Case, v: Array) -> float:
+    off = sum((row.along @ v - row.speed) ** 2 / row.size**2 for row in case.rows)
+    short = sum(max(0.0, row.speed - row.along @ v) ** 2 / row.size**2 for row in case.least)
+    return float((v - case.posture) @ (v - case.posture) + RANK * (off + short))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_bounds_hold_and_no_velocity_within_them_is_better(seed: int) -> None:
+    case, random = random_case(seed), np.random.default_rng(seed)
+    found = solve(*case).velocity
+    assert (found >= case.low).all()
+    assert (found <= case.high).all()
+    best = cost(case, found) * (1.0 + 1e-6) + 1e-6
+    others = [random.uniform(case.low, case.high) for _ in range(100)]
+    others += [found + random.normal(size=N) * 10.0 ** random.uniform(-6, 0) for _ in range(400)]
+    assert all(cost(case, np.clip(other, case.low, case.high)) >= best * (1.0 - 1e-5) - 2e-6 for other in others)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: int) -> None:
+    case = random_case(seed, rows=seed % 4, pushes=0)
+    far = np.full(N, 1e9)
+    found = solve(case.rows, case.posture, [], -far, far)
+    assert found.velocity is found.unlimited
+    matrix, right = np.eye(N), case.posture
+    for along, speed in case.rows:
+        matrix = matrix + np.outer(along, along) * RANK / float(along @ along)
+        right = right + along * speed * RANK / float(along @ along)
+    assert found.velocity == pytest.approx(quadprog.solve_qp(matrix, right)[0], abs=NEAR)
+    if not case.rows:
+        return
+    drive, hold = linear([row.along for row in case.rows], N)
+    speeds = np.array([row.speed for row in case.rows])
+    linearly = drive @ speeds + hold @ case.posture
+    assert found.velocity == pytest.approx(linearly, abs=NEAR), "the guard judges what is commanded"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_limits_that_are_not_reached_change_no_bit(seed: int) -> None:
+    case, far = random_case(seed, rows=1, pushes=0), np.full(N, 1e9)
+    free = solve(case.rows, case.posture, [], -far, far).velocity
+    slack = [Row(row.along, float(row.along @ free) - 0.1) for row in random_case(seed + 99, pushes=2).least]
+    found = solve(case.rows, case.posture, slack, free - 0.1, free + 0.1)
+    assert found.velocity is found.unlimited
+    assert (found.velocity == free).all()
+    (row,) = case.rows
+    assert row.along @ free == pytest.approx(row.speed, abs=1e-12)
+
+
+def test_a_row_comes_before_the_posture_and_a_push_as_high_as_a_row() -> None:
+    along, aside = np.array([0.3, 0.4, 0.0, 0.0]), np.array([0.4, -0.3, 0.0, 0.0])
+    posture, far = np.array([1.0, 0.0, 0.5, 0.0]), np.full(N, 9.0)
+    found = solve([Row(along, 0.1)], posture, [], -far, far).velocity
+    assert along @ found == pytest.approx(0.1)
+    assert aside @ found == pytest.approx(aside @ posture), "what is left belongs to the posture"
+    pushed = solve([Row(along, 0.1)], posture, [Row(along, 0.3)], -far, far).velocity
+    assert along @ pushed == pytest.approx(0.2, abs=1e-4), "half of what contradicts each other"
+    apart = solve([Row(along, 0.1)], posture, [Row(aside, 0.7)], -far, far).velocity
+    assert (along @ apart, aside @ apart) == (pytest.approx(0.1, abs=1e-4), pytest.approx(0.7, abs=1e-4))
+
+
+@pytest.mark.parametrize("along", [np.zeros(N), np.full(N, 1e-12)])
+def test_a_row_without_a_lever_moves_nothing(along: Array) -> None:
+    posture, far = np.full(N, 0.2), np.full(N, 1.0)
+    found = solve([Row(along, 1.0)], posture, [Row(along, 1.0)], -far, far).velocity
+    assert (found == posture).all()
+    drive, _ = linear([along], N)
+    assert not drive.any()
+
+
+@pytest.mark.parametrize("fixed", range(N + 1))
+def test_a_joint_that_may_move_at_one_velocity_alone_does_so_whatever_is_asked(fixed: int) -> None:
+    for seed in range(100):
+        case = random_case(seed)
+        low = np.where(np.arange(N) < fixed, case.high, case.low)
+        fast = [[row._replace(speed=30.0 * row.speed) for row in rows] for rows in (case.rows, case.least)]
+        found = solve(fast[0], case.posture, fast[1], low, case.high).velocity
+        assert (found >= low).all()
+        assert (found <= case.high).all()
