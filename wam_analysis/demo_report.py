@@ -13,7 +13,7 @@ import numpy as np
 from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
 from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
 from wam_analysis.demo_figure import save
-from wam_analysis.demo_summary import DemoSummary, LoopReport, SteadyPress, summary_of
+from wam_analysis.demo_summary import DemoSummary, LoopReport, SteadyPress, failure_of, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
@@ -22,7 +22,7 @@ from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
 from wam_description.event import Code
 from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
-from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.recording import recorded_run
 
 
 class VerdictResult(StrEnum):
@@ -94,15 +94,8 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
     wrong = [str(answer) for answer in verdict(summary) if answer.result is VerdictResult.NO]
-    failed = [f"FAILED: {failure}" for failure in [_failure(run)] if failure]
+    failed = [f"FAILED: {why}" for why in [failure_of(run)] if why]
     return DemoReport("\n".join([text(summary, notes), "", *files]), (*failed, *wrong))
-
-
-def _failure(run: RecordedRun) -> str:
-    """Why a run failed, '' where it did not or the recording ends before the scenario does, without a fault."""
-    if run.outcome:
-        return "" if run.outcome == Code.DONE else run.outcome
-    return run.faults[-1].reason if run.faults else ""
 
 
 def reaction_report(bag: Path) -> str:

@@ -81,7 +81,7 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
     assert str(answer) == "commands carried out: NO (1 refused, 1 not reached)"
     analysis = analyse_bag(read(tmp_path / "bag"), lambda stage: None)
     sections = {section.key: section for section in analysis.sections}
-    assert "NOT REACHED in the end: nothing there." in sections["verdict"].sentences
+    assert "NOT REACHED in the end: nothing there." in sections["force"].wrong
     beside = [  # a force that is right, in the same step
         SteadyPress(step.name, steady_begin(step), step.end, 8.0, 8.0, 0.0, 8.0, 8.0, 3.0, reactions=())
         for step in summary.steps
@@ -108,7 +108,7 @@ def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) 
     assert words in str(answer)
     assert "not reached" not in str(answer)
     sections = {section.key: section for section in analyse_bag(bag, lambda stage: None).sections}
-    assert any(words in line for line in sections["verdict"].sentences)
+    assert any(words in line for line in sections["force"].wrong)
 
 
 @pytest.mark.slow
@@ -141,7 +141,7 @@ def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[D
     summary, analysis = found
     begins = {step.name: step.begin / 1e9 for step in summary.steps}
     sections = {section.key: section for section in analysis.sections}
-    (said,) = (line for line in sections["verdict"].sentences if line.startswith("REFUSED"))
+    (said,) = (line for line in sections["force"].wrong if line.startswith("REFUSED"))
     for name, (kind, reason) in REFUSED.items():
         assert any(line.startswith(name) and reason in line for line in sections["force"].sentences), name
         assert f"({kind} at {begins[name]:.2f} s)" in said or f"({kind} at {begins[name] + 0.005:.2f} s)" in said
@@ -156,7 +156,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
     for name in REFUSED:
         assert {one.partition(": ")[2] for one in measured if one.startswith(name)} == {"refused for"}
     assert "press across: overshoot" in measured
-    assert not any("MISSED" in line for line in sections["verdict"].sentences)
+    assert not any("MISSED" in line for line in sections["force"].wrong)
 
 
 @pytest.mark.slow

@@ -34,12 +34,13 @@ def contact_section(recording: AnalysedRun) -> Section:
     lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
+    wrong = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
+    shows: list[str] = []
     for number, contact in enumerate(summary.contacts, 1):
         name = f"{number} {contact.estimate.link}"
         sentences += _doubts(name, contact)
         findings += _numbers(name, contact)
-    sentences += verdict
+    sentences += wrong
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
     touching = known & true.acts
@@ -62,7 +63,7 @@ def contact_section(recording: AnalysedRun) -> Section:
                 note="of the vector: the norm of its three components; where the force is not the least one",
             ),
         ]
-        verdict.append(f"Contact: on the right link {right:.0f} % of the time{_errors(away, off)}.")
+        shows.append(f"Contact: right link {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
         false = known & sensed.acts & ~true.acts
         count = len(runs(false))
@@ -70,10 +71,10 @@ def contact_section(recording: AnalysedRun) -> Section:
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
             sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
-            verdict.insert(0, sentences[-1])
+            wrong.insert(0, sentences[-1])
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
-        verdict.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
+        shows.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
     if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
         sentences.append(NOT_CERTAIN)
     if not all(contact.estimate.is_placed for contact in summary.contacts):
@@ -82,7 +83,7 @@ def contact_section(recording: AnalysedRun) -> Section:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
     findings += _tracked_friction(recording)
-    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(shows), tuple(wrong))
 
 
 def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
@@ -133,6 +134,5 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
 
 
 def _errors(away: float, off: float) -> str:
-    named = ((away, "cm", "of the position"), (off, "N", "of the force vector, its size"))
-    known = [f"{shown(value, unit)} {what}" for value, unit, what in named if math.isfinite(value)]
-    return f"; median errors {' and '.join(known)}" if known else ""
+    known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
+    return f", median error {' and '.join(known)}" if known else ""
