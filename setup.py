@@ -132,6 +132,8 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # the arm of Barrett Technology on its CAN bus
+        "bus": ["python-can"],
         # the inner loop as C: WAM_COMPILE
         "compile": ["mypy", "setuptools<80"],
         # Tab in the shell: `register-python-argcomplete wam`
@@ -153,6 +155,7 @@ setup(
             "mypy",
             "pytest<9",
             "pytest-xdist",
+            "python-can",
             "rosbags",
             "ruff",
             "scipy",
