@@ -94,7 +94,7 @@ def test_the_arm_starts_wakes_and_follows_torques_with_any_firmware(name: str, v
     rig.arm.brake()
     assert not any(rig.bus.commanded)
     rig.run(0.1)
-    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.25)
+    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
     assert not any(rig.arm.current)
 
 

@@ -167,19 +167,20 @@ class SimulatedBus:
                 self._obey(one, frame)
 
     def _obey(self, one: SimulatedController, frame: Frame) -> None:
-        before, mode = dict(one.values), self._safety.values["MODE"]
-        for answer in one.take(frame):
+        before = dict(one.values)
+        answers = one.take(frame)
+        wanted = one.values["MODE"]
+        if one is self._safety:
+            one.values["MODE"] = before["MODE"]
+            if wanted < before["MODE"] and one.values["VERS"] >= BUS.settable_version:  # only a person goes upwards
+                self._set_mode(SafetyMode(before["MODE"]), SafetyMode(wanted))
+        elif one.values["P"] != before["P"]:
+            self._offsets[one.node - 1] += one.values["P"] - before["P"]
+        elif one.values["STAT"] == BUS.ready != before["STAT"]:
+            one.values["STAT"], one.woken = before["STAT"], self.time
+        for answer in answers:
             self._spend(answer)
             self._queue += self.on_line(answer)
-        if one is self._safety:
-            wanted, one.values["MODE"] = one.values["MODE"], mode
-            if wanted < mode and one.values["VERS"] >= BUS.settable_version:  # only a person goes upwards
-                self._set_mode(SafetyMode(mode), SafetyMode(wanted))
-        elif one.values.get("P") != before.get("P"):
-            at = one.node - 1
-            self._offsets[at] += one.values["P"] - before["P"]
-        elif one.values["STAT"] == BUS.ready != before["STAT"]:
-            one.values["STAT"], one.woken = 0, self.time
 
     def _spend(self, frame: Frame) -> None:
         """Let the bits of a frame pass, at 1 Mbit/s, one in ten of them stuffed."""
