@@ -173,7 +173,10 @@ setup(
         (f"share/{name}/rviz", sorted(glob("rviz/*.rviz"))),
         (f"lib/{name}", launchers),
     ],
-    entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},
+    entry_points={
+        "console_scripts": ["wam = wam_cli.program:main", *console_scripts],
+        "pytest11": ["wam_ros.pytest_plugin = wam_ros.pytest_plugin"],  # the test kit; named like its module
+    },
     ext_modules=extensions(),
     zip_safe=False,
 )

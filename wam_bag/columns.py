@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.cdr import Decoder, Definitions
+from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_records import Bytes
 from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 from wam_bag.message_search import DATA, Found, log_times, messages
+from wam_bag.message_text import definitions
 from wam_bag.point_clouds import table_columns, tables
 
 Texts = NDArray[np.object_]
@@ -367,3 +369,15 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
         lambda times, groups: ClockColumns(times, _filled(groups, 0, (len(times),), np.int64)),
     ),
 }
+
+
+def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
+    """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
+    collector = Collector(kind, definitions(kind, schema(kind)), 0, 1)
+    sizes = np.array([len(one) for one in data], np.int64)
+    starts = np.cumsum(sizes + DATA) - sizes - DATA
+    head = bytes(DATA)
+    # messages are compared by whole words, which may end behind the last one
+    buffer = np.frombuffer(b"".join([*(part for one in data for part in (head, one)), head]), np.uint8)
+    collector.add(buffer, Found(starts, sizes))
+    return collector.columns("recorded")

@@ -17,6 +17,7 @@
 - requests: requests to services and their answers; call: one request from a shell
 - conformance: a running driver tested against its contract; driver_probe: the node that does it
 - driver_bench: states and currents of that driver; message_checks, stop_checks: a function for each row
+- testing: the test kit; pytest_plugin: its fixtures
 - limits: waits, counts and lengths of all these
 - network: limits ROS to this machine; one node of a name in each place
 """

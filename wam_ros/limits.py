@@ -91,8 +91,22 @@ class ConformanceLimits:
     vanish: float = 5.0  # s, for a publisher to vanish
 
 
+@dataclass(frozen=True)
+class TestLimits:
+    """The test kit."""
+
+    # nobody uses them by default, and their ports are above those that Linux gives to any program
+    domains: range = range(215, 233)
+    domain_retry: float = 0.05  # s
+    patience: float = 300.0  # s of the wall clock, for what must happen at all on a busy machine
+    arm_time: float = 10.0  # s of the arm, for a condition
+    lockstep_timeout: float = 60.0  # s, for a node on a busy machine
+    look: float = 0.05  # s of the wall clock between two looks at a condition while the arm's time does not pass
+
+
 NODE_LIMITS = NodeLimits()
 PROCESS_LIMITS = ProcessLimits()
 RECORDER_LIMITS = RecorderLimits()
 CALL_LIMITS = CallLimits()
 CONFORMANCE_LIMITS = ConformanceLimits()
+TEST_LIMITS = TestLimits()

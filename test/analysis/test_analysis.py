@@ -13,13 +13,11 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 import numpy as np
 import pytest
-import yaml
 from browser import looked_at
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import STORE, joint_state
-from test_lockstep import configuration, record_composed
+from sample_messages import STORE, joint_state
 
 from wam_analysis.drawing import STYLE, widen_flat
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag, analyse_foreign_bag
@@ -33,12 +31,13 @@ from wam_analysis.findings.tabulated import MARK, tabulated
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.recorded import prediction_parameters
 from wam_analysis.table import bounded
-from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns
 from wam_cli.main import main
 from wam_control.force.force_loop import ForceLoop
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
+from wam_ros.testing import RunningArm
 from wam_sim.recorded_parameters import recorded_parameters
 
 PRESS = 22.0  # N
@@ -47,7 +46,7 @@ CYCLING = [
     {"name": "press", "seconds": 9.0, "force": {"frame": "link", "newtons": [0.0, -PRESS, 0.0]}},
     {"name": "brake", "seconds": 0.2, "request": "disable"},
 ]
-STICTION = {"arm.joints.static_friction": [4.0], "arm.joints.dynamic_friction": [1.0]}
+STICTION = {"joints.static_friction": [4.0], "joints.dynamic_friction": [1.0]}
 LOADS = ("sim/joint_states", "joint_sensors")  # topics that have the load of the motors
 RIPPLE = 0.012  # N m at motor1, 24 cycles a turn
 MOVING = [
@@ -76,49 +75,29 @@ class Recorded(NamedTuple):
         return found
 
 
-def recorded(configured: Configuration, folder: Path, domain_id: int) -> Recorded:
-    record_composed(configured, domain_id)
-    bag = read(folder / "bag")
-    return Recorded(folder / "bag", configured, bag, analyse_bag(bag, lambda doing: None))
+def recorded(folder: Path, domain_id: int, steps: list[Any], **start: Any) -> Recorded:
+    arm = RunningArm(domain_id, folder)
+    bag = arm.play(steps, **start)
+    return Recorded(bag.path, arm.configuration, bag, analyse_bag(bag, lambda doing: None))
 
 
 @pytest.fixture(scope="module")
 def cycling(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Recorded:
     """The testbed with much stiction: it cycles about the force."""
-    folder = tmp_path_factory.mktemp("cycling")
-    script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": CYCLING}))
-    base = Configuration.load(packaged("testbed"))
-    configured = base.with_values(
-        {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "timing.outer_divisor": 10,
-            "scenario:script": str(script),
-            "recorder:directory": str(folder),
-            "recorder:name": "bag",
-            "force_loop:force_gain": [8e-3],
-            **STICTION,
-        }
-    )
-    return recorded(configured, folder, domain_of_module)
+    values = {"timing": {"outer_divisor": 10}, "force_loop": {"force_gain": [8e-3]}, "arm": STICTION}
+    return recorded(tmp_path_factory.mktemp("cycling"), domain_of_module, CYCLING, configuration="testbed", **values)
 
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Recorded:
     """The arm on its way out and back, pushed, with noise on its sensors and a ripple in a motor."""
-    folder = tmp_path_factory.mktemp("moving")
-    script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": MOVING}))
-    values = {
-        "driver:effects.ripples.amplitude": [RIPPLE, 0.0, 0.0, 0.0],
-        "driver:amplifier.torque_ripple": [0.0, 0.01, 0.0, 0.0],
-        "driver:sensors.encoder_noise": [2e-6] * 4,
-        "driver:sensors.strain_noise": [0.02] * 4,
+    driver = {
+        "effects.ripples.amplitude": [RIPPLE, 0.0, 0.0, 0.0],
+        "amplifier.torque_ripple": [0.0, 0.01, 0.0, 0.0],
+        "sensors.encoder_noise": [2e-6] * 4,
+        "sensors.strain_noise": [0.02] * 4,
     }
-    return recorded(configuration(script, folder, "bag", **values), folder, domain_of_module)
+    return recorded(tmp_path_factory.mktemp("moving"), domain_of_module, MOVING, driver=driver)
 
 
 def section_of(recorded: Recorded, key: str) -> Section:

@@ -25,7 +25,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
-from test_bag import QOS
+from sample_messages import QOS
 
 from wam_analysis.findings.analysis import analyse
 from wam_bag import bag_file, safe_yaml

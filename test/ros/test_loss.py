@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import RosWorld
 from test_nodes import ARM, MS, SIX, changed, make
 
 from wam_description.event import Level
@@ -12,6 +11,7 @@ from wam_description.signals import NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.messages import diagnostic_status, joint_state, message_type
+from wam_ros.testing import Network
 from wam_ros.topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
@@ -21,7 +21,7 @@ LIMIT = 50 * MS  # ns of the arm's time, from the last answer of a node to zero 
 class Stack:
     """The six nodes in this process; the arm is enabled."""
 
-    def __init__(self, ros: RosWorld, folder: Path, mode: str, **values: Any) -> None:
+    def __init__(self, ros: Network, folder: Path, mode: str, **values: Any) -> None:
         self.ros, self.folder, self._clock = ros, folder, AnsweredClock(MS * 1e-9)
         self.values = {"timing__mode": mode, "timing__timeout": 2.0, **values}
         self._frozen: list[tuple[Any, Any, list[Any]]] = []
@@ -104,7 +104,7 @@ LOST = {
 
 @pytest.mark.parametrize("name", LOST)
 def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
-    name: str, ros: RosWorld, tmp_path: Path
+    name: str, ros: Network, tmp_path: Path
 ) -> None:
     feedback = {"force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
     stack = Stack(ros, tmp_path, "realtime", **(feedback if name == "contact_estimator" else {}))
@@ -119,7 +119,7 @@ def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
 
 
 def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_with_it(
-    ros: RosWorld, tmp_path: Path
+    ros: Network, tmp_path: Path
 ) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     stack.freeze("gravity")
@@ -131,7 +131,7 @@ def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_wit
     stack.enable()
 
 
-def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: RosWorld, tmp_path: Path) -> None:
+def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     node = stack.nodes["force_loop"]
     publish, node._publish = node._publish, lambda stamp, outputs: None
@@ -145,7 +145,7 @@ def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: RosWor
     stack.enable()
 
 
-def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     row = BY_NAME["status"]
     forger = ros.node("forger").create_publisher(message_type(row), row.name, qos(row))
@@ -158,7 +158,7 @@ def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: RosWorld
     assert stack.fault == ""
 
 
-def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "realtime")
     ros.wait(lambda: stack.nodes["gravity"]._is_enabled)
     stack.nodes["gravity"].end()
@@ -173,7 +173,7 @@ def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: RosWorld, tm
         ("motor_states", "/wam/driver and /wam/intruder publish motor_states"),
     ],
 )
-def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: RosWorld, tmp_path: Path) -> None:
+def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     row = BY_NAME[topic]
     other = ros.node("intruder")
@@ -189,7 +189,7 @@ def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, 
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
-def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: RosWorld, tmp_path: Path) -> None:
+def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, mode)
     before = stack.nodes["driver"]._session.number
     ros.remove(stack.nodes["driver"])
