@@ -19,6 +19,7 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_description.units import si
 from wam_studies.figures.panels import Panel
+from wam_studies.page import END, section_of
 from wam_studies.thesis import (
     arm_forces,
     cables,
@@ -377,7 +378,7 @@ def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) 
 
 def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    page.write_text("# Title\n<!-- experiment: creep -->\nold\n<!-- end -->\nafter\n")
+    page.write_text(f"# Title\n<!-- written: creep -->\nold\n{END}\nafter\n")
     picture = tmp_path / "result.png"
     picture.write_bytes(b"picture")
     experiment = load("creep")
@@ -387,7 +388,7 @@ def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) 
     assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
     assert "- a \\d remark" in text
     assert "old" not in text
-    assert text.endswith("<!-- end -->\nafter\n")
+    assert text.endswith(f"{END}\nafter\n")
     assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
 
 
@@ -400,7 +401,7 @@ def test_a_new_experiment_gets_a_section_at_the_end_of_the_page(tmp_path: Path) 
         write(page, [(load("creep"), result, picture)])
     text = page.read_text()
     assert text.startswith("# Title\n\n## Creep of cables")
-    assert text.count("<!-- experiment: creep -->") == text.count("| q | 1 | 1.01 |") == 1
+    assert text.count("<!-- written: creep -->") == text.count("| q | 1 | 1.01 |") == 1
 
 
 def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
@@ -443,9 +444,8 @@ def test_an_experiment_without_curves_has_no_picture(
 
 def test_documentation_shows_every_experiment() -> None:
     docs = Path(__file__).resolve().parents[2] / "docs"
-    text = (docs / "experiments.md").read_text()
     for name in names():
-        block = text.partition(f"<!-- experiment: {name} -->")[2].partition("<!-- end -->")[0]
+        block = section_of(docs / "experiments.md", name)
         assert "| predicted | measured |" in block, name
         assert "MISSED" not in block, name
         assert (docs / "experiments" / f"{name}.png").is_file()
