@@ -550,14 +550,14 @@ def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_
     file = tmp_path / "short.yaml"  # an experiment of this one run
     whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
     file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
-    assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 1
+    assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 2
     said = capfd.readouterr().err
     assert "run 'without_deadband' ended in step 'press', 0 of 1 steps finished; " in said
     assert "repeat 'wam experiment short'" in said
 
 
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
-    assert run_command("wam-slide", "--directory", str(tmp_path), "--evaluate", str(tmp_path)) == 1
+    assert run_command("wam-slide", "--directory", str(tmp_path), "--evaluate", str(tmp_path)) == 2
     assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err
     with pytest.raises(BagError):
         recorded(load("creep"), 0, {}, (), tmp_path).step("out")
