@@ -240,6 +240,7 @@ class StreamThresholds:
     lagged: float = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
     filled: float = 5.5  # periods of the longest gap that is filled by interpolation
     shown: int = 3  # messages of a topic that is shown
+    transformed: int = 64  # messages of a topic whose spectrum is shown
     pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
     # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
     reset: int = 1_000_000_000
@@ -285,6 +286,12 @@ class ReportLayout:
     narrow_page: int = 640  # px; up to this width the narrow pictures are shown
     wide: float = 9.6  # inches, of a picture
     narrow: float = 4.1  # inches, of a picture for a small page
+    still_height: float = 2.7  # inches, of a picture
+    points_per_inch: float = 310.0  # of a line
+    dots: int = 1500  # of a picture of dots
+    bars: int = 60  # of a histogram
+    first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
+    grey: str = "#9aa3ad"  # of raw values behind a line
     png_dpi: int = 130  # of a picture on a page
     ticks: int = 5  # at most, across a small picture
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
