@@ -16,6 +16,7 @@ from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.held_force import HeldForce, held_forces
 from wam_analysis.findings.motion import MotionFindings, motion_sections
+from wam_analysis.findings.steps import steps_section
 from wam_analysis.findings.timing import extent, provenance, timing_section
 from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
 from wam_analysis.foreign.sections import foreign_sections
@@ -143,7 +144,14 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     progress("timing")
     prefix = f"{recording.namespace}/"
     duration = extent({name: topic for name, topic in recording.bag.topics.items() if name.startswith(prefix)})
-    sections = (_happened(recording, duration), *middle, *motion.sections, timing_section(recording))
+    steps = steps_section(recording.summary)
+    sections = (
+        _happened(recording, duration),
+        *filter(None, [steps]),
+        *middle,
+        *motion.sections,
+        timing_section(recording),
+    )
     verdict = _verdict(_own_line(recording, duration), sections)
     return Analysis(recording, held, motion, duration, provenance(recording), (verdict, *sections))
 

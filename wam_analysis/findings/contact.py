@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy, ListedContact
+from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -36,10 +37,8 @@ def contact_section(recording: AnalysedRun) -> Section:
     findings: list[Finding] = []
     wrong = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
     shows: list[str] = []
-    for number, contact in enumerate(summary.contacts, 1):
-        name = f"{number} {contact.estimate.link}"
-        sentences += _doubts(name, contact)
-        findings += _numbers(name, contact)
+    sentences += contact_doubts(summary)
+    findings += contact_numbers(summary)
     sentences += wrong
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
@@ -75,15 +74,27 @@ def contact_section(recording: AnalysedRun) -> Section:
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
         shows.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
-    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
-        sentences.append(NOT_CERTAIN)
-    if not all(contact.estimate.is_placed for contact in summary.contacts):
-        sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
     findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(shows), tuple(wrong))
+
+
+def contact_numbers(summary: DemoSummary) -> Iterator[Finding]:
+    """Every estimated contact in numbers."""
+    for number, contact in enumerate(summary.contacts, 1):
+        yield from _numbers(f"{number} {contact.estimate.link}", contact)
+
+
+def contact_doubts(summary: DemoSummary) -> Iterator[str]:
+    """What is not to be trusted of the estimated contacts."""
+    for number, contact in enumerate(summary.contacts, 1):
+        yield from _doubts(f"{number} {contact.estimate.link}", contact)
+    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
+        yield NOT_CERTAIN
+    if not all(contact.estimate.is_placed for contact in summary.contacts):
+        yield f"Positions of contacts: {NOT_PLACED}."
 
 
 def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
