@@ -12,6 +12,7 @@
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
+- long_steps: a node that holds up the others of its process
 - processors: those that the processes of one lockstep keep to
 - process_signals: signals from the imports of a program to its end; program: that of a node
 - requests: requests to services and their answers; call: one request from a shell

@@ -176,6 +176,7 @@ class RunningArm:
         driver: Any = self.nodes.get("driver")
         self._driver: Any = driver.driver if driver else None
         self.node = self.add(Node("test", namespace=NAMESPACE, context=self.context))
+        self._publishers: dict[str, Publisher] = {}
         self._senders: dict[str, tuple[Publisher, Callable[[int, Any], Any]]] = {}
         self._streams: dict[str, tuple[int, Any]] = {}  # until a stamp, ns: a value
         self._statuses: dict[str, NodeStatus] = {}
@@ -336,19 +337,26 @@ class RunningArm:
             time only; 0 sends it once.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
         """
-        self._require_start()
-        row = self.interface.topics[topic]
-        if value is None:
-            value = _EMPTY[row.type]._replace(**fields)
-        if topic not in self._senders:
-            publisher = self.node.create_publisher(message_type(row), topic, qos(row))
-            self._senders[topic] = publisher, encoder(row, self.configuration.shared)
-            takers = len(self.interface.subscribers(topic))
-            self.run_until(lambda: publisher.get_subscription_count() >= takers)
+        publisher = self.publisher(topic)
+        self._senders[topic] = publisher, encoder(self.interface.topics[topic], self.configuration.shared)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
         stamp = stamp_of(states[-1]) if states else 0
-        self._streams[topic] = stamp + round(seconds * SECOND), value
+        self._streams[topic] = stamp + round(seconds * SECOND), self.value(topic, **fields) if value is None else value
         self._stream(stamp, topic)
+
+    def value(self, topic: str, **fields: Any) -> Any:
+        """A value of a topic; what is not given is empty or zero."""
+        return _EMPTY[self.interface.topics[topic].type]._replace(**fields)
+
+    def publisher(self, topic: str) -> Publisher:
+        """A publisher of the test, which all nodes of the stack that take the topic have found."""
+        self._require_start()
+        if topic not in self._publishers:
+            row = self.interface.topics[topic]
+            self._publishers[topic] = self.node.create_publisher(message_type(row), topic, qos(row))
+            takers = len(self.interface.subscribers(topic))
+            self.run_until(lambda: self._publishers[topic].get_subscription_count() >= takers)
+        return self._publishers[topic]
 
     def _stream(self, stamp: int, only: str = "") -> None:
         for topic, (end, value) in list(self._streams.items()):

@@ -311,6 +311,11 @@ def test_pages_of_other_sites_are_refused(server: Any) -> None:
     with pytest.raises(InvalidStatus) as refused:
         connect(address, origin="http://evil.example")  # type: ignore[arg-type]
     assert refused.value.response.status_code == 403
+    page = f"http://{HOST}:{server.get_port()}"
+    with urllib.request.urlopen(page) as answer:
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(urllib.request.Request(page, headers={"Host": "evil.example"}))
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(f"http://{_other_address()}:{server.get_port()}", timeout=2.0)
 

@@ -16,8 +16,10 @@ from wam_description.event import Level
 from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
+from wam_description.topics import BY_NAME, TASK_COLUMNS
 from wam_description.wiring import Input, Outputs, reaction
 from wam_ros.testing import ArmFault, RunningArm, configured
+from wam_ros.wire import encoder
 from wam_sim.simulation import Simulation
 
 OUTPUTS = ("joint_velocity_command", "joint_effort_command")
@@ -78,6 +80,28 @@ def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
     sent = arm.recorded["joint_velocity_command"].stamp_ns
     assert sent[-1] - sent[0] == 500_000_000
     assert abs(arm.truth.qd[2]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("taker", "topic", "text", "fields"),
+    [
+        ("velocity_loop", "joint_velocity_command", "allowed: 0.035 s", {"velocity": [0.0] * 4}),
+        ("force_loop", "joint_posture_command", "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
+        ("force_loop", "task_command", "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
+    ],
+)
+def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_refuses_it(
+    taker: str, topic: str, text: str, fields: dict[str, Any], arm: RunningArm
+) -> None:
+    """The node says why and goes on; a thousand axes took seconds, in which nobody answered an emergency stop."""
+    arm.start(nodes=INNER if taker == "velocity_loop" else ())
+    arm.enable()
+    arm.run(1.0)
+    value = arm.value(topic, **fields)
+    arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(1_000_000, value))
+    arm.run_until(lambda: arm.status(taker).level is Level.WARN)
+    assert text in arm.status(taker).message
+    assert topic.removeprefix("joint") in arm.status(taker).facts["refused"]
 
 
 def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:

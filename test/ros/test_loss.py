@@ -1,15 +1,23 @@
 """What an enabled arm does where a node of the chain stops, another one speaks for it, or the driver starts again."""
 
+import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
+from conftest import LONG
 from test_nodes import ARM, MS, SIX, changed, make
 
+from wam_description.arm import Shared
 from wam_description.event import Level
+from wam_description.parameters import Nothing
 from wam_description.signals import NodeStatus, State
+from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME
+from wam_description.wiring import Input, Outputs, reaction
 from wam_driver.safety import Mode
+from wam_ros.long_steps import LongStep
 from wam_ros.messages import diagnostic_status, joint_state, message_type
 from wam_ros.testing import Network
 from wam_ros.topics import qos, stamp_of
@@ -197,3 +205,43 @@ def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Net
     stack.enable()
     assert stack.nodes["driver"]._session.number > before
     assert all(node._ports.session > before for name, node in stack.nodes.items() if name != "driver")
+
+
+class Slow:
+    """A node whose step does not end before the test lets it."""
+
+    name, parameters = "slow", Nothing
+    may_end: ClassVar[Callable[[], bool]] = lambda: True
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("joint_states", "position"), outputs=())
+    def step(self, inputs: Inputs) -> Outputs:
+        end = time.monotonic() + LONG
+        while not type(self).may_end() and time.monotonic() < end:
+            time.sleep(0.001)
+        return {}
+
+
+def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
+    ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It reports itself while it computes: from the process of transform to that of the velocity loop."""
+    stack = Stack(ros, tmp_path, "realtime")
+    slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
+    published = slow._ports._outlets.published
+    before = published["status"]
+    monkeypatch.setattr(Slow, "may_end", lambda: published["status"] > before)
+    stack.ros.wait(lambda: published["status"] > before, what="a report from inside the step")
+    assert stack.nodes["velocity_loop"]._ports.held_up(["transform"]).startswith("slow was in a step of ")
+    monkeypatch.setattr(Slow, "may_end", lambda: True)
+
+
+def test_what_a_held_up_node_lacks_is_the_fault_of_the_long_step(ros: Network, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "realtime")
+    ports = stack.nodes["gravity"]._ports
+    stack.freeze("transform")
+    ports.report_long_step(LongStep("gravity", 0.7))
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert "gravity was in a step of 0.7 s: " in stack.fault
+    assert "transform has stopped" not in stack.fault
