@@ -37,6 +37,7 @@ from wam_studies.thesis.one_link import growth, one_link
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result, markdown, plain
+from wam_studies.thesis.sweeping import RecordedRun, record_run
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 
@@ -494,11 +495,11 @@ def run_command(*words: str) -> int:
     return int(ended.value.code or 0)
 
 
-def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path, domain_id: int, capfd) -> None:
+def test_creep_runs_and_is_judged_again_from_its_bag(tmp_path: Path, capfd) -> None:
     assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 0
     said = capfd.readouterr()
     assert "all quantities are within their bounds" in said.out
-    assert "creep 1/1 out_and_back: done" in said.err
+    assert "runs: 1 of 1" in said.err
     assert (tmp_path / "mine" / "result.png").is_file()
     (tmp_path / "mine" / "result.png").unlink()
     again = ("--directory", str(tmp_path / "again"), "--evaluate")
@@ -517,7 +518,7 @@ def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path,
     assert "stops the arm  does not stop" in capfd.readouterr().out
 
 
-def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, capfd) -> None:
+def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, capfd) -> None:
     """The large step of section 5.6 alone, in a file of one's own."""
     whole = yaml.safe_load(packaged("experiments/testbed-5.6").read_text())
     whole["runs"] = [run for run in whole["runs"] if run["name"] == "large_step"]
@@ -529,30 +530,14 @@ def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, ca
     assert "the driver stopped the arm at" in said
 
 
-class StopAfter:
-    """As `wam_ros.run.Stop`, which a signal sets; here after so many callbacks, whatever the clock says."""
-
-    def __init__(self, callbacks: int) -> None:
-        self._left = callbacks
-
-    @property
-    def is_set(self) -> bool:
-        self._left -= 1
-        return self._left < 0
-
-
-def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_id: int, capfd, monkeypatch) -> None:
-    monkeypatch.setattr("wam_cli.commands.experiment.Stop", lambda: StopAfter(3000))
-    assert run_command("stiction-limit-cycle", "--directory", str(tmp_path), "--name", "mine") == 130
-    said = capfd.readouterr().err
-    assert "without_deadband: stopped" in said
-    assert "done" not in said
-    file = tmp_path / "short.yaml"  # an experiment of this one run
-    whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
-    file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
+def test_a_run_that_is_not_whole_is_not_judged(tmp_path: Path, capfd) -> None:
+    file, whole = tmp_path / "short.yaml", yaml.safe_load(packaged("experiments/creep").read_text())
+    file.write_text(yaml.safe_dump(whole))
+    (run,) = load(str(file)).runs
+    record_run(RecordedRun(load(str(file)), run._replace(steps=run.steps[:1]), str(tmp_path / "mine")))
     assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 2
     said = capfd.readouterr().err
-    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps finished; " in said
+    assert f"run 'out_and_back' ended in step '{run.steps[0]['name']}', 0 of {len(run.steps)} steps finished; " in said
     assert "repeat 'wam experiment short'" in said
 
 
