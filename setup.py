@@ -133,6 +133,8 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # the arm of Barrett Technology on its CAN bus
+        "bus": ["python-can"],
         # the inner loop as C: WAM_COMPILE
         "compile": ["mypy", "setuptools<80"],
         # Tab in the shell: `register-python-argcomplete wam`
@@ -154,6 +156,7 @@ setup(
             "mypy",
             "pytest<9",
             "pytest-xdist",
+            "python-can",
             "rosbags",
             "ruff",
             "scipy",
@@ -171,7 +174,10 @@ setup(
         (f"share/{name}/rviz", sorted(glob("rviz/*.rviz"))),
         (f"lib/{name}", launchers),
     ],
-    entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},
+    entry_points={
+        "console_scripts": ["wam = wam_cli.program:main", *console_scripts],
+        "pytest11": ["wam_ros.pytest_plugin = wam_ros.pytest_plugin"],  # the test kit; named like its module
+    },
     ext_modules=extensions(),
     zip_safe=False,
 )

@@ -22,7 +22,7 @@ from wam_analysis.press_positions import NOWHERE, PressPositions, press_position
 from wam_analysis.task_forces import TaskForce, measured_force, task_forces, tasks_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
-from wam_bag.losses import RECORDING, losses
+from wam_bag.losses import CUT, RECORDING, losses
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
@@ -153,6 +153,16 @@ class DemoSummary(NamedTuple):
 def summarize(bag: Bag) -> DemoSummary:
     """Everything that the report needs, from a bag that may hold any part of the demonstration."""
     return summary_of(recorded_run(bag))
+
+
+def failure_of(run: RecordedRun) -> str:
+    """Why a run failed or that it was cut off; '' where it did not, or had neither a scenario nor a fault.
+
+    A part that was cut out of a recording is none.
+    """
+    if run.outcome or CUT in run.bag.metadata:
+        return "" if run.outcome in ("", Code.DONE) else run.outcome
+    return run.faults[-1].reason if run.faults else UNFINISHED * bool(run.steps)
 
 
 def summary_of(run: RecordedRun) -> DemoSummary:

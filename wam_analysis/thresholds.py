@@ -1,5 +1,6 @@
 """Thresholds of the analysis, by concern, each with its unit and reason; and the layout of its reports."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -239,6 +240,7 @@ class StreamThresholds:
     lagged: float = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
     filled: float = 5.5  # periods of the longest gap that is filled by interpolation
     shown: int = 3  # messages of a topic that is shown
+    transformed: int = 64  # messages of a topic whose spectrum is shown
     pace: float = 0.2  # by which the median period of the receptions may differ from that of the stamps
     # ns by which a stamp goes back where a clock was reset; two clocks that differ by more are two
     reset: int = 1_000_000_000
@@ -249,6 +251,16 @@ class StreamThresholds:
     seconds: float = 1e17  # an integer time below this is in seconds or less, above it in ns since 1970
     absent: float = 1.5  # periods between two messages of a frame, from which one is absent
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
+    repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock
+    paced: float = 0.5  # of the usual wait: messages of one stamp that come so far apart are no copies
+    turns: tuple[float, ...] = (
+        2.0 * math.pi,
+        4.0 * math.pi,
+        360.0,
+    )  # rad, after which an angle wraps; or degrees as rad
+    wraps: float = 0.75  # of a turn: a larger jump from message to message is a wrap
+    within: float = 1.01  # of a turn, which an angle that wraps does not leave
+    zero: float = 5.0  # times the usual step of a position: a larger one without a velocity moves its zero
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
@@ -265,6 +277,7 @@ class ReportLayout:
     narrowest: int = 40  # columns of text, at least
     name: float = 0.4  # width of a name in a table at most, of all
     column: int = 12  # width of a number in a table at least, columns
+    stated: int = 3  # sentences of a line of the verdict
     changes: int = 4  # of parameters that are named
     note: int = 160  # characters of a note on the parameters
     # pictures
@@ -273,6 +286,12 @@ class ReportLayout:
     narrow_page: int = 640  # px; up to this width the narrow pictures are shown
     wide: float = 9.6  # inches, of a picture
     narrow: float = 4.1  # inches, of a picture for a small page
+    still_height: float = 2.7  # inches, of a picture
+    points_per_inch: float = 310.0  # of a line
+    dots: int = 1500  # of a picture of dots
+    bars: int = 60  # of a histogram
+    first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
+    grey: str = "#9aa3ad"  # of raw values behind a line
     png_dpi: int = 130  # of a picture on a page
     ticks: int = 5  # at most, across a small picture
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic

@@ -4,23 +4,29 @@ Messages of a topic mostly have the same counts and strings.  Then every number 
 of them, and a column is a view of many records at once.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from operator import attrgetter
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.cdr import Decoder, Definitions
+from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_records import Bytes
 from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 from wam_bag.message_search import DATA, Found, log_times, messages
+from wam_bag.message_text import definitions
 from wam_bag.point_clouds import table_columns, tables
 
 Texts = NDArray[np.object_]
 Series = dict[str, NDArray[Any]]
 AXES = ("x", "y", "z")
+JOINT_FIELDS = ("position", "velocity", "effort")
+UNNAMED, DOUBLED = "joints without a name", "a joint's name twice"
 
 
 def stamped(times: NDArray[np.int64]) -> Series:
@@ -45,8 +51,9 @@ def _listed(frames: Texts) -> str:
 class JointColumns(NamedTuple):
     """sensor_msgs/JointState, k messages of n joints, matched by name.
 
-    `names` are in the order of their first appearance; values that a message leaves out are NaN.  A field
-    that every message leaves empty has shape (k, 0).
+    `names` are in the order of their first appearance, see `joint_names`; values that a message leaves out are NaN, and
+    so are those of a field of another length than its names.  A field that every message leaves empty has shape (k, 0).
+    `irregular` counts messages by what is wrong with their names or fields.
     """
 
     log_time_ns: Times
@@ -56,6 +63,7 @@ class JointColumns(NamedTuple):
     position: Numbers
     velocity: Numbers
     effort: Numbers
+    irregular: Mapping[str, int] = MappingProxyType({})
 
     def __repr__(self) -> str:
         return f"JointColumns({len(self.log_time_ns)} messages: {', '.join(self.names)})"
@@ -244,7 +252,7 @@ class Collector:
 
 
 def _joints(group: Group) -> tuple[Any, ...]:
-    fields = [group.numbers(name).astype(np.float64) for name in ("position", "velocity", "effort")]
+    fields = [group.numbers(name).astype(np.float64) for name in JOINT_FIELDS]
     return *_header(group), group.text("name"), fields
 
 
@@ -276,24 +284,59 @@ def _vectors(times: Times, groups: list[Any], place: int) -> Numbers:
     return _filled(groups, place, (len(times), 3), np.float64)
 
 
+def joint_names(names: Sequence[str], width: int) -> tuple[str, ...]:
+    """Names of the values of a message: a joint without one is numbered, and so is one whose name is there twice.
+
+    Parameters
+    ----------
+    names : as the message has them.
+    width : values of its longest field.
+    """
+    found: list[str] = []
+    for i, name in enumerate([*names, *[""] * (width - len(names))]):
+        own = name or f"joint{i + 1}"
+        found.append(own if own not in found else f"{own} ({i + 1})")
+    return tuple(found)
+
+
+def irregularities(names: Sequence[str], widths: Mapping[str, int]) -> Iterator[str]:
+    """What is wrong with the names of a message and the lengths of its fields."""
+    most = max(len(names), *widths.values())
+    if not all(names) or len(names) < most:
+        yield UNNAMED
+    if len(set(filter(None, names))) < len([*filter(None, names)]):
+        yield DOUBLED
+    yield from (f"{field} of another length than the names" for field, width in widths.items() if 0 < width < most)
+
+
 def _joint_columns(times: Times, groups: list[Any]) -> JointColumns:
+    irregular = Counter[str]()
+    named = []
+    for where, (stamps, frame, given, fields) in groups:
+        widths = {name: field.shape[1] for name, field in zip(JOINT_FIELDS, fields, strict=True)}
+        irregular.update({what: len(stamps) for what in irregularities(given, widths)})
+        named.append((where, (stamps, frame, joint_names(given, max(widths.values())), fields)))
+    groups = named
     names = tuple(dict.fromkeys(name for _, values in groups for name in values[2]))
     arrays = []
     for field in range(3):
-        widths = {values[3][field].shape[1] for _, values in groups}
-        is_complete = widths <= {len(names)} and all(values[2] == names for _, values in groups)
-        array = np.empty((len(times), len(names) if any(widths) else 0))
+        every = {values[3][field].shape[1] for _, values in groups}
+        is_complete = every <= {len(names)} and all(values[2] == names for _, values in groups)
+        array = np.empty((len(times), len(names) if any(every) else 0))
         if not is_complete:
             array[:] = np.nan
-        for where, (_, _, own, fields) in groups if any(widths) else ():
-            values = fields[field][:, : len(own)]
-            if own == names and values.shape[1] == len(names):
+        for where, (_, _, own, fields) in groups if any(every) else ():
+            values = fields[field]
+            if values.shape[1] != len(own):
+                continue
+            if own == names:
                 array[where] = values
                 continue
-            for i, name in enumerate(own[: values.shape[1]]):
+            for i, name in enumerate(own):
                 array[where, names.index(name)] = values[:, i]
         arrays.append(array)
-    return JointColumns(*_stamped(times, groups), names, *arrays)
+    position, velocity, effort = arrays
+    return JointColumns(*_stamped(times, groups), names, position, velocity, effort, irregular)
 
 
 def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
@@ -326,3 +369,15 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
         lambda times, groups: ClockColumns(times, _filled(groups, 0, (len(times),), np.int64)),
     ),
 }
+
+
+def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
+    """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
+    collector = Collector(kind, definitions(kind, schema(kind)), 0, 1)
+    sizes = np.array([len(one) for one in data], np.int64)
+    starts = np.cumsum(sizes + DATA) - sizes - DATA
+    head = bytes(DATA)
+    # messages are compared by whole words, which may end behind the last one
+    buffer = np.frombuffer(b"".join([*(part for one in data for part in (head, one)), head]), np.uint8)
+    collector.add(buffer, Found(starts, sizes))
+    return collector.columns("recorded")

@@ -107,7 +107,12 @@ def _ended_by(error: BaseException, command: str, parser: argparse.ArgumentParse
     if isinstance(error, ModuleNotFoundError):
         return _missing(command, error)
     if isinstance(error, ValueError | OSError | argparse.ArgumentTypeError):
-        parser.exit(1, printable(f"wam {command}: {error}{_hint(error, command)}", kept="\n") + "\n")
+        from wam_bag.errors import BagError
+
+        parser.exit(
+            1 + isinstance(error, BagError),
+            printable(f"wam {command}: {error}{_hint(error, command)}", kept="\n") + "\n",
+        )
     raise error
 
 

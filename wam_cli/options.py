@@ -332,11 +332,11 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
 OTHER_ROBOT = (
     ("--topic", "TOPIC", "analyse this topic only; of any type, with --map"),
     ("--joint", "JOINT", "analyse this joint only; or the names of joints that have none in the messages"),
-    ("--command", "TOPIC", "what is commanded; else topics named command, cmd, desired, reference, target, goal"),
+    ("--command", "TOPIC", "what was commanded; else the reference in the state of a controller"),
     (
         "--map",
         "QUANTITY=FIELD",
-        f"field of the messages, as effort=current or position=state.q; {', '.join(MAPPED)}",
+        f"field of the messages, as effort=current or stamp=sec,nanosec; {', '.join(MAPPED)}",
     ),
     ("--unit", "QUANTITY=UNIT", "of what was recorded, as position=deg or effort=mA, or a factor as effort=0.12"),
 )

@@ -144,6 +144,20 @@ class Configuration(NamedTuple):
             f"'{one}'" + f" of section '{SHARED}'" * (bool(place) and ":" not in one) for one in sorted(found) or near
         )
 
+    def with_sections(self, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
+        """The same configuration with some values replaced, and with sections of further nodes.
+
+        Parameters
+        ----------
+        changes : flat ``{dotted name: value}`` by section, as `sections`.
+
+        Raises
+        ------
+        ParameterError
+            if the configuration has no such parameter, or a new section is of no node.
+        """
+        return self._overlaid(self.path, changes)
+
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
         """The configuration of `path`: this one with changed values and further sections."""
         new = {name: dict(flat) for name, flat in changes.items() if name not in self.sections}

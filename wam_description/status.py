@@ -8,6 +8,8 @@ from wam_description.signals import NodeStatus
 
 REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
 AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
+BUSY = "busy"  # fact: a step that takes long, in words
+HELD_UP = "held up"  # fact: the nodes of its process, separated by blanks
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
 ENABLED = "enabled"  # mode of the driver in which no brake holds

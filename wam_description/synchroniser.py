@@ -29,7 +29,7 @@ MOST_EARLY = 64  # messages of a session that was announced, kept until its firs
 
 
 class OutOfTime(ValueError):
-    """A message of the future; the text names the value, what is allowed and what to do."""
+    """A message too old or of the future; the text names the value, what is allowed and what to do."""
 
 
 class InputSpec(NamedTuple):
@@ -190,7 +190,7 @@ class Synchroniser:
         Raises
         ------
         OutOfTime
-            where the stamp is ahead of the newest state, by more than the limit of the input.
+            where the stamp differs from that of the newest state by more than the limit of the input.
         """
         return self._inlets[topic](stamp, value)
 
@@ -237,6 +237,12 @@ class Synchroniser:
             if newest.is_command and not stamp:
                 stamp = self._last
             self._require_present(stamp, newest.limit_ns)
+            if stamp < self._last - newest.limit_ns:
+                age, limit = seconds(self._last - stamp), seconds(newest.limit_ns)
+                raise OutOfTime(
+                    f"stamp {stamp} ns is {age:.3g} s older than the newest state, {self._last} ns, allowed: "
+                    f"{limit:.3g} s; give a command the stamp of the state that it answers"
+                )
             if not newest.put(stamp, value, self._last):
                 self.strays += 1
             return self._complete() if self._triggers else ()

@@ -266,7 +266,7 @@ TOPICS: Final = (
         "external_torque_zero",
         "outer",
         "effort = torque of the joint sensors that the force loop takes as that of a free arm, N m: of `~/tare`, and of "
-        "the begin of a force; as it changes, the estimator knows the weight of the arm better",
+        "the start of a force; as it changes, the estimator knows the weight of the arm better",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),

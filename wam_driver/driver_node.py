@@ -21,6 +21,7 @@ from wam_driver.realtime import Realtime
 from wam_driver.safety import Mode
 from wam_driver.session import Session
 from wam_driver.thresholds import DRIVER
+from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
@@ -69,10 +70,17 @@ class DriverNode(TolerantNode):
             )
         else:
             self.time = Realtime(
-                self.driver, shared.timing, own.watchdog, own.late_periods, self._publish, time.perf_counter
+                self.driver,
+                shared.timing,
+                own.watchdog,
+                own.late_periods,
+                self._publish,
+                time.perf_counter,
+                lambda: ports.held_up(STEPS.nodes),
             )
             advice = self.driver.stale_advice
-            self.driver.stale_advice = lambda: self._with_lateness(advice())
+            senders = ports.interface.publishers("motor_current_command")
+            self.driver.stale_advice = lambda: self._with_lateness(ports.held_up(senders) or advice())
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),

@@ -23,6 +23,7 @@ class Realtime:
         names the computer, too.
     publish : called after a period, to publish the new state.
     now : steady clock, s.
+    held_up : another node of this process that was in a long step, '' for none.
 
     Attributes
     ----------
@@ -37,7 +38,9 @@ class Realtime:
         late_periods: float,
         publish: Callable[[], None],
         now: Callable[[], float],
+        held_up: Callable[[], str] = lambda: "",
     ) -> None:
+        self._held_up = held_up
         self._driver, self._timing, self._watchdog, self._late_periods = driver, timing, watchdog, late_periods
         self._publish, self._now = publish, now
         self._latencies: list[float] = []
@@ -85,12 +88,17 @@ class Realtime:
         if due > most and self._driver.safety.mode is Mode.ENABLED:
             self._driver.fault(
                 f"the driver itself did not run for {due * self._timing.period:.2f} s, allowed "
-                f"{self._watchdog * 1e3:.0f} ms; give it a processor, or use lockstep"
+                f"{self._watchdog * 1e3:.0f} ms; {self._cause()}"
             )
         for left in range(min(due, most) - 1, -1, -1):
             self._driver.advance(age)
             if left == 0 or self._driver.is_outer:
                 self._send()
+
+    def _cause(self) -> str:
+        if busy := self._held_up():
+            return f"{busy}: let its steps compute less, or run it in a process of its own"
+        return "give it a processor, or use lockstep"
 
     def _note(self, due: int) -> None:
         """Keep how many periods were due at the ticks in the window."""

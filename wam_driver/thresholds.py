@@ -42,5 +42,45 @@ class DriverThresholds:
     longest_settling: float = 10.0  # s, for which it waits until few periods are late
 
 
+@dataclass(frozen=True, slots=True)
+class BusThresholds:
+    """When the driver of a real arm waits, asks and faults; what the maker's arm has; what a simulated bus does."""
+
+    reply: float = 0.005  # s, for a reply at the start; fast computers that waited for 1 ms missed controllers
+    attempts: int = 3  # at a reply at the start, since a frame may be lost
+    last_node: int = 31  # of the bus
+    between_writes: float = 0.01  # s, between two writes to the safety module, and between two wake-ups
+    silence: float = 1.0  # s after the wake-up, in which a frame would drive the controllers off the bus
+    look: float = 0.05  # s, between two looks at what a person has to do
+    silent: float = 0.01  # s without a position of a motor, above which there is a fault
+    unguarded: float = 0.045  # s without the mode of the safety module, above which there is a fault
+    poll: float = 0.02  # s, between two questions for the modes of safety module and controllers
+    collect: float = 0.6  # of a period, in which the positions have to come
+    stray: int = 3  # frames that none of ours sends, before there is a fault: one may be left over in a queue
+    jump: float = 0.25  # turn of a motor between two positions, above which one is dropped: 157 rad/s in 10 ms
+    velocity_bandwidth: float = 180.0  # rad/s, of the filter of the velocities, as in libbarrett; a count is 0.8 rad/s
+    gain_ratio: float = (
+        1.5  # of a controller's counts per N m and the nominal ones, either way; real ones differ by 1.3
+    )
+    ignored_velocities: int = 5  # samples that the safety module skips, while the positions are set
+    settable_version: int = 197  # of the safety module, from which its mode can be set by the host
+    # of the maker's arm
+    ready: int = 2  # STAT of a controller that is awake
+    idle_mode: int = 0  # MODE of a controller that brakes
+    torque_mode: int = 2  # MODE of a controller that follows torques
+    wrist_poles: int = 6  # of motor 7; gimbals have 8 and other ratios
+    encoders: tuple[int, ...] = (4096, 40960)  # counts per turn, magnetic and optical
+    gain: tuple[int, ...] = (2700, 2700, 2700, 2700, 6500, 6500, 17474)  # counts per N m, the defaults of btutil
+    cable_limit: tuple[int, ...] = (4860, 4860, 4860, 4320, 3900, 3900, 1600)  # counts, at which controllers clip
+    largest_torque: int = 8191  # counts, of 14 bits
+    # of the simulated bus
+    second: int = 10**9  # ns
+    winding: float = 2.5  # ohm, by which an idle motor brakes; assumed
+    heartbeat: float = 0.1  # s without positions, after which the safety module stops an active arm; not published
+    waking: float = 0.5  # s; assumed
+    attention: float = 0.3  # s, in which an attentive person presses the button that is wanted
+
+
 PLANT = PlantThresholds()
 DRIVER = DriverThresholds()
+BUS = BusThresholds()

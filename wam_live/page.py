@@ -1,7 +1,6 @@
 """The web server of the page, reachable from this machine alone."""
 
 import contextlib
-import functools
 import html
 import io
 import json
@@ -10,6 +9,7 @@ import math
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from http import HTTPStatus
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -142,13 +142,27 @@ def _look_next_to_the_panel(client: Any) -> None:
 
 @contextlib.contextmanager
 def _only_this_page(server: Any, port: int) -> Iterator[None]:
-    """Let the server refuse connections that other web pages open.
+    """Let the server refuse connections that other web pages open, other names of this machine, and frames around it.
 
-    viser does not check where a WebSocket comes from: any page open in the same browser could press the buttons.
+    viser does not check where a WebSocket comes from: any page open in the same browser could press the buttons.  One
+    that shows this page in a frame could lead the pointer to them.
     """
-    origins = [None, *(f"http://{name}:{port}" for name in (HOST, "localhost"))]
+    names = [f"{name}:{port}" for name in (HOST, "localhost")]
     original = server.serve
-    server.serve = functools.partial(original, origins=origins)
+
+    def serve(*arguments: Any, process_request: Any, **options: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            if request.headers.get("Host") not in names:
+                return connection.respond(HTTPStatus.FORBIDDEN, f"open http://{names[0]}\n")
+            response = process_request(connection, request)
+            if response is not None:
+                response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+            return response
+
+        origins = [None, *(f"http://{name}" for name in names)]
+        return original(*arguments, process_request=answer, origins=origins, **options)
+
+    server.serve = serve
     try:
         yield
     finally:

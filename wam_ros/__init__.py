@@ -12,11 +12,13 @@
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
+- long_steps: a node that holds up the others of its process
 - processors: those that the processes of one lockstep keep to
 - process_signals: signals from the imports of a program to its end; program: that of a node
 - requests: requests to services and their answers; call: one request from a shell
 - conformance: a running driver tested against its contract; driver_probe: the node that does it
 - driver_bench: states and currents of that driver; message_checks, stop_checks: a function for each row
+- testing: the test kit; pytest_plugin: its fixtures
 - limits: waits, counts and lengths of all these
 - network: limits ROS to this machine; one node of a name in each place
 """

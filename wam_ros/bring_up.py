@@ -310,6 +310,7 @@ class Composition:
     ----------
     nodes : the nodes by name.
     context, executor : of this connection, for further nodes.
+    add : called with a further node, which is spun with the others.
     killed : none, as nodes of this process end by themselves.
     """
 
@@ -327,6 +328,7 @@ class Composition:
         names = node_names(configuration)
         self._connection = Connection(["wam", "--ros-args", "--log-level", log_level], domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
+        self.add = self._connection.add
         BUSES[self.context] = LocalBus(self.executor, names.values())
         self.nodes: dict[str, Node] = {}
         self._may_end: dict[str, Any] = {}
@@ -348,7 +350,7 @@ class Composition:
             use_global_arguments=False,
         )
         self.nodes[name] = node
-        self._connection.add(node)
+        self.add(node)
         if hasattr(getattr(node, "node", node), "done"):
             self._may_end[name] = node
 

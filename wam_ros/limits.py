@@ -9,6 +9,9 @@ class NodeLimits:
 
     loss_repeated: int = 10  # steps, after which a loss is reported again while the arm is enabled
     slow_step: float = 0.5  # s, from which a step is reported
+    long_step: float = 0.02  # s, from which a step holds up the other nodes of its process; a driver waits 0.025 s
+    long_step_look: float = 0.01  # s between two looks for one
+    long_step_recent: float = 1.0  # s, in which what the others lack is the consequence of one
     slow_step_reports: float = 5.0  # s between two of these reports
     service_wait: float = 2.0  # s, after which a request reports that it still waits for its service
     stale_after: int = 5  # s without a step, as long as aggregators of diagnostics wait
@@ -20,7 +23,11 @@ class NodeLimits:
     strays: int = 5  # messages out of order after which two publishers of one node name both count as alive
     fault_held: float = 1.0  # s without a further exception, after which a fault is over
     exception_length: int = 300  # characters of an exception that are reported
-    trajectory_points: int = 1000  # of a trajectory that is taken
+    # of a trajectory that is taken: to read and to check it takes 17 ms, less than the driver's watchdog
+    trajectory_points: int = 500
+    table_rows: int = 256  # of a table that is taken; more than any node publishes, read in 1 ms
+    message_size: int = 262_144  # bytes; a trajectory of a 7-joint arm with all its arrays has half of it
+    requested_parameters: int = 500  # in one request; a node has half as many
     reason_length: int = 400  # characters; a message may hold a name of any length
     turn: int = 16  # messages handed on in one turn, about two inner periods; then timers and services have theirs
 
@@ -91,8 +98,22 @@ class ConformanceLimits:
     vanish: float = 5.0  # s, for a publisher to vanish
 
 
+@dataclass(frozen=True)
+class TestLimits:
+    """The test kit."""
+
+    # nobody uses them by default, and their ports are above those that Linux gives to any program
+    domains: range = range(215, 233)
+    domain_retry: float = 0.05  # s
+    patience: float = 300.0  # s of the wall clock, for what must happen at all on a busy machine
+    arm_time: float = 10.0  # s of the arm, for a condition
+    lockstep_timeout: float = 60.0  # s, for a node on a busy machine
+    look: float = 0.05  # s of the wall clock between two looks at a condition while the arm's time does not pass
+
+
 NODE_LIMITS = NodeLimits()
 PROCESS_LIMITS = ProcessLimits()
 RECORDER_LIMITS = RecorderLimits()
 CALL_LIMITS = CallLimits()
 CONFORMANCE_LIMITS = ConformanceLimits()
+TEST_LIMITS = TestLimits()

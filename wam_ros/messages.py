@@ -27,6 +27,7 @@ from wam_description.topics import (
     POINT,
     STRING,
     TABLE,
+    TASK_COLUMNS,
     TIME,
     TRAJECTORY,
     WRENCH,
@@ -162,13 +163,19 @@ def _fields(columns: tuple[str, ...]) -> list[PointField]:
     return [PointField(name=name, offset=8 * i, datatype=kind, count=1) for i, name in enumerate(columns)]
 
 
-def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[str]) -> Table:
+def most_rows(topic: Topic, shared: Shared) -> int:
+    """Rows that a table of a topic may have, so that a step takes its usual time: of a task one for each joint."""
+    return len(shared.arm.joints.names) if topic.columns == TASK_COLUMNS else NODE_LIMITS.table_rows
+
+
+def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[str], most: int | None = None) -> Table:
     """Rows of a PointCloud2 under these columns; NaN where a number is not known, nothing else may be.
 
     Raises
     ------
     Refused
-        for a frame that is not one of `frames`, other columns, a wrong size or a number that is infinite.
+        for a frame that is not one of `frames`, other columns, a wrong size, more than `most` rows or a number that is
+        infinite.
     """
     frame, step = message.header.frame_id, 8 * len(columns)
     if message.is_bigendian or message.fields != _fields(tuple(columns)):
@@ -177,6 +184,8 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
     data = bytes(message.data)
     if message.point_step != step or len(data) != step * message.width * message.height:
         raise Refused(f"{len(data)} bytes of data; {message.width * message.height} rows need {step} bytes each")
+    if most is not None and len(data) > most * step:
+        raise Refused(f"{len(data) // step} rows; send at most {most}")
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", data))
     result = Table(frame, rows)
     _require_usable(table_defect(result, columns, frames))
@@ -221,9 +230,10 @@ def diagnostic_status(status: NodeStatus, hardware: str) -> DiagnosticStatus:
 
 
 def read_status(message: DiagnosticStatus) -> NodeStatus:
-    """The status that a message describes."""
+    """The status that a message describes, fit for a terminal: another program may have sent it."""
     level = message.level[0] if isinstance(message.level, bytes) else int(message.level)
-    return parse(message.name, level, message.message, [(item.key, item.value) for item in message.values])
+    given = [(printable(item.key), printable(item.value)) for item in message.values]
+    return parse(printable(message.name), level, printable(message.message), given)
 
 
 Read = Callable[[Any], Any]
@@ -251,7 +261,8 @@ def reader(topic: Topic, shared: Shared, arrays: str) -> Read:
         joints = list(shared.arm.joints.names)
         return lambda message: read_trajectory(message, joints)
     if topic.type == TABLE:
-        return lambda message: read_table(message, topic.columns, frames)
+        most = most_rows(topic, shared)
+        return lambda message: read_table(message, topic.columns, frames, most)
     raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the input of a step")
 
 

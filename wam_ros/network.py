@@ -150,9 +150,10 @@ def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
 
 
 def move_to_free_domain(namespace: str, environment: MutableMapping[str, str]) -> str:
-    """Leave a ROS domain in which an arm runs in this namespace, for one that nobody is in.
+    """Leave the default ROS domain, if an arm runs in it in this namespace, for one that nobody is in.
 
-    For programs that nobody has to find, such as the demonstration.  `environment` is changed.
+    For programs that nobody has to find, such as the demonstration.  `environment` is changed.  The domain of a shell
+    that names one is not left: what else the shell starts is to be in the same one.
 
     Returns
     -------
@@ -160,8 +161,8 @@ def move_to_free_domain(namespace: str, environment: MutableMapping[str, str]) -
     """
     domain, full = requested_domain(environment), f"/{namespace.strip('/')}"
     pid = occupant(domain, full, "driver")
-    if not pid:
-        return ""
+    if not pid or environment.get("ROS_DOMAIN_ID"):
+        return ""  # the nodes report that the place is taken
     free = next((one for one in USUAL_DOMAINS if not is_inhabited(one)), None)
     if free is None:
         return ""  # the nodes report that the place is taken

@@ -29,6 +29,7 @@ from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
 from wam_ros.limits import NODE_LIMITS
+from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import Follower, declare, follow_together
@@ -62,7 +63,6 @@ class AdaptedNode(TolerantNode):
         self.node = declaration.make(shared, own)
         self._worked = 0  # stamp of the last step, ns
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
-        self._commands = {item.topic for item in declaration.taken if item.age == "command"}
         self._is_realtime = shared.timing.mode == "realtime"
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
@@ -92,12 +92,18 @@ class AdaptedNode(TolerantNode):
         self._service_clients: dict[tuple[str, Any], Any] = {}  # by name and type
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
+        # what the stack does not stream comes from, or follows from, a program of the user, who is told
+        self._commands = {
+            item.topic for item in declaration.taken if item.age == "command" or not interface.is_streamed(item.topic)
+        }
         self._interface, self._since, self._is_enabled = interface, 0, False
         self._synchronisers: set[Synchroniser] = set()
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
         ports.watch_peers(self._take_status, followed.node if followed else "")
         for topic, feeds in interface.feeds(declaration, self.node).items():
             self._connect(topic, feeds)
+        if self._is_realtime:
+            STEPS.watch(declaration.name, ports.report_long_step)
         for name in getattr(self.node, "services", ()):
             self.create_service(Trigger, f"~/{name}", _answering(getattr(self.node, name)))
 
@@ -126,6 +132,7 @@ class AdaptedNode(TolerantNode):
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""
+        STEPS.forget(self._declaration.name)
         self._ports.wait_for_delivery()
         super().destroy_node()
         self._place.close()
@@ -174,10 +181,10 @@ class AdaptedNode(TolerantNode):
         ):
             lost, stopped = self._interface.silent(ages)  # on a busy machine another node may just have been late
             silent = ", ".join(stopped)
-            self._ports.set_problem(
-                "inputs",
-                f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault",
-            )
+            reason = f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault"
+            if step := self._ports.held_up(stopped):
+                reason = f"{step}: {' and '.join(lost)} too old; let its steps compute less, then reset_fault"
+            self._ports.set_problem("inputs", reason)
             if known:
                 self._ports.repeat_status()
 
@@ -223,7 +230,12 @@ class AdaptedNode(TolerantNode):
     def _work(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
         began = time.monotonic()
         self._worked = inputs.stamp
-        outputs = work(inputs)
+        STEPS.begin(self._declaration.name, began)
+        try:
+            outputs = work(inputs)
+        finally:
+            if STEPS.end(self._declaration.name, began):
+                self._ports.repeat_status()
         if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
             is_own = not is_packaged(self._declaration)
             self.get_logger().warning(

@@ -16,17 +16,18 @@ from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.parameters import listed
 from wam_description.signals import NodeStatus
-from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance, with_refused
+from wam_description.status import AWAITED, BUSY, CHANGES, HELD_UP, diagnosed_name, guidance, with_refused
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
 from wam_ros.limits import NODE_LIMITS
+from wam_ros.long_steps import STEPS, LongStep
 from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
 from wam_ros.outlets import Outlets
 from wam_ros.priority import PRIORITY, set_priority
 from wam_ros.refusals import Claims, Refusals
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, SECOND, header, qos, topic_name
-from wam_ros.wire import decoder, stamp_of
+from wam_ros.wire import decoder, deserialized, stamp_of
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
@@ -82,6 +83,7 @@ class Ports:
         self.problems: dict[str, str] = {}
         self.session = 0
         self._name = declaration.name
+        self._busy: dict[str, tuple[str, frozenset[str]]] = {}  # by node in a long step: what, and who waits for it
         self._changes = Changes()
         self._status = self._plain = WAITING
         self._digests = digests(shared)
@@ -183,6 +185,18 @@ class Ports:
     def repeat_status(self) -> None:
         """Publish the present status once more, as a message may be lost on a loaded machine."""
         self._outlets.send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
+
+    def report_long_step(self, step: LongStep) -> None:
+        """Publish that this node is inside a long step, which holds up those of its process; from another thread."""
+        status = self._status._replace(facts={**self._status.facts, BUSY: str(step), HELD_UP: " ".join(STEPS.nodes)})
+        self._outlets.send(STATUS, diagnostic_status(status, self.shared.arm.name))
+
+    def held_up(self, nodes: Collection[str]) -> str:
+        """The long step of another node that holds up one of these nodes, '' for none."""
+        found = [reason for reason, held in self._busy.values() if not held.isdisjoint(nodes)]
+        if step := STEPS.recent():
+            found += [str(step)] * (not STEPS.nodes.isdisjoint(nodes))
+        return next(iter(found), "")
 
     def repeat_taken_status(self) -> None:
         """`repeat_status`, but not over one that is still on its way: replaced, it would be a loss to a recorder.
@@ -306,11 +320,16 @@ class Ports:
         """
         self._absent = set(self.interface.names) - {self._name}
 
-        def receive(message: Any) -> None:
-            status = read_status(message)
+        kind = message_type(self.interface.topics[STATUS])
+
+        def receive(data: bytes) -> None:
+            status = read_status(deserialized(data, kind, STATUS))
             is_peer = status.node in self.interface.declarations and status.node != self._name
             if is_peer:
                 self.faults[status.node] = status.fault
+                self._busy.pop(status.node, None)
+                if busy := status.facts.get(BUSY):
+                    self._busy[status.node] = busy, frozenset(status.facts.get(HELD_UP, "").split())
             # a node of the stack that this bring-up does not list answers all the same
             if self.takes_problem is not None and (is_peer or status.node in NODES.keys() - {self._name}):
                 reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
@@ -321,7 +340,7 @@ class Ports:
             if is_peer or status.node == followed:
                 take(status)
 
-        self.listen(STATUS, receive)
+        self.listen(STATUS, receive, raw=True)
 
     @property
     def absent(self) -> list[str]:

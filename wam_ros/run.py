@@ -127,10 +127,17 @@ class Connection:
         self.listener_gone = False
         self._nodes: list[Node] = []
 
-    def add(self, node: Node) -> None:
-        """Take a node into the executor."""
-        self.executor.add_node(node)
+    def add(self, node: Any) -> Any:
+        """Take a node into the executor; it is destroyed with the connection."""
         self._nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def remove(self, node: Any) -> None:
+        """Destroy a node now."""
+        self._nodes.remove(node)
+        self.executor.remove_node(node)
+        node.destroy_node()
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
@@ -138,9 +145,7 @@ class Connection:
             PROCESS_LIMITS.short_delivery if self.listener_gone else PROCESS_LIMITS.delivery
         )
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
-            self.executor.remove_node(node)
-            node.destroy_node()
-        self._nodes.clear()
+            self.remove(node)
         self.executor.shutdown()
         rclpy.try_shutdown(context=self.context)
 

@@ -176,7 +176,11 @@ def _refusing_unknown_types(callback: Callable[[Any, Any], Any]) -> Callable[[An
 
 
 def _wrong(parameters: Sequence[Any]) -> str:
+    if len(parameters) > NODE_LIMITS.requested_parameters:
+        return f"{len(parameters)} parameters in one request; send at most {NODE_LIMITS.requested_parameters}"
     for found in parameters:
+        if not found.name:
+            return "a parameter without a name; name it"
         if found.value.type not in _READABLE:
             name = printable(found.name, 100)
             return f"parameter '{name}' has the type {found.value.type}; allowed: {min(_READABLE)} to {max(_READABLE)}"

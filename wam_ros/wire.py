@@ -15,13 +15,15 @@ from rclpy.serialization import deserialize_message, serialize_message
 from wam_bag.cdr import Pattern, first_stamp
 from wam_description.arm import Shared
 from wam_description.signals import BASE, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, TIME, WRENCH, Topic, columns_of
-from wam_ros.messages import Refused, message_type, reader, writer
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, TIME, TRAJECTORY, WRENCH, Topic, columns_of
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.messages import Refused, message_type, most_rows, reader, writer
 
 _LARGEST = tuple(LARGEST[name] for name in State._fields)
 _LARGEST_WRENCH = (LARGEST["force"],) * 3 + (LARGEST["torque"],) * 3
 _NO_HEADER = ((0, 0), "")  # stamp and frame
 _FLOAT64 = 8  # sensor_msgs/PointField
+_STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
 Encode = Callable[[int, Any], bytes]
 Decode = Callable[[bytes], Any]
@@ -63,11 +65,7 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
     kind, read = message_type(topic), reader(topic, shared, arrays)
 
     def slowly(data: bytes) -> Any:
-        try:
-            message = deserialize_message(data, kind)
-        except Exception as error:  # rclpy raises its own kinds for bytes that are no such message
-            raise Refused(f"{len(data)} bytes are no {topic.type}; send one of that type") from error
-        return read(message)
+        return read(deserialized(data, kind, topic.type))
 
     frames = (BASE, *shared.arm.covers.names)
     if topic.type == JOINT_STATE:
@@ -82,8 +80,39 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
         wrenches = [(frame, _wrench(frame)) for frame in frames]
         return lambda data: _read_wrench(data, wrenches) or slowly(data)
     if topic.type == TABLE:
-        return lambda data: _read_table(data, topic.columns, frames) or slowly(data)
-    return slowly
+        most = most_rows(topic, shared)
+        return lambda data: _read_table(data, topic.columns, frames, most) or slowly(data)
+    return _repeated(slowly) if topic.type == TRAJECTORY else slowly
+
+
+def deserialized(data: bytes, kind: Any, name: str) -> Any:
+    """A message of a type from its bytes.
+
+    Raises
+    ------
+    Refused
+        for too many bytes, which would take too long, and for bytes that are no such message.
+    """
+    if len(data) > NODE_LIMITS.message_size:
+        raise Refused(f"{len(data)} bytes of {name}; send at most {NODE_LIMITS.message_size}")
+    try:
+        return deserialize_message(data, kind)
+    except Exception as error:  # rclpy raises its own kinds for bytes that are no such message
+        raise Refused(f"{len(data)} bytes are no {name}; send one of that type") from error
+
+
+def _repeated(decode: Decode) -> Decode:
+    """The same, at once for a message that differs from the last one in its stamp alone, as one that is streamed."""
+    last, value = b"", None
+
+    def take(data: bytes) -> Any:
+        nonlocal last, value
+        if data[_STAMP_END:] != last:
+            value = decode(data)
+            last = data[_STAMP_END:]
+        return value
+
+    return take
 
 
 def _names(topic: Topic, shared: Shared) -> tuple[str, ...]:
@@ -175,11 +204,13 @@ def _table_limits(columns: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[in
     )
 
 
-def _read_table(data: bytes, columns: tuple[str, ...], frames: tuple[str, ...]) -> Table | None:
+def _read_table(data: bytes, columns: tuple[str, ...], frames: tuple[str, ...], most: int) -> Table | None:
     """The value, None where the message has to be looked at more closely."""
     step = 8 * len(columns)
     for frame in frames:
         count = (len(data) - _table(columns, frame, 0).size) // step
+        if count > most:
+            continue
         numbers = _table(columns, frame, max(count, 0)).numbers(data)
         if numbers is not None:
             break

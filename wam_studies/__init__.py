@@ -11,6 +11,5 @@ plant               the plant's effects, each measured alone and compared with t
 force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
 stability           the stability guard validated by Monte Carlo simulation; the stability map of figure 5.8
 design_choices      4.4 and 5.7 with numbers: stiffness of the arm, less friction against more stiffness
-experiment_runs     the runs of an experiment over topics, recorded
 scorecard           the arm of a configuration compared with the requisites of chapter 3
 """

@@ -7,9 +7,7 @@ import numpy as np
 
 from wam_analysis.table import markdown
 from wam_description.configuration import Configuration
-from wam_description.transmission_map import TransmissionMap
-from wam_studies.scorecard import measures, printed
-from wam_theory.cable import twist_torque, twisted_tension
+from wam_studies.scorecard import measures
 from wam_theory.linear_loop import damping_ratio, routh_gain, series_stiffness
 from wam_theory.regimes import actuator_cycle_power, actuator_cycle_work
 from wam_theory.resonance import (
@@ -77,43 +75,6 @@ def stiffness_table(configuration: Configuration) -> str:
     return markdown(head, rows)
 
 
-def differential_radius(configuration: Configuration) -> float:
-    """Least radius, m, of the differential's pulleys at which its third stage leaves the limiting efficiency of 7.2.2.
-
-    Its cables have the E A in print; each motor of the differential drives one pulley with the whole reduction of
-    its two stages.  The thesis does not give the radius.
-    """
-    arm = configuration.shared.arm
-    gears = np.abs(TransmissionMap.of(arm).motor_from_joint)
-    (ea,), (required,) = (
-        printed("stiffness per length of the differential's cable"),
-        printed("least limiting efficiency at full torque"),
-    )
-    two_stages = measures(configuration).efficiency
-    loss = 1.0 - required / two_stages
-    return float(arm.motors.peak_torque[1] * gears[1, 1] / (ea * loss))
-
-
-class TwistedCircuit(NamedTuple):
-    """Circuit of joint 4 at its largest twist: tension, its change, N, and torque on joint 3, N m."""
-
-    twist: float  # rad
-    tension: float
-    change: float
-    torque: float
-
-
-def twisted_circuit(configuration: Configuration) -> TwistedCircuit:
-    """The first stage of joint 4, which spans the inner link, twisted by joint 3 (7.2.2)."""
-    arm = configuration.shared.arm
-    motor = len(arm.motors.names) - 1
-    stage = arm.cables.stage_motors.index(arm.motors.names[motor])
-    cables, (twist,) = arm.cables, printed("largest twist of the joint-4 circuit, each way")
-    at = (cables.pretension[motor], cables.stage_ea[stage], cables.stage_length[stage], cables.stage_radius[stage])
-    tension = float(twisted_tension(*at, twist))
-    return TwistedCircuit(twist, tension, tension - at[0], float(twist_torque(*at, twist)))
-
-
 class Choice(NamedTuple):
     """A quantity of 5.7 with half the friction, and with twice k_tr, over the present one."""
 
@@ -126,22 +87,6 @@ class Choice(NamedTuple):
 # the testbed of 5.6, SI, with zeta = 0.25, beyond the Routh limit so that a largest stable step exists
 BASE = FrictionNode(0.45194, 2.0 * 0.25 * math.sqrt(0.45194 * 3097.0), 1632.7, 1464.3, 0.7, 0.9)
 GAMMA, STEP = 1.8, 20.0  # G_I in the units of (5.15) at BASE; F_error, N m
-
-
-class StrongerRotor(NamedTuple):
-    """Rotor inertia for more torque, per that of one motor: by length, as of motors in parallel, or by diameter."""
-
-    by_length: float
-    by_diameter: float
-
-
-def stronger_rotor(torque: float) -> StrongerRotor:
-    """Rotor inertia for so many times the torque of one motor (7.2.2).
-
-    The magnetic stress on the rotor's surface is that of the same magnets and currents: torque goes with L D^2, inertia
-    with L D^4.
-    """
-    return StrongerRotor(torque, torque**2)
 
 
 def friction_or_stiffness() -> tuple[Choice, ...]:

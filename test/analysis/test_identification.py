@@ -11,7 +11,7 @@ import pytest
 from arms import CONFIGURATION, NOWHERE, WAM, changed
 from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import STORE, joint_state, wrench
+from sample_messages import STORE, joint_state, wrench
 
 from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.contradictions import Mistake, contradictions

@@ -25,7 +25,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosHistory, QosReliability, QosTime
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
+from sample_messages import QOS, STORE, joint_state, point, status, wrench
 
 import wam_bag
 from wam_bag.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
@@ -33,53 +34,9 @@ from wam_bag.bag_writer import BagWriter, RecordingError, exact_cdr, policies
 from wam_bag.cdr import ExactLength, stamp_reader
 from wam_bag.definitions import DefinitionError, definition, schema, type_hash
 from wam_bag.mcap_writer import McapWriter
-from wam_bag.metadata import INFINITE
 from wam_description.topics import TOPICS
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-QOS = {
-    "history": "keep_last",
-    "depth": 7,
-    "reliability": "reliable",
-    "durability": "transient_local",
-    "deadline": INFINITE,
-    "lifespan": INFINITE,
-    "liveliness": "automatic",
-    "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}
 TYPES = sorted({topic.type for topic in TOPICS})
-
-
-def header(stamp: int, frame: str = "") -> Any:
-    time = STORE.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
-    return STORE.types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
-
-
-def joint_state(stamp: int, names: list[str], *arrays: list[float]) -> bytes:
-    fields = [np.array(values, dtype=np.float64) for values in arrays]
-    message = STORE.types["sensor_msgs/msg/JointState"](header(stamp), names, *fields)
-    return bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/JointState"))
-
-
-def vector(x: float, y: float, z: float, kind: str = "Vector3") -> Any:
-    return STORE.types[f"geometry_msgs/msg/{kind}"](x, y, z)
-
-
-def wrench(stamp: int, frame: str, *values: float) -> bytes:
-    inner = STORE.types["geometry_msgs/msg/Wrench"](vector(*values[:3]), vector(*values[3:]))
-    message = STORE.types["geometry_msgs/msg/WrenchStamped"](header(stamp, frame), inner)
-    return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/WrenchStamped"))
-
-
-def point(stamp: int, frame: str, *values: float) -> bytes:
-    message = STORE.types["geometry_msgs/msg/PointStamped"](header(stamp, frame), vector(*values, kind="Point"))
-    return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/PointStamped"))
-
-
-def status(name: str, text: str) -> bytes:
-    message = STORE.types["diagnostic_msgs/msg/DiagnosticStatus"](0, name, text, "", [])
-    return bytes(STORE.serialize_cdr(message, "diagnostic_msgs/msg/DiagnosticStatus"))
 
 
 def write_sample(path: Path, force: float = 3.0) -> None:

@@ -25,7 +25,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
-from test_bag import QOS
+from sample_messages import QOS
 
 from wam_analysis.findings.analysis import analyse
 from wam_bag import bag_file, safe_yaml
@@ -78,13 +78,24 @@ def xyz(vectors: Sequence[Any]) -> np.ndarray[Any, Any]:
     return np.array([[v.x, v.y, v.z] for v in vectors])
 
 
+def named(message: Any) -> list[str]:
+    """Names of a message's values: numbered where there is none, or where another value has it."""
+    width = max(len(message.name), *(len(getattr(message, field)) for field in ("position", "velocity", "effort")))
+    found: list[str] = []
+    for i in range(width):
+        name = (message.name[i] if i < len(message.name) else "") or f"joint{i + 1}"
+        found.append(f"{name} ({i + 1})" if name in found else name)
+    return found
+
+
 def assert_joints(columns: JointColumns, messages: Sequence[Any]) -> None:
-    assert columns.names == tuple(dict.fromkeys(name for message in messages for name in message.name))
+    assert columns.names == tuple(dict.fromkeys(name for message in messages for name in named(message)))
     for field in ("position", "velocity", "effort"):
         array = getattr(columns, field)
         assert array.shape[1] in (0, len(columns.names))
         for row, message in zip(array, messages, strict=True):
-            expected = dict(zip(message.name, getattr(message, field).tolist(), strict=False))
+            values = getattr(message, field).tolist()
+            expected = dict(zip(named(message), values, strict=True)) if len(values) == len(named(message)) else {}
             np.testing.assert_array_equal(row, [expected.get(name, np.nan) for name in columns.names[: len(row)]])
             assert len(row) or not expected
 

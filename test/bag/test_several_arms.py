@@ -7,7 +7,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import STORE, joint_state, status
+from sample_messages import STORE, joint_state, status
 
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter

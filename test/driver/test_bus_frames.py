@@ -5,7 +5,7 @@ import random
 import pytest
 
 from wam_driver.bus import frames, properties
-from wam_driver.bus.frames import GROUP, Frame, Position, Value
+from wam_driver.bus.frames import Bit, Frame, Position, Value
 from wam_driver.bus.safety_module import WATCHED, Button, Pendant
 
 COUNT = 100_000
@@ -59,9 +59,9 @@ def test_torques_are_packed_as_in_the_published_example() -> None:
     ("frame", "identifier", "data"),
     [
         (frames.get(3, 5), 0x003, "05"),
-        (frames.get(4, 48, GROUP), 0x404, "30"),
+        (frames.get(4, 48, Bit.GROUP), 0x404, "30"),
         (frames.put(10, 8, 1), 0x00A, "880001000000"),
-        (frames.put(4, 8, 2, GROUP), 0x404, "880002000000"),
+        (frames.put(4, 8, 2, Bit.GROUP), 0x404, "880002000000"),
         (frames.reply(10, 8, 2), 0x546, "880002000000"),
         (frames.position(2, -1), 0x443, "3fffff"),
         (frames.torques(2, 42, [1]), 0x402, "aa00040000000000"),

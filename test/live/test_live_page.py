@@ -25,8 +25,7 @@ import numpy as np
 import pytest
 from bag_comparison import compare
 from browser import browser
-from conftest import LONG, RosWorld
-from test_lockstep import STEPS, configuration, record_composed
+from conftest import LONG
 
 from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
@@ -55,6 +54,7 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 from wam_live.page import free_port as next_free_port
 from wam_live.thresholds import LIVE
+from wam_ros.testing import Network, RunningArm
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
@@ -311,6 +311,11 @@ def test_pages_of_other_sites_are_refused(server: Any) -> None:
     with pytest.raises(InvalidStatus) as refused:
         connect(address, origin="http://evil.example")  # type: ignore[arg-type]
     assert refused.value.response.status_code == 403
+    page = f"http://{HOST}:{server.get_port()}"
+    with urllib.request.urlopen(page) as answer:
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(urllib.request.Request(page, headers={"Host": "evil.example"}))
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(f"http://{_other_address()}:{server.get_port()}", timeout=2.0)
 
@@ -450,10 +455,12 @@ def alone(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Pa
 
 def recorded(folder: Path, domain_id: int) -> Path:
     """A short run in lockstep, as a bag."""
-    script = folder / "script.yaml"
-    script.write_text(json.dumps({"steps": STEPS}))
-    record_composed(configuration(script, folder, "bag"), domain_id)
-    return folder / "bag"
+    push = {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4}
+    steps = [
+        {"name": "release", "seconds": 0.1, "request": "enable"},
+        {"name": "move and be pushed", "seconds": 0.5, "posture": [0.1, -0.7, 0.05, 0.4], "push": push},
+    ]
+    return RunningArm(domain_id, folder).play(steps).path
 
 
 @pytest.mark.slow
@@ -496,7 +503,7 @@ def test_of_a_bag_without_hypotheses_the_estimated_contact_is_played_from_its_ow
     assert BagSource(analysed_run(bag._replace(topics=topics))).snapshot(400_000_000).estimated == NO_CONTACT
 
 
-def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:
+def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: Network) -> None:
     listener, page = ros.node("listener"), ros.node("page")
     heard: list[str] = []
     listener.create_subscription(
@@ -518,7 +525,7 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     del other
 
 
-def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: RosWorld) -> None:
+def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: Network) -> None:
     node, shared = ros.node("driver"), CONFIGURATION.shared
     stack = RunningStack(ros.context, "wam", shared)
     rows = {name: BY_NAME[name] for name in ("sim/contact/wrench", "sim/contact/point", "sim/joint_states")}
@@ -539,7 +546,7 @@ def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: RosWorld) -
     stack.node.destroy_node()
 
 
-def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:
+def test_copies_for_the_page_are_few_and_newest_first(ros: Network) -> None:
     sender, viewer = ros.node("sender"), ros.node("viewer")
     copy = DisplayCopy(sender, BY_NAME["sim/disturbance"])
     heard: list[int] = []

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import LONG
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import STORE, joint_state, wrench
+from sample_messages import STORE, joint_state, wrench
 
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import NoViewerError, _arrows, _quaternion, _turn, load_rerun, view, viewer

@@ -26,10 +26,9 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 import pytest
-import yaml
-from conftest import LONG, locked_domain
+from conftest import LONG
 
-from wam_description.configuration import Configuration, packaged
+from wam_ros.testing import RunningArm, locked_domain
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -232,26 +231,11 @@ def is_among(line: str, printed: str) -> bool:
 @pytest.fixture(scope="module")
 def first_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`bags/first`: a scenario shorter than the demonstration."""
-    from wam_ros.bring_up import Composition
-
-    folder = tmp_path_factory.mktemp("first")
-    script = folder / "short.yaml"
     press = {"frame": "outer_link", "newtons": [0.0, -1.0, 0.0]}
-    script.write_text(yaml.safe_dump({"steps": [{"name": "press", "seconds": 0.05, "force": press}]}))
-    base = Configuration.load(packaged("wam"))
-    configuration = base.with_values(
-        {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.real_time_factor": 0.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(folder),
-            "recorder:name": "first",
-        }
-    )
-    with locked_domain() as number, Composition(configuration, domain_id=number) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        composition.spin(lambda: scenario.done)
-    return folder / "first"
+    steps = [{"name": "press", "seconds": 0.05, "force": press}]
+    with locked_domain() as number:
+        arm = RunningArm(number, tmp_path_factory.mktemp("first"))
+        return arm.play(steps, recorder={"name": "first"}).path
 
 
 @contextmanager

@@ -16,8 +16,8 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from wam_description.configuration import Configuration, packaged
 from wam_description.topics import BY_NAME
+from wam_ros.testing import RunningArm
 
 ROOT = Path(__file__).resolve().parents[2]
 HANDBOOK = {
@@ -60,14 +60,11 @@ def test_a_changed_block_is_noticed_and_a_changed_sentence_is_kept(generate: Any
     assert generate.filled(own) == own
 
 
-def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None:
+def test_topics_and_services_named_in_the_handbook_exist(arm: RunningArm) -> None:
     from wam_description.nodes import NODES
-    from wam_ros.bring_up import Composition
 
-    nodes = [name for name in NODES if name != "recorder"]
-    configuration = Configuration.load(packaged("wam")).with_values({"nodes": nodes, "timing.real_time_factor": 0.0})
-    with Composition(configuration, domain_id=domain_id) as composition:
-        services = {service.service_name for node in composition.nodes.values() for service in node.services}
+    arm.start(nodes=[name for name in NODES if name != "recorder"])
+    services = {service.service_name for node in arm.nodes.values() for service in node.services}
     topics = {name if name.startswith("/") else f"/wam/{name}" for name in BY_NAME}
     for page, text in HANDBOOK.items():
         named = set(re.findall(r"/wam/[a-z_/]*[a-z]", text))

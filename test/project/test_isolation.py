@@ -6,9 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DOMAINS, ROOT, locked_domain
+from conftest import ROOT
 
+from wam_ros.limits import TEST_LIMITS
 from wam_ros.network import PORTS, has_ports, is_inhabited
+from wam_ros.testing import locked_domain
 
 LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/ip_local_port_range
 
@@ -25,8 +27,8 @@ def test_the_tree_comes_before_what_is_installed() -> None:
 
 
 def test_domains_of_the_tests_are_none_that_a_user_takes() -> None:
-    assert min(DOMAINS) > 101  # the most that ROS recommends to users
-    for domain in (DOMAINS[0], DOMAINS[-1]):
+    assert min(TEST_LIMITS.domains) > 101  # the most that ROS recommends to users
+    for domain in (TEST_LIMITS.domains[0], TEST_LIMITS.domains[-1]):
         ports = range(7400 + PORTS * domain, min(7400 + PORTS * (domain + 1), 65536))
         assert ports[0] not in LINUX_GIVES
         assert ports[-1] not in LINUX_GIVES

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import LONG, RosWorld
+from conftest import LONG
 from sensor_msgs.msg import JointState
 
 from wam_cli.commands.conform import driver_alone
@@ -22,6 +22,7 @@ from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.node import make_node
+from wam_ros.testing import Network
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -32,7 +33,7 @@ PATIENT = 20
 class Bench:
     """A driver and the probe in one process."""
 
-    def __init__(self, ros: RosWorld, folder: Path, configuration: Configuration, make: Callable[..., Any]) -> None:
+    def __init__(self, ros: Network, folder: Path, configuration: Configuration, make: Callable[..., Any]) -> None:
         self.ros, self._make = ros, make
         file = folder / "parameters.yaml"
         file.write_text(configuration.text)
@@ -106,7 +107,7 @@ def test_an_attempt_that_the_machine_held_up_does_not_count(
 
 @pytest.mark.slow
 def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_refused(
-    ros: RosWorld, tmp_path: Path
+    ros: Network, tmp_path: Path
 ) -> None:
     configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
     bench = Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))
@@ -117,7 +118,7 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
 
 @pytest.mark.slow
 def test_the_skeleton_keeps_the_contract_in_150_lines(
-    ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     configuration = skeleton(monkeypatch)
     entry = configuration.shared.nodes[0]
@@ -132,7 +133,7 @@ def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one(
 
 
 def test_without_a_driver_no_row_but_the_interface_is_tested(
-    ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     short = replace(CONFORMANCE_LIMITS, start=0.05, look=0.05, service_wait=0.05)
     for module in ("driver_probe", "message_checks"):
@@ -225,7 +226,7 @@ def broken_driver(**ros: Any) -> Any:
 
 
 @pytest.mark.slow
-def test_a_broken_driver_fails_row_by_row(ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broken_driver_fails_row_by_row(ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(ros, tmp_path, skeleton(monkeypatch), broken_driver)
     driver = bench.driver
 

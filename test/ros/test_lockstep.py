@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from bag_comparison import compare
 
 from wam_bag.bag import Bag, JointColumns, PointColumns, TableColumns, WrenchColumns, read
@@ -19,6 +18,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.interface import process_groups
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_description.synchroniser import InputSpec, Synchroniser
+from wam_ros.testing import RunningArm, playing
 from wam_sim.replay import tables
 from wam_sim.simulation import Rows, Simulation
 
@@ -35,38 +35,6 @@ STEPS = [
 ]
 
 
-@pytest.fixture
-def script(tmp_path: Path) -> Path:
-    path = tmp_path / "script.yaml"
-    path.write_text(yaml.safe_dump({"steps": STEPS}))
-    return path
-
-
-def configuration(script: Path, directory: Path, name: str, **values: object) -> Configuration:
-    base = Configuration.load(packaged("wam"))
-    return base.with_values(
-        {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(directory),
-            "recorder:name": name,
-            **values,
-        }
-    )
-
-
-def record_composed(configured: Configuration, domain_id: int) -> None:
-    from wam_ros.bring_up import Composition
-
-    with Composition(configured, domain_id=domain_id) as composition:
-        scenario = composition.nodes["scenario"]
-        composition.spin(lambda: scenario.done)  # type: ignore[attr-defined]
-        assert scenario.failure == ""  # type: ignore[attr-defined]
-
-
 def record_in_processes(configured: Configuration, how: str = EACH) -> None:
     from wam_ros.bring_up import Processes
 
@@ -75,8 +43,8 @@ def record_in_processes(configured: Configuration, how: str = EACH) -> None:
         assert (name.split()[-1], code) == ("scenario", 0)
 
 
-def play_directly(configured: Configuration, script: Path) -> Simulation:
-    run = Simulation(configured, load(script, configured.shared))
+def play_directly(configured: Configuration) -> Simulation:
+    run = Simulation(configured, load(configured.sections["scenario"]["script"], configured.shared))
     assert run.play() == ""
     return run
 
@@ -109,41 +77,35 @@ def differences(rows: Rows, bag: Bag) -> list[str]:
 
 
 @pytest.mark.parametrize(("delay", "dither_cycle"), [(0, 0), (1, 40)])
-def test_lockstep_over_topics_equals_the_loop_without_ros(
-    delay: int, dither_cycle: int, script: Path, tmp_path: Path, domain_id: int
-) -> None:
-    values = {"timing.outer_delay": delay, "timing.dither_cycle": dither_cycle}
-    configured = configuration(script, tmp_path, "composed", **values)
-    record_composed(configured, domain_id)
-    run = play_directly(configured, script)
-    bag = read(tmp_path / "composed")
-    assert len(run.rows) == 26
+def test_lockstep_over_topics_equals_the_loop_without_ros(delay: int, dither_cycle: int, arm: RunningArm) -> None:
+    bag = arm.play(STEPS, timing={"outer_delay": delay, "dither_cycle": dither_cycle})
+    run = play_directly(arm.configuration)
     assert len(run.rows["motor_states"]) == 801
     assert differences(run.rows, bag) == []
 
 
 @pytest.mark.slow
-def test_one_period_of_delay_changes_the_numbers(script: Path, tmp_path: Path) -> None:
+def test_one_period_of_delay_changes_the_numbers(tmp_path: Path) -> None:
     """The comparison above would notice an outer command that is used a period too late."""
-    runs = [
-        play_directly(configuration(script, tmp_path, "none", **{"timing.outer_delay": delay}), script)
-        for delay in (0, 1)
-    ]
+    runs = [play_directly(playing(STEPS, tmp_path, timing={"outer_delay": delay})) for delay in (0, 1)]
     assert runs[0].rows["motor_states"] != runs[1].rows["motor_states"]
 
 
-def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: Path, domain_id: int) -> None:
+def test_processes_under_load_say_what_one_process_says(tmp_path: Path, arm: RunningArm) -> None:
+    def named(name: str) -> Configuration:
+        return playing(STEPS, tmp_path, recorder={"name": name})
+
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
     try:
-        record_in_processes(configuration(script, tmp_path, "loaded"))
+        record_in_processes(named("loaded"))
     finally:
         for process in busy:
             process.kill()
             process.wait()
-    record_in_processes(configuration(script, tmp_path, "quiet"))
-    record_composed(configuration(script, tmp_path, "composed"), domain_id)
+    record_in_processes(named("quiet"))
+    arm.play(STEPS, recorder={"name": "composed"})
     assert compare(tmp_path / "loaded", tmp_path / "quiet") == []
-    record_in_processes(configuration(script, tmp_path, "grouped"), GROUPED)
+    record_in_processes(named("grouped"), GROUPED)
     assert compare(tmp_path / "quiet", tmp_path / "composed") == []
     assert compare(tmp_path / "grouped", tmp_path / "composed") == []
     bag = read(tmp_path / "loaded")
@@ -173,7 +135,8 @@ def test_a_node_of_another_name_has_a_process_of_its_own(tmp_path: Path, monkeyp
 
 
 @pytest.mark.slow
-def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_path: Path) -> None:
+def test_direct_runs_are_equal_in_every_bit_across_processes(tmp_path: Path) -> None:
+    script = playing(STEPS, tmp_path).sections["scenario"]["script"]
     code = (
         "import sys, json, hashlib\n"
         "from pathlib import Path\n"

@@ -1,17 +1,25 @@
 """What an enabled arm does where a node of the chain stops, another one speaks for it, or the driver starts again."""
 
+import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
-from conftest import RosWorld
+from conftest import LONG
 from test_nodes import ARM, MS, SIX, changed, make
 
+from wam_description.arm import Shared
 from wam_description.event import Level
+from wam_description.parameters import Nothing
 from wam_description.signals import NodeStatus, State
+from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME
+from wam_description.wiring import Input, Outputs, reaction
 from wam_driver.safety import Mode
+from wam_ros.long_steps import LongStep
 from wam_ros.messages import diagnostic_status, joint_state, message_type
+from wam_ros.testing import Network
 from wam_ros.topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
@@ -21,7 +29,7 @@ LIMIT = 50 * MS  # ns of the arm's time, from the last answer of a node to zero 
 class Stack:
     """The six nodes in this process; the arm is enabled."""
 
-    def __init__(self, ros: RosWorld, folder: Path, mode: str, **values: Any) -> None:
+    def __init__(self, ros: Network, folder: Path, mode: str, **values: Any) -> None:
         self.ros, self.folder, self._clock = ros, folder, AnsweredClock(MS * 1e-9)
         self.values = {"timing__mode": mode, "timing__timeout": 2.0, **values}
         self._frozen: list[tuple[Any, Any, list[Any]]] = []
@@ -104,7 +112,7 @@ LOST = {
 
 @pytest.mark.parametrize("name", LOST)
 def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
-    name: str, ros: RosWorld, tmp_path: Path
+    name: str, ros: Network, tmp_path: Path
 ) -> None:
     feedback = {"force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
     stack = Stack(ros, tmp_path, "realtime", **(feedback if name == "contact_estimator" else {}))
@@ -119,7 +127,7 @@ def test_a_node_that_is_frozen_is_named_and_the_current_is_zero_within_50_ms(
 
 
 def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_with_it(
-    ros: RosWorld, tmp_path: Path
+    ros: Network, tmp_path: Path
 ) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     stack.freeze("gravity")
@@ -131,7 +139,7 @@ def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_wit
     stack.enable()
 
 
-def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: RosWorld, tmp_path: Path) -> None:
+def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     node = stack.nodes["force_loop"]
     publish, node._publish = node._publish, lambda stamp, outputs: None
@@ -145,7 +153,7 @@ def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: RosWor
     stack.enable()
 
 
-def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     row = BY_NAME["status"]
     forger = ros.node("forger").create_publisher(message_type(row), row.name, qos(row))
@@ -158,7 +166,7 @@ def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: RosWorld
     assert stack.fault == ""
 
 
-def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "realtime")
     ros.wait(lambda: stack.nodes["gravity"]._is_enabled)
     stack.nodes["gravity"].end()
@@ -173,7 +181,7 @@ def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: RosWorld, tm
         ("motor_states", "/wam/driver and /wam/intruder publish motor_states"),
     ],
 )
-def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: RosWorld, tmp_path: Path) -> None:
+def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     row = BY_NAME[topic]
     other = ros.node("intruder")
@@ -189,7 +197,7 @@ def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, 
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
-def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: RosWorld, tmp_path: Path) -> None:
+def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, mode)
     before = stack.nodes["driver"]._session.number
     ros.remove(stack.nodes["driver"])
@@ -197,3 +205,43 @@ def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Ros
     stack.enable()
     assert stack.nodes["driver"]._session.number > before
     assert all(node._ports.session > before for name, node in stack.nodes.items() if name != "driver")
+
+
+class Slow:
+    """A node whose step does not end before the test lets it."""
+
+    name, parameters = "slow", Nothing
+    may_end: ClassVar[Callable[[], bool]] = lambda: True
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("joint_states", "position"), outputs=())
+    def step(self, inputs: Inputs) -> Outputs:
+        end = time.monotonic() + LONG
+        while not type(self).may_end() and time.monotonic() < end:
+            time.sleep(0.001)
+        return {}
+
+
+def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
+    ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It reports itself while it computes: from the process of transform to that of the velocity loop."""
+    stack = Stack(ros, tmp_path, "realtime")
+    slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
+    published = slow._ports._outlets.published
+    before = published["status"]
+    monkeypatch.setattr(Slow, "may_end", lambda: published["status"] > before)
+    stack.ros.wait(lambda: published["status"] > before, what="a report from inside the step")
+    assert stack.nodes["velocity_loop"]._ports.held_up(["transform"]).startswith("slow was in a step of ")
+    monkeypatch.setattr(Slow, "may_end", lambda: True)
+
+
+def test_what_a_held_up_node_lacks_is_the_fault_of_the_long_step(ros: Network, tmp_path: Path) -> None:
+    stack = Stack(ros, tmp_path, "realtime")
+    ports = stack.nodes["gravity"]._ports
+    stack.freeze("transform")
+    ports.report_long_step(LongStep("gravity", 0.7))
+    ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
+    assert "gravity was in a step of 0.7 s: " in stack.fault
+    assert "transform has stopped" not in stack.fault

@@ -2,15 +2,13 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-import yaml
-from conftest import RosWorld
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -25,14 +23,15 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
-from wam_ros.bring_up import Composition
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status, wrench_stamped
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
 from wam_ros.ports import READY
+from wam_ros.testing import Network, RunningArm, playing
 from wam_ros.topics import DEPTH, qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 
+PLAYING = ("scenario", "recorder")
 WAM = Configuration.load(packaged("wam"))
 ARM = WAM.shared.arm
 MOTORS = list(ARM.motors.names)
@@ -509,15 +508,15 @@ def test_lockstep_goes_on_after_a_node_was_restarted(ros: Any, tmp_path: Path) -
     nodes = {name: make(ros, tmp_path, name, "/wam", configured) for name in SIX if name != "velocity_loop"}
     driver, time = nodes["driver"].driver, nodes["driver"].time
 
-    def wait(world: RosWorld, until: Callable[[], Any], what: str) -> None:
+    def wait(world: Network, until: Callable[[], Any], what: str) -> None:
         ros.wait(lambda: world.executor.spin_once(timeout_sec=0.0) or until(), what=what)
 
-    with closing(RosWorld(ros.domain_id)) as first:
+    with closing(Network(ros.domain_id)) as first:
         make(first, tmp_path, "velocity_loop", "/wam", configured)
         wait(first, lambda: driver.stamp > 20 * MS, "lockstep")
     ros.wait(lambda: driver.safety.fault, what="the fault of a node that is missing")
     assert "no motor_current_command" in driver.safety.fault
-    with closing(RosWorld(ros.domain_id)) as second:
+    with closing(Network(ros.domain_id)) as second:
         make(second, tmp_path, "velocity_loop", "/wam", configured)
         wait(second, lambda: not time.obstacle(), "lockstep again")
         assert driver.reset_fault().success
@@ -562,27 +561,15 @@ def test_two_arms_in_two_namespaces_do_not_mix(ros: Any, tmp_path: Path) -> None
 
 
 @pytest.fixture
-def whole(domain_id: int, tmp_path: Path) -> Iterator[Composition]:
+def whole(arm: RunningArm, tmp_path: Path) -> RunningArm:
     """Every node of the stack in one process, in lockstep, playing nothing for long."""
-    script = tmp_path / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": [{"name": "wait", "seconds": 1000.0}]}))
-    configured = WAM.with_values(
-        {
-            "nodes": list(NODES),
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(tmp_path),
-            "recorder:name": "bag",
-        }
-    )
-    with Composition(configured, domain_id=domain_id) as composition:
-        yield composition
+    steps = [{"name": "wait", "seconds": 1000.0}]
+    return arm.start(configuration=playing(steps, tmp_path, nodes=[name for name in NODES if name not in PLAYING]))
 
 
-def test_the_live_graph_is_the_interface_table(whole: Composition) -> None:
+def test_the_live_graph_is_the_interface_table(whole: RunningArm) -> None:
+    whole.run(0.02)
     driver = whole.nodes["driver"]
-    whole.spin(lambda: driver.driver.stamp > 20 * MS)  # type: ignore[attr-defined]
     node = whole.nodes["scenario"]
     names = {driver.resolve_topic_name(topic.name): topic for topic in TOPICS}
     interface = Interface(WAM.with_values({"nodes": list(NODES)}).shared)
@@ -595,7 +582,8 @@ def test_the_live_graph_is_the_interface_table(whole: Composition) -> None:
             assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE, topic.name
             assert info.qos_profile.durability == durability, topic.name
         subscriptions = node.get_subscriptions_info_by_topic(full_name)
-        assert sorted(info.node_name for info in subscriptions) == sorted(interface.subscribers(topic.name)), topic.name
+        takers = sorted(info.node_name for info in subscriptions if info.node_name != whole.node.get_name())
+        assert takers == sorted(interface.subscribers(topic.name)), topic.name
         for info in subscriptions:
             assert info.topic_type == topic.type
             assert info.qos_profile.durability == durability, f"{info.node_name} of {topic.name}"
@@ -605,15 +593,8 @@ def test_the_live_graph_is_the_interface_table(whole: Composition) -> None:
     assert beside <= {"rosout", "parameter_events"}, "nothing beside the table"
 
 
-def test_every_node_says_that_it_is_ready_and_reports_every_second(whole: Composition) -> None:
-    seen: list[Any] = []
-    ready: set[str] = set()
-    node = whole.nodes["gravity"]
-    status, diagnostics = BY_NAME["status"], BY_NAME["/diagnostics"]
-    profile = qos(status)
-    profile.depth = DEPTH
-    node.create_subscription(message_type(status), status.name, lambda m: ready.add(m.name), profile)
-    node.create_subscription(message_type(diagnostics), diagnostics.name, seen.append, qos(diagnostics))
-    whole.spin(lambda: whole.nodes["driver"].driver.stamp > 1100 * MS)  # type: ignore[attr-defined]
-    whole.spin(lambda: ready == set(NODES))
-    assert {m.status[0].name for m in seen} >= {f"wam: {name}" for name in NODES if name != "recorder"}
+def test_every_node_says_that_it_is_ready_and_reports_every_second(whole: RunningArm) -> None:
+    whole.run(1.1)
+    whole.run_until(lambda: all(whole.status(node) for node in NODES))
+    reports = {one.status[0].name for one in whole.recorded["/diagnostics"].messages}
+    assert reports >= {f"wam: {name}" for name in NODES if name != "recorder"}

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
-from wam_bag.bag import JointColumns, read
+from wam_bag.bag import JointColumns
 from wam_control.task.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
@@ -24,44 +23,31 @@ from wam_description.signals import ForceCommand, NodeStatus, State, Table, Wren
 from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
 from wam_description.wiring import Call, Input, Outputs, declaration, reaction
+from wam_ros.testing import RunningArm, playing
 from wam_sim.replay import replay
 from wam_sim.simulation import Simulation
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-STEPS = {
-    "steps": [
-        {"name": "release", "seconds": 0.1, "request": "enable"},
-        {
-            "name": "push",
-            "seconds": 0.3,
-            "push": {
-                "cover": "outer_link",
-                "contact_position": 0.4,
-                "newtons": [0.0, 20.0, 0.0],
-                "begin": 0.05,
-                "end": 0.25,
-            },
+STEPS = [
+    {"name": "release", "seconds": 0.1, "request": "enable"},
+    {
+        "name": "push",
+        "seconds": 0.3,
+        "push": {
+            "cover": "outer_link",
+            "contact_position": 0.4,
+            "newtons": [0.0, 20.0, 0.0],
+            "begin": 0.05,
+            "end": 0.25,
         },
-    ]
-}
+    },
+]
 
 
 @pytest.fixture
 def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Configuration:
     monkeypatch.syspath_prepend(str(EXAMPLES))
-    (tmp_path / "script.yaml").write_text(yaml.safe_dump(STEPS))
-    configuration = Configuration.load(EXAMPLES / "impedance.yaml")
-    return configuration.with_values(
-        {
-            "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "scenario:script": str(tmp_path / "script.yaml"),
-            "recorder:directory": str(tmp_path),
-            "recorder:name": "bag",
-        }
-    )
+    return playing(STEPS, tmp_path, configuration=EXAMPLES / "impedance.yaml")
 
 
 @pytest.mark.slow
@@ -74,17 +60,11 @@ def test_the_example_prints_how_far_the_tip_yields() -> None:
 
 
 def test_an_own_controller_is_the_same_in_simulation_topics_and_replay(
-    configured: Configuration, tmp_path: Path, domain_id: int
+    configured: Configuration, tmp_path: Path, arm: RunningArm
 ) -> None:
-    from wam_ros.bring_up import Composition
-
-    with Composition(configured, domain_id=domain_id) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        composition.spin(lambda: scenario.done)
-        assert scenario.failure == ""
+    recorded = arm.start(configuration=configured).play().topics["/wam/joint_effort_command"]
     run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
     assert run.play() == ""
-    recorded = read(tmp_path / "bag").topics["/wam/joint_effort_command"]
     assert isinstance(recorded, JointColumns)
     simulated = np.array([row.values for row in run.rows["joint_effort_command"]])
     assert np.abs(simulated).max() > 1.0, "zeros would show nothing"
@@ -614,17 +594,12 @@ def test_a_topic_of_the_outer_rate_between_two_outer_periods_is_refused_with_the
         assert stamps[0] == stamps[1] != []
 
 
-def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(
-    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from wam_ros.bring_up import Composition
+INNER_NODES = ["driver", "transform", "velocity_loop", "gravity"]
 
-    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
-    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Inner"]
-    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
-        driver: Any = composition.nodes["driver"]
-        composition.spin(lambda: driver.driver.safety.fault)
-        assert driver.driver.safety.fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
+
+def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(arm: RunningArm) -> None:
+    fault = arm.start(Inner, nodes=INNER_NODES).run_until_fault()
+    assert fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
 
 
 @pytest.mark.slow
@@ -668,17 +643,11 @@ def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason
     ],
 )
 def test_over_topics_the_fault_names_the_node_and_its_unusable_output(
-    given: State, text: str, configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
+    given: State, text: str, arm: RunningArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wam_ros.bring_up import Composition
-
-    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
     monkeypatch.setattr(Careless, "given", given)
-    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Careless"]
-    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
-        driver: Any = composition.nodes["driver"]
-        composition.spin(lambda: driver.driver.safety.fault)
-        assert driver.driver.safety.fault.startswith(f"careless: {text}")
+    fault = arm.start(Careless, nodes=INNER_NODES).run_until_fault()
+    assert fault.startswith(f"careless: {text}")
 
 
 def test_an_array_in_the_place_of_another_argument_of_an_input_is_refused() -> None:
@@ -756,21 +725,17 @@ class Twice:
 
 
 def test_reactions_to_one_topic_work_in_the_order_of_their_declaration_everywhere(
-    configured: Configuration, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+    configured: Configuration, tmp_path: Path, arm: RunningArm
 ) -> None:
-    from wam_ros.bring_up import Composition
-
     run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"twice": Twice})
     for _ in range(11):
         run.step()
     order = ["one [4, 0, 0]", "two [0, 4, 0]", "three"]
     assert run.nodes["twice"].done == 3 * order
-    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
-    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Twice"]})
-    with Composition(over_topics, domain_id=domain_id) as composition:
-        twice: Any = composition.nodes["twice"]
-        composition.spin(lambda: len(twice.node.done) >= 30)
-        subscribers = [info.node_name for info in twice.get_subscriptions_info_by_topic("/wam/joint_states")]
+    arm.start(Twice, configuration=configured)
+    twice: Any = arm.nodes["twice"]
+    arm.run_until(lambda: len(twice.node.done) >= 30)
+    subscribers = [info.node_name for info in twice.get_subscriptions_info_by_topic("/wam/joint_states")]
     done = [word for word in twice.node.done if word != "three"]
     assert done == (order[:2] * len(done))[: len(done)]
     assert subscribers.count("twice") == 1
@@ -782,17 +747,14 @@ def test_a_list_of_another_length_is_refused_by_name(configured: Configuration) 
 
 
 def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
-    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    configured: Configuration, arm: RunningArm, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     from wam_ros import node as adapter
-    from wam_ros.bring_up import Composition
 
-    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
     monkeypatch.setattr(adapter, "NODE_LIMITS", replace(adapter.NODE_LIMITS, service_wait=0.0))
-    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Requesting"]})
-    said = []
-    with Composition(over_topics, domain_id=domain_id) as composition:
-        composition.spin(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))
+    said: list[str] = []
+    arm.start(Requesting, configuration=configured)
+    arm.run_until(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))
     assert "waiting for the service nobody/help; start the node 'nobody'" in "".join(said)
 
 

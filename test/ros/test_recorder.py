@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 import yaml
-from conftest import LONG, RosWorld, soon
+from conftest import LONG, soon
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from mcap.exceptions import McapError
@@ -45,11 +45,11 @@ from wam_description.event import Level
 from wam_description.parameters import ParameterError, flatten
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
-from wam_ros.bring_up import Composition
 from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
+from wam_ros.testing import Network, RunningArm
 from wam_ros.topics import header, qos
 
 CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
@@ -478,7 +478,7 @@ def test_what_a_restarted_node_published_before_it_was_connected_is_not_lost(ros
     ros.wait(matched(states))
     gravity = diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam")
     for life, sent in ((1, 4), (2, 8)):
-        with contextlib.closing(RosWorld(ros.domain_id)) as another_process:
+        with contextlib.closing(Network(ros.domain_id)) as another_process:
             status = publisher(another_process.node("gravity"), "status")
             for _ in range(sent):
                 status.publish(gravity)  # the newest alone is kept for a recorder that does not know this publisher yet
@@ -769,23 +769,7 @@ def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: P
     assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
 
 
-def test_every_message_that_the_stack_publishes_is_in_the_bag(
-    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    script = tmp_path / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": [{"name": "speak", "seconds": 0.3}]}))
-    base = Configuration.load(CONFIG)
-    configuration = base.with_values(
-        {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(tmp_path),
-            "recorder:name": "bag",
-        }
-    )
+def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
     published: Counter[str] = Counter()
     publish = Publisher.publish
 
@@ -794,9 +778,8 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(
         publish(self, message)
 
     monkeypatch.setattr(Publisher, "publish", counting)
-    with Composition(configuration, domain_id=domain_id) as composition:
-        composition.spin(lambda: composition.nodes["scenario"].done)
-    recorded = {name: topic.messages for name, topic in contents(tmp_path / "bag").topics.items()}
+    bag = arm.play([{"name": "speak", "seconds": 0.3}])
+    recorded = {name: topic.messages for name, topic in contents(bag.path).topics.items()}
     assert published["/wam/motor_states"] == 301
     assert {name: published[name] for name in recorded} == recorded
 

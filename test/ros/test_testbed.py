@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import yaml
 from rclpy.parameter import Parameter
-from test_lockstep import differences, play_directly, record_composed
+from test_lockstep import differences, play_directly
 
-from wam_bag.bag import JointColumns, read
+from wam_bag.bag import JointColumns
 from wam_description.configuration import Configuration, packaged
-from wam_ros.bring_up import Composition
+from wam_ros.testing import ArmFault, RunningArm
 
 POUND = 4.4482216152605
 STEPS = [
@@ -26,29 +26,9 @@ STEPS = [
 ]
 
 
-def configured_testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Configuration:
-    script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": STEPS}))
-    base = Configuration.load(packaged("testbed"))
-    return base.with_values(
-        {
-            "nodes": [*base.shared.nodes, *extra],
-            "timing.mode": mode,
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(folder),
-            "recorder:name": "bag",
-            "force_loop:force_gain": [0.01],
-        }
-    )
-
-
-def test_the_nodes_press_ten_pounds_on_the_spring_as_the_loop_without_ros_does(tmp_path: Path, domain_id: int) -> None:
-    configured = configured_testbed(tmp_path, "scenario", "recorder")
-    record_composed(configured, domain_id)
-    bag = read(tmp_path / "bag")
-    assert differences(play_directly(configured, tmp_path / "script.yaml").rows, bag) == []
+def test_the_nodes_press_ten_pounds_on_the_spring_as_the_loop_without_ros_does(arm: RunningArm) -> None:
+    bag = arm.play(STEPS, configuration="testbed", force_loop={"force_gain": [0.01]})
+    assert differences(play_directly(arm.configuration).rows, bag) == []
     sensors = bag.topics["/wam/joint_sensors"]
     assert isinstance(sensors, JointColumns)
     at = int(np.searchsorted(sensors.stamp_ns, 1_950_000_000))
@@ -62,24 +42,23 @@ def test_the_outer_loop_runs_at_fifty_hertz_and_answers_in_the_same_period() -> 
     assert timing.outer_delay == 0
 
 
-def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(tmp_path: Path, domain_id: int) -> None:
-    with Composition(configured_testbed(tmp_path, mode="realtime"), domain_id=domain_id) as composition:
-        node = composition.nodes["driver"]
-        plant = node.driver.plant  # type: ignore[attr-defined]
-        (before,) = plant.model.dof_frictionloss[1:]
-        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[0.7])])
-        assert answer.successful
-        stamp = node.driver.stamp  # type: ignore[attr-defined]
-        composition.spin(lambda: node.driver.stamp > stamp + 5_000_000)  # type: ignore[attr-defined]
-        assert plant.model.dof_frictionloss[1] == pytest.approx(before + 0.7)
-        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[0.7, 0.7])])
-        assert not answer.successful
-        assert "added_coulomb_friction' has 2 values" in answer.reason
-        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[-0.1])])
-        assert not answer.successful
+@pytest.mark.parametrize(
+    ("values", "text"), [([0.7, 0.7], "added_coulomb_friction' has 2 values"), ([-0.1], "allowed: 0 to 100")]
+)
+def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(values: list[float], text: str, arm: RunningArm) -> None:
+    arm.start(configuration="testbed", timing={"mode": "realtime"})
+    model, node = arm.truth.model, arm.nodes["driver"]
+    (before,) = model.dof_frictionloss[1:]
+    (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[0.7])])
+    assert answer.successful
+    arm.run(0.005)
+    assert model.dof_frictionloss[1] == pytest.approx(before + 0.7)
+    (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=values)])
+    assert not answer.successful
+    assert text in answer.reason
 
 
-def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: Path, domain_id: int) -> None:
+def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(arm: RunningArm, tmp_path: Path) -> None:
     force = {"frame": "link", "newtons": [0.0, -20.0, 0.0]}
     set_up = {"driver": {"effects.added_coulomb_friction": [0.7]}, "force_loop": {"force_gain": [0.009]}}
     steps = [
@@ -92,24 +71,18 @@ def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: 
             "set": {"driver": {"effects.added_coulomb_friction": [0.0]}},
         },
     ]
-    configured = configured_testbed(tmp_path, "scenario", "recorder")
-    (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": steps}))
-    record_composed(configured, domain_id)
-    run = play_directly(configured, tmp_path / "script.yaml")
-    assert differences(run.rows, read(tmp_path / "bag")) == []
+    bag = arm.play(steps, configuration="testbed", force_loop={"force_gain": [0.01]})
+    run = play_directly(arm.configuration)
+    assert differences(run.rows, bag) == []
     (friction,) = run.driver.plant.model.dof_frictionloss[1:]
     assert friction <= 0.19, "the rod is off again"
     for step in steps:
         step.pop("set", None)
     (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": steps}))
-    assert run.rows["joint_sensors"] != play_directly(configured, tmp_path / "script.yaml").rows["joint_sensors"]
+    assert run.rows["joint_sensors"] != play_directly(arm.configuration).rows["joint_sensors"]
 
 
-def test_a_setting_that_is_refused_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
-    configured = configured_testbed(tmp_path, "scenario")
+def test_a_setting_that_is_refused_ends_the_scenario_with_the_reason(arm: RunningArm) -> None:
     body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 2}}}
-    (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": [body]}))
-    with Composition(configured, domain_id=domain_id) as composition:
-        scenario = composition.nodes["scenario"]
-        composition.spin(lambda: scenario.done)  # type: ignore[attr-defined]
-        assert "step 'rub': driver refuses" in scenario.failure  # type: ignore[attr-defined]
+    with pytest.raises(ArmFault, match="step 'rub': driver refuses"):
+        arm.play([body], configuration="testbed")

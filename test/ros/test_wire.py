@@ -6,12 +6,17 @@ import struct
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import WrenchStamped
 from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, WRENCH, Topic
-from wam_ros.messages import Refused, message_type, reader, writer
+from wam_ros.messages import Refused, message_type, read_status, reader, writer
 from wam_ros.wire import decoder, encoder, stamp_of
 
 SHARED = Configuration.load(packaged("wam")).shared
@@ -137,3 +142,48 @@ def test_option_bits_of_the_encapsulation_do_not_change_the_value(topic: Topic, 
     decode = decoder(topic, SHARED, "position? velocity? effort?")
     assert repr(decode(data[:2] + options + data[4:])) == repr(decode(data)) == repr(value)
     assert stamp_of(data[:2] + options + data[4:]) == STAMP
+
+
+def table_of(topic: str, rows: int) -> bytes:
+    row = BY_NAME[topic]
+    return encoder(row, SHARED)(STAMP, Table("base", ((0.0,) * len(row.columns),) * rows))
+
+
+def trajectory_of(points: int) -> bytes:
+    names = list(SHARED.arm.joints.names)
+    whole = JointTrajectory(joint_names=names, points=[JointTrajectoryPoint(positions=[0.0] * 4)] * points)
+    return bytes(serialize_message(whole))
+
+
+LARGE = [
+    ("task_command", table_of("task_command", 5), "5 rows; send at most 4"),
+    ("task_command", table_of("task_command", 100_000), "send at most 262144"),
+    ("contact/hypotheses", table_of("contact/hypotheses", 257), "257 rows; send at most 256"),
+    ("joint_trajectory", trajectory_of(501), "501 points; send 1 to 500"),
+    ("joint_trajectory", trajectory_of(100_000), "send at most 262144"),
+    ("joint_states", bytes(serialize_message(JointState(name=["joint1"] * 100_000))), "send at most 262144"),
+    ("force_command", bytes(serialize_message(WrenchStamped(header=Header(frame_id="x" * 300_000)))), "262144"),
+]
+
+
+@pytest.mark.parametrize(("topic", "data", "text"), LARGE, ids=[f"{row[0]}, {len(row[1])} bytes" for row in LARGE])
+def test_a_message_that_is_too_large_is_refused_before_its_values_are_looked_at(
+    topic: str, data: bytes, text: str
+) -> None:
+    with pytest.raises(Refused, match=text):
+        decoder(BY_NAME[topic], SHARED, "position?")(data)
+
+
+def test_a_trajectory_that_is_streamed_is_read_once() -> None:
+    decode, data = decoder(BY_NAME["joint_trajectory"], SHARED, ""), trajectory_of(3)
+    first = decode(data)
+    assert decode(data[:4] + b"\1" * 8 + data[12:]) is first
+    other = decode(trajectory_of(2))
+    assert other != first
+    assert decode(data) == first
+
+
+def test_a_status_is_fit_for_a_terminal() -> None:
+    message = DiagnosticStatus(name="x\33[2J", message="a\nb", values=[KeyValue(key="fault", value="\33]0;owned\7")])
+    status = read_status(message)
+    assert all(text.isprintable() for text in (status.node, status.message, status.fault))

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
@@ -18,6 +17,7 @@ from wam_cli.commands.replay import other_values, reasons, stated
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
+from wam_ros.testing import RunningArm, playing
 from wam_ros.topics import stamp_of
 from wam_sim.recording import recorded_run
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
@@ -60,37 +60,18 @@ def bag(tmp_path_factory: pytest.TempPathFactory, domain_id: int) -> Path:
     return RECORDED[0]
 
 
-def recorded(folder: Path, domain_id: int, changes: Changes = (), **values: object) -> Path:
-    from wam_ros.bring_up import Composition
+def recorded(folder: Path, domain_id: int, changes: Changes = (), **values: Any) -> Path:
+    stack = RunningArm(domain_id, folder).start(configuration=playing(STEPS["steps"], folder, **values))
+    waiting = list(changes)
 
-    script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump(STEPS))
-    base = Configuration.load(packaged("wam"))
-    configuration = base.with_values(
-        {
-            "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "scenario:script": str(script),
-            "recorder:directory": str(folder),
-            "recorder:name": "bag",
-            **values,
-        }
-    )
-    with Composition(configuration, domain_id=domain_id) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        waiting = list(changes)
+    def change(message: JointState) -> None:
+        if waiting and stamp_of(message) > waiting[0][0]:
+            _, node, given = waiting.pop(0)
+            parameters = [Parameter(name, value=value) for name, value in given.items()]
+            assert all(found.successful for found in stack.nodes[node].set_parameters(parameters))
 
-        def change(message: JointState) -> None:
-            if waiting and stamp_of(message) > waiting[0][0]:
-                _, node, given = waiting.pop(0)
-                parameters = [Parameter(name, value=value) for name, value in given.items()]
-                assert all(found.successful for found in composition.nodes[node].set_parameters(parameters))
-
-        scenario.create_subscription(JointState, "joint_states", change, 10)
-        composition.spin(lambda: scenario.done)
-        assert scenario.failure == ""
-    return folder / "bag"
+    stack.nodes["scenario"].create_subscription(JointState, "joint_states", change, 10)
+    return stack.play().path
 
 
 def without_messages(bag: Path, to: Path, topic: str, word: bytes) -> Path:
@@ -164,11 +145,10 @@ def test_gains_that_were_changed_at_any_time_replay_with_their_change(tmp_path: 
 
 
 def test_an_arm_without_joint_sensors_replays_too(tmp_path: Path, domain_id: int) -> None:
-    without = {
-        "arm.joint_sensors": False,
-        "force_loop:feedback": "contact_estimate",
-        "force_loop:force_gain": [0.01],
-        "contact_estimator:use_joint_sensors": False,
+    without: dict[str, Any] = {
+        "arm": {"joint_sensors": False},
+        "force_loop": {"feedback": "contact_estimate", "force_gain": [0.01]},
+        "contact_estimator": {"use_joint_sensors": False},
     }
     bag = recorded(tmp_path, domain_id, **without)
     assert "/wam/joint_sensors" not in read(bag).topics

@@ -12,12 +12,11 @@ import pinocchio as pin
 import pytest
 import yaml
 from arms import NOWHERE
-from test_lockstep import record_composed
 
 from wam_analysis.demo_summary import summarize
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.identification.regressor import about_origin
-from wam_bag.bag import Bag, JointColumns, read
+from wam_bag.bag import Bag, JointColumns
 from wam_cli.main import main
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
 from wam_control.contact.contact_inference import ContactInference
@@ -30,6 +29,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_description.urdf import urdf
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.limit_watch import LimitWatch
+from wam_ros.testing import RunningArm
 from wam_studies.contact.scenarios import ScenarioGenerator
 
 # alpha / pi, a, d: joint i turns about z of frame i-1, then d along it, a along x, alpha about x
@@ -248,19 +248,9 @@ def pressed(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
     folder, base = tmp_path_factory.mktemp("barrett"), CONFIGURATIONS["barrett_wam7"]
     every = yaml.safe_load(packaged("barrett-wam7_scenario", "scenario").read_text())["steps"]
     own = [{**step, "seconds": STEPS[step["name"]]} for step in every if step["name"] in STEPS]
-    script = folder / "script.yaml"
-    script.write_text(yaml.safe_dump({"steps": [{"name": "release", "seconds": 0.3, "request": "enable"}, *own]}))
-    values = {
-        "nodes": [*base.shared.nodes, "scenario", "recorder"],
-        "timing.real_time_factor": 0.0,
-        "timing.timeout": 60.0,
-        "arm.joints.start": [0.0, 0.92, 0.0, 1.35, 0.0, -0.4, 0.0],
-        "scenario:script": str(script),
-        "recorder:directory": str(folder),
-        "recorder:name": "bag",
-    }
-    record_composed(base.with_values(values), domain_of_module)
-    return read(folder / "bag")
+    steps = [{"name": "release", "seconds": 0.3, "request": "enable"}, *own]
+    start = [0.0, 0.92, 0.0, 1.35, 0.0, -0.4, 0.0]
+    return RunningArm(domain_of_module, folder).play(steps, configuration=base, arm={"joints.start": start})
 
 
 @pytest.mark.slow

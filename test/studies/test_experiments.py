@@ -19,6 +19,7 @@ from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_description.units import si
 from wam_studies.figures.panels import Panel
+from wam_studies.page import END, section_of
 from wam_studies.thesis import (
     arm_forces,
     cables,
@@ -36,6 +37,7 @@ from wam_studies.thesis.one_link import growth, one_link
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result, markdown, plain
+from wam_studies.thesis.sweeping import RecordedRun, record_run
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 
@@ -377,7 +379,7 @@ def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) 
 
 def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    page.write_text("# Title\n<!-- experiment: creep -->\nold\n<!-- end -->\nafter\n")
+    page.write_text(f"# Title\n<!-- written: creep -->\nold\n{END}\nafter\n")
     picture = tmp_path / "result.png"
     picture.write_bytes(b"picture")
     experiment = load("creep")
@@ -387,7 +389,7 @@ def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) 
     assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
     assert "- a \\d remark" in text
     assert "old" not in text
-    assert text.endswith("<!-- end -->\nafter\n")
+    assert text.endswith(f"{END}\nafter\n")
     assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
 
 
@@ -400,7 +402,7 @@ def test_a_new_experiment_gets_a_section_at_the_end_of_the_page(tmp_path: Path) 
         write(page, [(load("creep"), result, picture)])
     text = page.read_text()
     assert text.startswith("# Title\n\n## Creep of cables")
-    assert text.count("<!-- experiment: creep -->") == text.count("| q | 1 | 1.01 |") == 1
+    assert text.count("<!-- written: creep -->") == text.count("| q | 1 | 1.01 |") == 1
 
 
 def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
@@ -443,9 +445,8 @@ def test_an_experiment_without_curves_has_no_picture(
 
 def test_documentation_shows_every_experiment() -> None:
     docs = Path(__file__).resolve().parents[2] / "docs"
-    text = (docs / "experiments.md").read_text()
     for name in names():
-        block = text.partition(f"<!-- experiment: {name} -->")[2].partition("<!-- end -->")[0]
+        block = section_of(docs / "experiments.md", name)
         assert "| predicted | measured |" in block, name
         assert "MISSED" not in block, name
         assert (docs / "experiments" / f"{name}.png").is_file()
@@ -494,11 +495,11 @@ def run_command(*words: str) -> int:
     return int(ended.value.code or 0)
 
 
-def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path, domain_id: int, capfd) -> None:
+def test_creep_runs_and_is_judged_again_from_its_bag(tmp_path: Path, capfd) -> None:
     assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 0
     said = capfd.readouterr()
     assert "all quantities are within their bounds" in said.out
-    assert "creep 1/1 out_and_back: done" in said.err
+    assert "runs: 1 of 1" in said.err
     assert (tmp_path / "mine" / "result.png").is_file()
     (tmp_path / "mine" / "result.png").unlink()
     again = ("--directory", str(tmp_path / "again"), "--evaluate")
@@ -517,7 +518,7 @@ def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path,
     assert "stops the arm  does not stop" in capfd.readouterr().out
 
 
-def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, capfd) -> None:
+def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, capfd) -> None:
     """The large step of section 5.6 alone, in a file of one's own."""
     whole = yaml.safe_load(packaged("experiments/testbed-5.6").read_text())
     whole["runs"] = [run for run in whole["runs"] if run["name"] == "large_step"]
@@ -529,35 +530,19 @@ def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, ca
     assert "the driver stopped the arm at" in said
 
 
-class StopAfter:
-    """As `wam_ros.run.Stop`, which a signal sets; here after so many callbacks, whatever the clock says."""
-
-    def __init__(self, callbacks: int) -> None:
-        self._left = callbacks
-
-    @property
-    def is_set(self) -> bool:
-        self._left -= 1
-        return self._left < 0
-
-
-def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_id: int, capfd, monkeypatch) -> None:
-    monkeypatch.setattr("wam_cli.commands.experiment.Stop", lambda: StopAfter(3000))
-    assert run_command("stiction-limit-cycle", "--directory", str(tmp_path), "--name", "mine") == 130
+def test_a_run_that_is_not_whole_is_not_judged(tmp_path: Path, capfd) -> None:
+    file, whole = tmp_path / "short.yaml", yaml.safe_load(packaged("experiments/creep").read_text())
+    file.write_text(yaml.safe_dump(whole))
+    (run,) = load(str(file)).runs
+    record_run(RecordedRun(load(str(file)), run._replace(steps=run.steps[:1]), str(tmp_path / "mine")))
+    assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 2
     said = capfd.readouterr().err
-    assert "without_deadband: stopped" in said
-    assert "done" not in said
-    file = tmp_path / "short.yaml"  # an experiment of this one run
-    whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
-    file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
-    assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 1
-    said = capfd.readouterr().err
-    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps finished; " in said
+    assert f"run 'out_and_back' ended in step '{run.steps[0]['name']}', 0 of {len(run.steps)} steps finished; " in said
     assert "repeat 'wam experiment short'" in said
 
 
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
-    assert run_command("wam-slide", "--directory", str(tmp_path), "--evaluate", str(tmp_path)) == 1
+    assert run_command("wam-slide", "--directory", str(tmp_path), "--evaluate", str(tmp_path)) == 2
     assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err
     with pytest.raises(BagError):
         recorded(load("creep"), 0, {}, (), tmp_path).step("out")

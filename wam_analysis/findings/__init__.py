@@ -4,6 +4,7 @@ analysis               reads a bag and makes all sections
 analysed_run           a bag prepared for analysis, with the forces that were held
 finding                one number with its prediction; a section
 held_force             each commanded force: measures and predictions
+steps                  section about the steps of a scenario, in answers and numbers
 force                  sections about force and stability
 swinging               cycles of motors and joints where no force was recorded
 contact                section about contacts, estimated and true
@@ -16,6 +17,6 @@ frequency              section about the velocity loops
 timing                 section about the loop, and provenance
 tabulated              tables of subjects and quantities
 signals                the signals that the pictures show
-charts                 pictures of the page that can be zoomed
-text, page, plots      the analysis as text and JSON, as HTML, and its pictures
+charts, plots          what is drawn, as numbers and as pictures
+text, page             the analysis as text and JSON, and as HTML
 """

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.demo_summary import DemoSummary, failure_of, summary_of
 from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.bag import Bag, JointColumns
+from wam_bag.losses import CUT
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recording import RecordedRun, recorded_run
 
@@ -88,6 +89,16 @@ class AnalysedRun(NamedTuple):
             if name not in refused
             and not ((columns := self.bag.topics.get(f"{self.namespace}/{name}")) and len(columns.log_time_ns))
         )
+
+    @property
+    def is_part(self) -> bool:
+        """Whether it was cut out of a longer recording."""
+        return CUT in self.bag.metadata
+
+    @property
+    def failure(self) -> str:
+        """Why the run failed or that it was cut off; '' where it did not, or had no scenario and no fault."""
+        return failure_of(self.run)
 
     @property
     def mode(self) -> str:

@@ -1,9 +1,9 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.held_force import HeldForce, held_forces
 from wam_analysis.findings.motion import MotionFindings, motion_sections
+from wam_analysis.findings.steps import steps_section
 from wam_analysis.findings.timing import extent, provenance, timing_section
-from wam_analysis.foreign.reading import foreign_bag, is_of_other_encoding, needs_rosbags
+from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
 from wam_analysis.foreign.sections import foreign_sections
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.thresholds import LAYOUT
-from wam_bag.bag import Bag, BagError, read
+from wam_bag.bag import Bag, JointColumns, WrenchColumns, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
@@ -64,16 +65,24 @@ class Analysis(NamedTuple):
     provenance: dict[str, str]
     sections: tuple[Section, ...]
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the run that was recorded failed, or was cut off."""
+        return bool(self.recording.failure)
+
     def __repr__(self) -> str:
         return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
 
 
-def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVEN, namespace: str = "") -> Analysis:
+def analyse(
+    source: str | Path | Mapping[str, Any], progress: Progress, given: TopicMap = NOTHING_GIVEN, namespace: str = ""
+) -> Analysis:
     """Read a bag and analyse it.
 
     Parameters
     ----------
-    path : bag directory or file, of this stack or of another robot with JointState, WrenchStamped or mapped topics.
+    source : bag directory or file, of this stack or of another robot with JointState, WrenchStamped or mapped topics; a
+        CSV file; or a table, such as a DataFrame, see `wam_analysis.foreign.reading.table_bag`.
     progress : called with each stage of the work.
     given : topics, joints, fields and units of another robot's bag.
     namespace : of an arm of this stack, '' for the one with the most topics.
@@ -85,7 +94,10 @@ def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVE
     ValueError
         if it has not what is given.
     """
-    path = Path(path)
+    if not isinstance(source, (str, Path)):
+        table = source.reset_index() if hasattr(source, "reset_index") else source
+        return analyse_foreign_bag(table_bag(Path("table"), table, given), given)
+    path = Path(source)
     progress(f"reading {path}")
     if not given.is_given and _is_own(path):
         return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
@@ -100,22 +112,17 @@ def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
     sections = foreign_sections(bag, given)
     recording = analysed_run(bag)._replace(is_foreign=True)
     nothing = MotionFindings((), None, {}, {})
-    sections = (_verdict(sections), *sections)
-    return Analysis(recording, (), nothing, extent(bag.topics), provenance(recording), sections)
+    duration = extent(bag.topics)
+    sections = (_verdict(_foreign_line(bag, duration), sections), *sections)
+    return Analysis(recording, (), nothing, duration, provenance(recording), sections)
 
 
 def _is_own(path: Path) -> bool:
     """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
-    if needs_rosbags(path):
+    if path.suffix == ".csv" or needs_rosbags(path) or of_other_encoding(path):
         return False
-    try:
-        found = contents(path)
-    except BagError:
-        if path.is_file() and path.suffix == ".mcap" and is_of_other_encoding(path):
-            return False
-        raise
-    if not any(topic.messages for topic in found.topics.values()):
-        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
+    found = contents(path)
+    require_messages(path, (topic.messages for topic in found.topics.values()))
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True
     spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN.items()
@@ -137,15 +144,45 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     progress("timing")
     prefix = f"{recording.namespace}/"
     duration = extent({name: topic for name, topic in recording.bag.topics.items() if name.startswith(prefix)})
-    sections = (_happened(recording, duration), *middle, *motion.sections, timing_section(recording))
-    return Analysis(recording, held, motion, duration, provenance(recording), (_verdict(sections), *sections))
+    steps = steps_section(recording.summary)
+    sections = (
+        _happened(recording, duration),
+        *filter(None, [steps]),
+        *middle,
+        *motion.sections,
+        timing_section(recording),
+    )
+    verdict = _verdict(_own_line(recording, duration), sections)
+    return Analysis(recording, held, motion, duration, provenance(recording), (verdict, *sections))
 
 
-def _verdict(sections: tuple[Section, ...]) -> Section:
-    """The most important findings of all sections, in a few sentences."""
-    stated = [sentence for section in sections for sentence in section.verdict]
-    silent = "No force, contact, cycle or fault was recorded that could be evaluated."
-    return Section("verdict", "Verdict", tuple(stated) or (silent,), ())
+def _verdict(what: str, sections: tuple[Section, ...]) -> Section:
+    """Three lines: what the recording is, what is wrong with it, what it shows."""
+    wrong = [sentence for section in sections for sentence in section.wrong]
+    shows = [sentence for section in sections for sentence in section.shows]
+    return Section(
+        "verdict",
+        "Verdict",
+        (what, _line("Wrong", wrong, "nothing was found."), _line("Shows", shows, "nothing that can be evaluated.")),
+        (),
+    )
+
+
+def _line(title: str, sentences: list[str], silent: str) -> str:
+    """The first of some sentences in a line, and how many follow below."""
+    if not sentences:
+        return f"{title}: {silent}"
+    kept = sentences[: LAYOUT.stated]
+    more = f" And {len(sentences) - len(kept)} more below." * (len(sentences) > len(kept))
+    return f"{title}: {' '.join(kept)}{more}"
+
+
+def _foreign_line(bag: Bag, duration: float) -> str:
+    """What another robot's recording is."""
+    joints = {name for one in bag.topics.values() if isinstance(one, JointColumns) for name in one.names}
+    wrenches = sum(isinstance(one, WrenchColumns) for one in bag.topics.values())
+    held = [_count(len(joints), "joint"), *([_count(wrenches, "wrench topic")] if wrenches else [])]
+    return f"Another robot's recording: {shown(duration, 's')}, {' and '.join(held)}."
 
 
 def _happened(recording: AnalysedRun, duration: float) -> Section:
@@ -170,13 +207,21 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
     others = [f"{recording.run.others[0].upper()}{recording.run.others[1:]}."] if recording.run.others else []
-    verdict = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
-    verdict += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
-    verdict += [f"STOPPED: {fault}." for fault in faults]
-    verdict += _changed(recording.run, summary.traces.zero)
-    if summary.steps and summary.outcome != Code.DONE and not faults:
-        verdict.append(f"Of the scenario: {summary.outcome}.")
-    return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
+    wrong = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
+    wrong += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
+    wrong += [f"STOPPED: {fault}." for fault in faults[:1]]
+    wrong += [f"{recording.failure[0].upper()}{recording.failure[1:]}."] if recording.failure and not faults else []
+    return Section("happened", "What happened", tuple(sentences), (), lacking, (), tuple(wrong))
+
+
+def _own_line(recording: AnalysedRun, duration: float) -> str:
+    """What a recording of this stack is."""
+    summary = recording.summary
+    mode = "" if recording.mode == "unknown" else f" in {recording.mode}"
+    text = f"{summary.namespace or '/'}: {shown(duration, 's')}{mode}"
+    steps = f", {_count(len(summary.steps), 'step')}" * bool(summary.steps)
+    part = ", part of a longer recording" if recording.is_part else f", {Code.DONE}" * (summary.outcome == Code.DONE)
+    return f"{text}{steps}{part}."
 
 
 def _touched(traces: Traces) -> Iterator[str]:

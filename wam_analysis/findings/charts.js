@@ -31,7 +31,8 @@
       label: one.label, width: 1.5, spanGaps: false,
       stroke: one.colour === "ink" ? style("--ink") : one.colour,
       dash: one.dashed ? [6, 4] : undefined,
-      points: { show: false },
+      points: { show: one.dots, size: 3 },
+      paths: one.dots ? () => null : undefined,
     }));
     const options = {
       width: place.clientWidth, height: chart.height,

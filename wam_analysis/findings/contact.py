@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy, ListedContact
+from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -34,12 +35,11 @@ def contact_section(recording: AnalysedRun) -> Section:
     lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
-    for number, contact in enumerate(summary.contacts, 1):
-        name = f"{number} {contact.estimate.link}"
-        sentences += _doubts(name, contact)
-        findings += _numbers(name, contact)
-    sentences += verdict
+    wrong = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
+    shows: list[str] = []
+    sentences += contact_doubts(summary)
+    findings += contact_numbers(summary)
+    sentences += wrong
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
     touching = known & true.acts
@@ -62,7 +62,7 @@ def contact_section(recording: AnalysedRun) -> Section:
                 note="of the vector: the norm of its three components; where the force is not the least one",
             ),
         ]
-        verdict.append(f"Contact: on the right link {right:.0f} % of the time{_errors(away, off)}.")
+        shows.append(f"Contact: right link {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
         false = known & sensed.acts & ~true.acts
         count = len(runs(false))
@@ -70,19 +70,31 @@ def contact_section(recording: AnalysedRun) -> Section:
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
             sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
-            verdict.insert(0, sentences[-1])
+            wrong.insert(0, sentences[-1])
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
-        verdict.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
-    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
-        sentences.append(NOT_CERTAIN)
-    if not all(contact.estimate.is_placed for contact in summary.contacts):
-        sentences.append(f"Positions of contacts: {NOT_PLACED}.")
+        shows.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
     findings += _tracked_friction(recording)
-    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(shows), tuple(wrong))
+
+
+def contact_numbers(summary: DemoSummary) -> Iterator[Finding]:
+    """Every estimated contact in numbers."""
+    for number, contact in enumerate(summary.contacts, 1):
+        yield from _numbers(f"{number} {contact.estimate.link}", contact)
+
+
+def contact_doubts(summary: DemoSummary) -> Iterator[str]:
+    """What is not to be trusted of the estimated contacts."""
+    for number, contact in enumerate(summary.contacts, 1):
+        yield from _doubts(f"{number} {contact.estimate.link}", contact)
+    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
+        yield NOT_CERTAIN
+    if not all(contact.estimate.is_placed for contact in summary.contacts):
+        yield f"Positions of contacts: {NOT_PLACED}."
 
 
 def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
@@ -133,6 +145,5 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
 
 
 def _errors(away: float, off: float) -> str:
-    named = ((away, "cm", "of the position"), (off, "N", "of the force vector, its size"))
-    known = [f"{shown(value, unit)} {what}" for value, unit, what in named if math.isfinite(value)]
-    return f"; median errors {' and '.join(known)}" if known else ""
+    known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
+    return f", median error {' and '.join(known)}" if known else ""

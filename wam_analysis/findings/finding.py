@@ -59,7 +59,8 @@ class Section(NamedTuple):
     sentences : sentences, the most important first.
     findings : numbers.
     lacking : topics that are not in the bag and would add to the section.
-    verdict : what of it belongs to the verdict, the worst first.
+    shows, wrong : what of it belongs to the verdict, the most important first: what the recording shows, and what is
+        wrong with it.
     """
 
     key: str
@@ -67,7 +68,8 @@ class Section(NamedTuple):
     sentences: tuple[str, ...]
     findings: tuple[Finding, ...]
     lacking: tuple[str, ...] = ()
-    verdict: tuple[str, ...] = ()
+    shows: tuple[str, ...] = ()
+    wrong: tuple[str, ...] = ()
 
 
 def deviations(findings: tuple[Finding, ...]) -> tuple[str, ...]:

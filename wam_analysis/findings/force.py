@@ -48,9 +48,9 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     range_stated, range_findings = _dynamic_range(held)
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
-    verdict = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary), *_forces_verdict(held))
+    wrong = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary))
     every = (*findings, *range_findings)
-    return Section("force", "Force", (*sentences, *range_stated), every, lacking, verdict)
+    return Section("force", "Force", (*sentences, *range_stated), every, lacking, _forces_verdict(held), wrong)
 
 
 def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -96,12 +96,13 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
     whose = "true" if len(worst.true) else "measured"
     what = "controlled" if any(one.hold.is_refused for one in held) else "recorded"
-    text = (
-        f"{len(known)} of {len(held)} commanded forces were {what}; the worst {whose} one in the steady state is "
-        f"{100.0 * bias / worst.hold.commanded:+.1f} % off ({worst.hold.name}, "
-        f"{shown(worst.hold.commanded, 'N')} commanded)."
-    )
+    off = f"{100.0 * bias / worst.hold.commanded:+.1f} %"
+    text = f"{len(known)} of {_forces(len(held))} {what}, the worst {whose} one {off} off ({worst.hold.name})."
     return (text,)
+
+
+def _forces(number: int) -> str:
+    return f"{number} force{'s' * (number != 1)}"
 
 
 def _dynamic_range(held: Sequence[HeldForce]) -> tuple[list[str], list[Finding]]:
@@ -235,8 +236,10 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
+    margins = [one.guarded.assessment.scale for one in held if one.guarded is not None]
+    margin = f"; the guard predicts stability up to {shown(min(margins))} times the gain" if margins else ""
     if settled and not verdict:
-        verdict.append(f"{settled} of {len(held)} forces settle, none cycles.")
+        verdict.append(f"{settled} of {_forces(len(held))} settled{margin}.")
     return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings), (), tuple(verdict))
 
 

@@ -247,7 +247,9 @@ def _friction_section(
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
     lacking = recording.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(tuple(findings))
-    return Section("friction", "Friction", (*signals.caveats, *sentences, *flagged), tuple(findings), lacking, flagged)
+    return Section(
+        "friction", "Friction", (*signals.caveats, *sentences, *flagged), tuple(findings), lacking, (), flagged
+    )
 
 
 def _breakaway(found: Friction) -> str:

@@ -6,9 +6,9 @@ import html
 from collections.abc import Sequence
 
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.findings.charts import Chart, charts, data, scripts
+from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.plots import Plot, plots
+from wam_analysis.findings.plots import Plot, arm_plot, still
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 from wam_analysis.thresholds import LAYOUT
 from wam_bag.losses import PARAMETERS
@@ -91,9 +91,14 @@ def page(analysis: Analysis) -> str:
     str
         HTML with its styles, scripts and pictures; it makes no request.
     """
-    pictures, drawn = list(plots(analysis)), list(charts(analysis))
+    drawn = list(charts(analysis))
+    figures = [(chart.section, _figure(still(chart), "still") + _chart(i, chart)) for i, chart in enumerate(drawn)]
+    if (arm := arm_plot(analysis)) is not None:
+        figures.insert(0, (FIRST, _figure(arm, "arm")))
     name = analysis.recording.bag.path.name
-    sections = "".join(_section(section, pictures, drawn) for section in analysis.sections)
+    last = Section(SIGNALS, "Signals", (), ())
+    shown_last = any(section == SIGNALS for section, _ in figures)
+    sections = "".join(_section(section, figures) for section in (*analysis.sections, *([last] * shown_last)))
     links = "".join(
         f'<a href="#{key}">{html.escape(title)}</a>'
         for key, title in [*((s.key, s.title) for s in analysis.sections), ("provenance", "Provenance")]
@@ -122,10 +127,9 @@ def _lead(analysis: Analysis) -> str:
     return f"{analysis.recording.summary.namespace or '/'}, {shown(analysis.duration, 's')}, {analysis.recording.mode}"
 
 
-def _section(section: Section, pictures: Sequence[Plot], drawn: Sequence[Chart]) -> str:
+def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.sentences)
-    figures = "".join(_figure(picture) for picture in pictures if picture.section == section.key)
-    figures += "".join(_chart(i, chart) for i, chart in enumerate(drawn) if chart.section == section.key)
+    figures = "".join(figure for key, figure in drawn if key == section.key)
     lacking = ""
     if section.lacking:
         lacking = f'<p class="lacking"><small>Not in this bag: {html.escape(", ".join(section.lacking))}.</small></p>'
@@ -136,7 +140,7 @@ def _section(section: Section, pictures: Sequence[Plot], drawn: Sequence[Chart])
     )
 
 
-def _figure(picture: Plot) -> str:
+def _figure(picture: Plot, kind: str) -> str:
     wide, narrow = (
         f"data:image/{picture.kind};base64,{base64.b64encode(data).decode()}" for data in (picture.wide, picture.narrow)
     )
@@ -144,8 +148,7 @@ def _figure(picture: Plot) -> str:
     image = f'<img alt="{text}" src="{wide}">'
     if picture.wide != picture.narrow:
         image = f'<picture><source media="(max-width: {LAYOUT.narrow_page}px)" srcset="{narrow}">{image}</picture>'
-    kind = ' class="arm"' if picture.kind == "png" else ' class="still"' if picture.has_chart else ""
-    return f"<figure{kind}>{image}<figcaption>{text}</figcaption></figure>"
+    return f'<figure class="{kind}">{image}<figcaption>{text}</figcaption></figure>'
 
 
 def _chart(number: int, chart: Chart) -> str:

@@ -4,8 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.thresholds import LAYOUT, STREAM
 from wam_bag.bag import JointColumns, WrenchColumns
+from wam_bag.columns import AXES
 
 Numbers = NDArray[np.float64]
 
@@ -35,7 +37,9 @@ def moving(recording: AnalysedRun) -> dict[str, JointColumns | WrenchColumns]:
     topics = {
         name: columns
         for name, columns in sorted(recording.bag.topics.items())
-        if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= STREAM.shown
+        if isinstance(columns, (JointColumns, WrenchColumns))
+        and len(columns.stamp_ns) >= STREAM.shown
+        and recording.bag.types.get(name) != COMMAND
     }
     joints = {n: c for n, c in topics.items() if isinstance(c, JointColumns) and c.position.size}
     own = [name for name in (f"{recording.namespace}/{seen}" for seen in ORDER) if name in joints]
@@ -45,6 +49,22 @@ def moving(recording: AnalysedRun) -> dict[str, JointColumns | WrenchColumns]:
         wrenches = {n: c for n, c in topics.items() if isinstance(c, WrenchColumns) and np.any(c.force != 0.0)}
         shown |= {n: c for n, c in wrenches.items() if not n.endswith(COMMANDS)}
     return {name: columns for name, columns in shown.items() if bool(np.all(np.diff(columns.stamp_ns) > 0))}
+
+
+def commanded(recording: AnalysedRun, columns: JointColumns | WrenchColumns) -> dict[str, Numbers]:
+    """What another robot was commanded at the stamps of a topic, by joint or axis, (n,): the last one before each."""
+    found: dict[str, Numbers] = {}
+    for name, command in recording.bag.topics.items():
+        is_command = recording.bag.types.get(name) == COMMAND and type(command) is type(columns)
+        if not (is_command and isinstance(command, (JointColumns, WrenchColumns))):
+            continue
+        rows = np.searchsorted(command.stamp_ns, columns.stamp_ns, side="right") - 1
+        values = command.position if isinstance(command, JointColumns) else command.force
+        names = command.names if isinstance(command, JointColumns) else AXES
+        if values.size and np.all(np.diff(command.stamp_ns) >= 0):
+            held = np.where(rows[:, np.newaxis] >= 0, values[np.maximum(rows, 0)], np.nan)
+            found |= dict(zip(names, held.T, strict=True))
+    return found
 
 
 def spectrum(columns: JointColumns) -> tuple[Numbers, Numbers]:

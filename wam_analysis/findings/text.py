@@ -7,7 +7,7 @@ import textwrap
 from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.findings.finding import Finding, Section
+from wam_analysis.findings.finding import Finding
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 from wam_analysis.thresholds import LAYOUT
 
@@ -28,7 +28,7 @@ def text(analysis: Analysis, width: int | None = None) -> str:
         lines += ["", section.title, "─" * len(section.title)]
         for sentence in section.sentences:
             lines += _wrapped(sentence, wide)
-        lines += _tables(section, wide)
+        lines += table_lines(section.findings, wide)
         if section.lacking:
             lines += _wrapped(f"not in this bag: {', '.join(section.lacking)}", wide)
     lines += ["", "Provenance", "──────────"]
@@ -40,10 +40,10 @@ def _wrapped(line: str, wide: int) -> list[str]:
     return textwrap.wrap(line, wide, initial_indent="  ", subsequent_indent="    ")
 
 
-def _tables(section: Section, wide: int) -> list[str]:
-    """Lines of the tables of a section; none without numbers."""
+def table_lines(findings: tuple[Finding, ...], wide: int) -> list[str]:
+    """Lines of the tables of some numbers, of so many columns; none without numbers."""
     lines: list[str] = []
-    for table in tabulated(section.findings):
+    for table in tabulated(findings):
         for block in _blocks(table, wide):
             lines += ["", *(f"  {line}".rstrip() for line in block)]
     if any(MARK in line for line in lines):
@@ -95,9 +95,8 @@ def document(analysis: Analysis) -> dict[str, Any]:
             {
                 "key": section.key,
                 "title": section.title,
-                "sentences": list(section.sentences),
+                **{name: list(getattr(section, name)) for name in ("sentences", "shows", "wrong", "lacking")},
                 "findings": [_finding(finding) for finding in section.findings],
-                "lacking": list(section.lacking),
             }
             for section in analysis.sections
         ],

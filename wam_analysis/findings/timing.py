@@ -84,7 +84,7 @@ def timing_section(recording: AnalysedRun) -> Section:
     if not findings:
         sentences.append("No stamped topic of the loop was recorded.")
     lacking = recording.lacking(*TIMED[:2])
-    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), lacking, (), tuple(verdict))
 
 
 def provenance(recording: AnalysedRun) -> dict[str, str]:

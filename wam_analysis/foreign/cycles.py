@@ -48,10 +48,14 @@ class FoundCycle(NamedTuple):
 
 
 def traced(source: Source) -> list[str]:
-    """The quantities in which cycles are looked for: the first of position, velocity and effort, or each axis."""
+    """The quantities in which cycles are looked for: the first of position, velocity and effort, or each axis.
+
+    One that is in less than half of the messages comes last.
+    """
     if not source.is_joint:
         return list(source.values)
-    return [next(q for q in ("position", "velocity", "effort") if q in source.values)]
+    known = {q: 2 * int(np.sum(np.isfinite(v))) < len(v) for q, v in source.values.items()}
+    return [min((q for q in ("position", "velocity", "effort") if q in known), key=known.__getitem__)]
 
 
 def cycles(source: Source, command: Source | None) -> list[FoundCycle]:
@@ -66,9 +70,10 @@ def cycles(source: Source, command: Source | None) -> list[FoundCycle]:
     for quantity in traced(source):
         label = source.label if source.is_joint else f"{source.label} {quantity}"
         unit = source.units[quantity]
-        for piece in pieces(source):
+        own = None if command is None else command.only(quantity)
+        for piece in pieces(source, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST.get(unit, 0.0))
-            for one, origin, error in _of_piece(piece, quantity, command, least):
+            for one, origin, error in _of_piece(piece, quantity, own, least):
                 cycle = one.cycle
                 size = (cycle.peak_to_peak, error, cycle.growth, cycle.confidence)
                 found.append(FoundCycle(label, unit, one.begin, one.end, 1.0 / cycle.period, *size, origin))
@@ -209,12 +214,17 @@ def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
 
 def lines(source: Source) -> list[tuple[str, str, SpectralLine]]:
     """Label, unit and line: the strongest lines in the spectrum of the longest stretch without a gap."""
-    piece = longest(pieces(source))
-    if piece is None:
-        return []
-    return [
-        (source.label if source.is_joint else f"{source.label} {quantity}", source.units[quantity], line)
-        for quantity in traced(source)
-        for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines)
-        if 2.0 * line.amplitude > LEAST.get(source.units[quantity], 0.0)
-    ]
+    found = []
+    for quantity in traced(source):
+        if (piece := longest(pieces(source, quantity))) is not None:
+            label = source.label if source.is_joint else f"{source.label} {quantity}"
+            every = spectral_lines(piece.time, piece.values[quantity], CYCLE.lines)
+            least = LEAST.get(source.units[quantity], 0.0)
+            found += [(label, source.units[quantity], line) for line in every if 2.0 * line.amplitude > least]
+    return found
+
+
+def slowest(source: Source) -> float:
+    """The frequency, Hz, from which on lines are looked for; NaN where no stretch is long enough."""
+    piece = longest([one for quantity in traced(source) for one in pieces(source, quantity)])
+    return CYCLE.first_line / float(np.ptp(piece.time)) if piece is not None else math.nan

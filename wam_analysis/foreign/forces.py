@@ -38,8 +38,9 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     A step ends where the sender of either goes over to another frame; one from another frame is none.  Axes that are
     not known of both are left out.
     """
-    known = ~command.is_away(measured.time)
     axes = [axis for axis in FORCE if axis in command.values and axis in measured.values]
+    measured, command = measured.only(*axes), command.only(*axes)
+    known = ~command.is_away(measured.time)
     if not axes or not np.any(known):
         return []
     desired = np.column_stack([command.values[axis] for axis in axes])

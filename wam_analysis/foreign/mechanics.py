@@ -35,10 +35,11 @@ class Sticking(NamedTuple):
 
 def sticking(source: Source, command: Source | None) -> Sticking | None:
     """Rest and motion of a joint; None without a velocity."""
+    if rests(source):
+        return Sticking(1.0, 0, 0, math.nan)
     still = slips = reversals = total = disobeyed = 0
-    for piece in pieces(source):
-        if "velocity" not in piece.values:
-            return None
+    moved = next((q for q in ("velocity", "position") if q in source.values), "")
+    for piece in pieces(source, moved) if moved else ():
         rest = _rest(piece)
         period = float(piece.time[1] - piece.time[0])
         phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
@@ -59,9 +60,15 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
     return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
 
 
+def rests(source: Source) -> bool:
+    """Whether a joint never moved, by its position: an encoder may flicker between counts."""
+    position = source.only("position").values.get("position", np.zeros(0))
+    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
+
+
 def hidden_motion(source: Source) -> float:
     """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
-    position = source.values.get("position", np.zeros(1))
+    position = source.only("position").values.get("position", np.zeros(1))
     distance = float(np.ptp(position))
     return distance if distance > SHAFT.far * max(resolution(position), SHAFT.joint_rest) else 0.0
 
@@ -86,22 +93,26 @@ def _rest(piece: Piece) -> float:
 
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
-    if "velocity" in command.values and np.any(command.values["velocity"]):
-        return np.interp(time, command.time, command.values["velocity"])
-    if "position" not in command.values:
+    speed, position = command.only("velocity"), command.only("position")
+    if np.any(speed.values.get("velocity", 0.0)):
+        return np.interp(time, speed.time, speed.values["velocity"])
+    if len(position.time) < SHAFT.fewest_samples:
         return np.zeros(len(time))
-    return np.interp(time, command.time, np.gradient(command.values["position"], command.time))
+    return np.interp(time, position.time, np.gradient(position.values["position"], position.time))
 
 
 def velocity_factor(source: Source) -> float:
     """Recorded velocity over the rate of the position, where that moves; NaN where the two agree or it does not move.
 
-    It is 0 where the velocity is zero, and below zero where its sign is swapped.
+    It is 0 where the velocity is zero, and below zero where its sign is swapped.  A joint whose encoder only flickers
+    does not move.
     """
     if not {"position", "velocity"} <= source.values.keys():
         return math.nan
+    if rests(source):
+        return math.nan
     rates, speeds = [], []
-    for piece in pieces(source):
+    for piece in pieces(source, "position", "velocity"):
         rate, sd = differentiated(piece.time, piece.values["position"])
         moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
         rates.append(rate[moves])
@@ -141,7 +152,8 @@ def friction(source: Source) -> FoundFriction | None:
     unexplained is taken; by what the others would change, the errors are larger.  In a motion of one frequency inertia
     and weight are the same, and the inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
-    some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
+    needed = [q for q in ("position", "velocity", "effort") if q in source.values]
+    some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
     if not some or math.isfinite(velocity_factor(source)):
         return None
     period = float(some[0].time[1] - some[0].time[0])

@@ -1,22 +1,27 @@
 """Bags of other robots as columns of joints and wrenches: by `wam_bag`, or by rosbags where the format is another."""
 
+import csv
 import importlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from numbers import Integral
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
-from wam_analysis.foreign.topic_map import UNITS, TopicMap
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
+from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
+from wam_bag.columns import UNNAMED, irregularities, joint_names
 from wam_bag.contents import contents
 
 Numbers = NDArray[np.float64]
@@ -26,10 +31,24 @@ JOINT_FIELDS = {"name": "name", "position": "position", "velocity": "velocity", 
 WRENCH_FIELDS = {"force": "wrench.force", "torque": "wrench.torque"}
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 CONTROLLER_PARTS = {"": ("feedback", "actual"), " command": ("reference", "desired")}  # suffix of the topic: names
-IN_JOINTS = ("position", "velocity", "effort")
+COMMAND = "command"
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
 ROSBAGS = (".bag", ".db3")
 BILLION = 1_000_000_000
+
+
+class Opened(NamedTuple):
+    """A recording that is open.
+
+    Attributes
+    ----------
+    kinds, counts : type and number of messages by topic.
+    messages : topic, time and message of each message of some topics.
+    """
+
+    kinds: dict[str, str]
+    counts: dict[str, int]
+    messages: Callable[[Collection[str]], Iterator[tuple[str, int, Any]]]
 
 
 def needs_rosbags(path: Path) -> bool:
@@ -40,33 +59,58 @@ def needs_rosbags(path: Path) -> bool:
 
 
 def foreign_bag(path: Path, given: TopicMap) -> Bag:
-    """The joints and wrenches of a bag, in the units of the map.
+    """The joints and wrenches of a recording, in the units of the map; the type of a command is `COMMAND`.
 
     Raises
     ------
     BagError
-        if it cannot be read, or needs rosbags, which is not installed.
+        if it cannot be read, is empty, or needs rosbags, which is not installed.
     ValueError
         if a topic, joint or field of the map is not there.
     """
+    if path.suffix == ".csv":
+        return table_bag(path, series_of_csv(path), given)
     if needs_rosbags(path):
         bag = _of(path, _by_rosbags(path), given)
-    elif is_of_other_encoding(path):
-        bag = _of(path, _by_mcap(path), given)
+    elif encoded := of_other_encoding(path):
+        bag = _of(path, _by_mcap(path, encoded), given)
     else:
         listed = contents(path).topics
         chosen = [name for name, topic in listed.items() if _is_wanted(name, topic.type, given)]
         bag = read(path, chosen)
+        bag = bag._replace(types={name: topic.type for name, topic in listed.items()})
+    require_messages(path, bag.counts.values())
+    return _analysed(bag, given)
+
+
+def require_messages(path: Path, counts: Iterable[int]) -> None:
+    """Refuse an empty recording.
+
+    Raises
+    ------
+    BagError
+        if no topic has a message.
+    """
+    if not any(counts):
+        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
+
+
+def _analysed(bag: Bag, given: TopicMap) -> Bag:
+    """The bag with columns of joints and wrenches alone."""
     missing = [name for name in (*given.topics, *given.commands) if name not in bag.topics]
     if missing:
-        raise ValueError(f"{path} has no topic {missing[0]}; its topics: {', '.join(sorted(bag.counts)) or 'none'}")
+        listed = ", ".join(sorted(bag.counts)) or "none"
+        raise ValueError(f"{bag.path} has no topic {missing[0]}; its topics: {listed}")
     topics: dict[str, Any] = {}
+    types = dict(bag.types)
     for name, columns in bag.topics.items():
-        topics |= dict(_mapped(name, bag.types[name], columns, given))
+        for part, found in _mapped(name, bag.types[name], columns, given):
+            topics[part] = found
+            is_command = part in given.commands or (bag.types[name] == CONTROLLER and part != name)
+            types[part] = COMMAND if is_command else bag.types[name]
     joints = sorted({joint for one in topics.values() if isinstance(one, JointColumns) for joint in one.names})
     if unknown := [name for name in given.joints if name not in joints]:
-        raise ValueError(f"{path} has no joint {unknown[0]}; its joints: {', '.join(joints) or 'none'}")
-    types = {name: JOINTS if isinstance(one, JointColumns) else WRENCH for name, one in topics.items()}
+        raise ValueError(f"{bag.path} has no joint {unknown[0]}; its joints: {', '.join(joints) or 'none'}")
     return bag._replace(topics=topics, types=types)
 
 
@@ -76,56 +120,131 @@ def _is_wanted(topic: str, kind: str, given: TopicMap) -> bool:
     return kind in (JOINTS, WRENCH, CONTROLLER) or topic in given.commands
 
 
+# tables
+
+
+def series_of_csv(path: Path) -> dict[str, Numbers]:
+    """Columns of a CSV file by their titles; what is no number is NaN.
+
+    Raises
+    ------
+    BagError
+        if it has no column or no row.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as stream:
+        head, *rows = csv.reader(stream)
+    if not rows:
+        raise BagError(f"{path} has no row below its titles")
+    table = np.genfromtxt([",".join(row) for row in rows], delimiter=",", dtype=np.float64, ndmin=2)
+    return {name.strip(): table[:, i] for i, name in enumerate(head)}
+
+
+def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> Bag:
+    """A recording of a table with 'time', s, and columns as position.JOINT, velocity.JOINT, effort.JOINT or force.x.
+
+    Parameters
+    ----------
+    series : columns by title, (k,), such as a DataFrame; a map gives other titles of a quantity, and of the time as its
+        stamp.
+
+    Raises
+    ------
+    ValueError
+        if it has no time, or nothing that can be analysed.
+    """
+    found = {str(name): np.asarray(series[name], np.float64) for name in series}
+    clock = given.fields.get("stamp", "time")
+    if clock not in found:
+        raise ValueError(f"{path} has no column '{clock}'; name that of the time by --map stamp=COLUMN")
+    seconds = given.scaled("stamp")[0] * found[clock]
+    times = np.rint(BILLION * seconds).astype(np.int64)
+    parts: dict[str, dict[str, Numbers]] = {}
+    for quantity in (*IN_JOINTS, "force", "torque"):
+        title, factor = given.fields.get(quantity, quantity), given.scaled(quantity)[0]
+        named = {n.removeprefix(title).removeprefix("."): n for n in found if f"{n}.".startswith(f"{title}.")}
+        parts[quantity] = {name: factor * found[column] for name, column in named.items()}
+    nothing = np.full(len(times), "", object)
+    topics: dict[str, Any] = {}
+    joints = tuple(dict.fromkeys(name for q in IN_JOINTS for name in parts[q]))
+    if joints:
+        blank = np.full(len(times), math.nan)
+        p, v, e = (np.column_stack([parts[q].get(n, blank) for n in joints]) for q in IN_JOINTS)
+        topics["joints"] = JointColumns(times, times, nothing, joint_names(joints, 0), p, v, e)
+    if parts["force"] or parts["torque"]:
+        vectors = [np.column_stack([parts[q].get(axis, 0.0 * times) for axis in "xyz"]) for q in ("force", "torque")]
+        topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
+    if not topics:
+        raise ValueError(f"{path} has the columns {', '.join(found)}; name them as position.JOINT, or by --map")
+    counts = dict.fromkeys(topics, len(times))
+    return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts)
+
+
 # other formats
 
 
-def _by_rosbags(path: Path) -> Callable[[Callable[[str, str], bool]], Iterator[tuple[str, str, int, Any]]]:
+def _by_rosbags(path: Path) -> AbstractContextManager[Opened]:
     try:
         highlevel: Any = importlib.import_module("rosbags.highlevel")
         typesys: Any = importlib.import_module("rosbags.typesys")
     except ImportError:
         raise BagError(f"{path} is no MCAP; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
 
-    def messages(is_wanted: Callable[[str, str], bool]) -> Iterator[tuple[str, str, int, Any]]:
+    @contextmanager
+    def opened() -> Iterator[Opened]:
         store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
         try:
             with highlevel.AnyReader([path], default_typestore=store) as reader:
-                some = [one for one in reader.connections if is_wanted(one.topic, one.msgtype)]
-                for one in reader.connections:
-                    yield one.topic, one.msgtype, 0, None
-                for one, time, data in reader.messages(some) if some else ():
-                    yield one.topic, one.msgtype, time, reader.deserialize(data, one.msgtype)
+
+                def messages(topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+                    some = [one for one in reader.connections if one.topic in topics]
+                    for one, time, data in reader.messages(some) if some else ():
+                        yield one.topic, time, reader.deserialize(data, one.msgtype)
+
+                kinds = {one.topic: one.msgtype for one in reader.connections}
+                yield Opened(kinds, {topic: found.msgcount for topic, found in reader.topics.items()}, messages)
         except highlevel.AnyReaderError as error:
             raise BagError(f"{path} cannot be read by rosbags: {error}") from None
 
-    return messages
+    return opened()
 
 
-def is_of_other_encoding(path: Path) -> bool:
-    """Whether it is one MCAP file with messages that are not CDR: JSON, or those of ROS 1."""
-    if not (path.is_file() and path.suffix == ".mcap"):
-        return False
+def of_other_encoding(path: Path) -> list[Path]:
+    """The MCAP files with messages that are not CDR, JSON or those of ROS 1; none where all are CDR."""
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path] if path.suffix == ".mcap" else []
+    return files if any(_has_other_encoding(file) for file in files) else []
+
+
+def _has_other_encoding(file: Path) -> bool:
     try:
-        with path.open("rb") as stream:
+        with file.open("rb") as stream:
             summary = make_reader(stream).get_summary()
     except Exception:  # a broken file is explained by the reader of the stack
         return False
     return summary is not None and any(one.message_encoding in ("json", "ros1") for one in summary.channels.values())
 
 
-def _by_mcap(path: Path) -> Callable[[Callable[[str, str], bool]], Iterator[tuple[str, str, int, Any]]]:
-    def messages(is_wanted: Callable[[str, str], bool]) -> Iterator[tuple[str, str, int, Any]]:
-        with path.open("rb") as stream:
-            decoders: dict[int, Callable[[bytes], Any]] = {}
-            for schema, channel, message in make_reader(stream).iter_messages():
-                kind = _ros2_name(schema.name) if schema else ""
-                if channel.id not in decoders:
-                    yield channel.topic, kind, 0, None
-                    decoders[channel.id] = _decoder(path, channel.message_encoding, kind, schema)
-                if is_wanted(channel.topic, kind):
-                    yield channel.topic, kind, message.log_time, decoders[channel.id](message.data)
+@contextmanager
+def _by_mcap(path: Path, files: Sequence[Path]) -> Iterator[Opened]:
+    with ExitStack() as stack:
+        readers = [make_reader(stack.enter_context(file.open("rb"))) for file in files]
+        kinds: dict[str, str] = {}
+        counts = Counter[str]()
+        for summary in (one for reader in readers if (one := reader.get_summary()) is not None):
+            numbers = summary.statistics.channel_message_counts if summary.statistics else {}
+            for channel in summary.channels.values():
+                schema = summary.schemas.get(channel.schema_id)
+                kinds[channel.topic] = _ros2_name(schema.name) if schema else ""
+                counts[channel.topic] += numbers.get(channel.id, 0)
 
-    return messages
+        def messages(topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+            for reader in readers:
+                decoders: dict[int, Callable[[bytes], Any]] = {}
+                for schema, channel, message in reader.iter_messages(topics=[*topics]):
+                    if channel.id not in decoders:
+                        decoders[channel.id] = _decoder(path, channel.message_encoding, kinds[channel.topic], schema)
+                    yield channel.topic, message.log_time, decoders[channel.id](message.data)
+
+        yield Opened(kinds, counts, messages)
 
 
 def _decoder(path: Path, encoding: str, kind: str, schema: Any) -> Callable[[bytes], Any]:
@@ -149,19 +268,17 @@ def _ros2_name(kind: str) -> str:
     return f"{package}/msg/{name}" if slash and "/" not in name else kind
 
 
-def _of(path: Path, messages: Any, given: TopicMap) -> Bag:
-    """A bag of what another reader yields: topic, type, time and message, or no message for a topic that is there."""
-    kinds: dict[str, str] = {}
+def _of(path: Path, reading: AbstractContextManager[Opened], given: TopicMap) -> Bag:
+    """A bag of what another reader yields."""
     times: dict[str, list[int]] = {}
     found: dict[str, list[Any]] = {}
-    for topic, kind, time, message in messages(lambda topic, kind: _is_wanted(topic, kind, given)):
-        kinds[topic] = kind
-        if message is not None:
+    with reading as opened:
+        wanted = [topic for topic, kind in opened.kinds.items() if _is_wanted(topic, kind, given)]
+        for topic, time, message in opened.messages(wanted):
             times.setdefault(topic, []).append(time)
             found.setdefault(topic, []).append(message)
     topics: dict[str, Any] = {name: Messages(np.array(times[name], np.int64), found[name]) for name in found}
-    counts = {name: len(found.get(name, [])) for name in kinds}
-    return Bag(path, topics, kinds, {}, {}, counts)
+    return Bag(path, topics, opened.kinds, {}, {}, opened.counts)
 
 
 # to columns
@@ -175,8 +292,11 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
         named = [given.fields.get(q, q) for q in IN_JOINTS]
         if bad := next((field for field in named if field not in IN_JOINTS), ""):
             raise ValueError(f"{topic} has no field '{bad}'; it has {', '.join(IN_JOINTS)}")
-        fields = [given.scaled(q)[0] * getattr(columns, field) for q, field in zip(IN_JOINTS, named, strict=True)]
-        yield topic, JointColumns(*columns[:4], *fields)
+        p, v, e = (given.scaled(q)[0] * getattr(columns, field) for q, field in zip(IN_JOINTS, named, strict=True))
+        names = columns.names
+        if UNNAMED in columns.irregular and len(given.joints) == len(names):
+            names = given.joints
+        yield topic, columns._replace(names=names, position=p, velocity=v, effort=e)
     elif isinstance(columns, WrenchColumns):
         force, torque = (given.scaled(q)[0] for q in ("force", "torque"))
         yield topic, columns._replace(force=force * columns.force, torque=torque * columns.torque)
@@ -223,6 +343,9 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     path = fields.get("stamp", "header.stamp")
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
+    if "," in path:
+        seconds, parts = (np.array(_integers(topic, columns, field), np.int64) for field in path.split(",", 1))
+        return BILLION * seconds + parts
     stamps = [_at(topic, message, path) for message in columns.messages]
     has_unit = "stamp" in given.units
     if hasattr(stamps[0], "sec"):
@@ -242,6 +365,10 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     return found
 
 
+def _integers(topic: str, columns: Messages, path: str) -> list[int]:
+    return [int(row[0]) for row in _numbers(topic, columns, path)]
+
+
 def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], received: NDArray[np.int64]) -> None:
     """Refuse numbers as seconds where the receptions show that they are others."""
     took, numbers = np.ptp(received) / 1e9, np.ptp(stamps) / 1e9
@@ -255,7 +382,7 @@ def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], receive
 
 def _frames(columns: Messages) -> NDArray[np.object_]:
     heads = [getattr(message, "header", None) for message in columns.messages]
-    return np.array([str(getattr(head, "frame_id", "")) for head in heads], object)
+    return np.array([str(getattr(head, "frame_id", "")).removeprefix("/") for head in heads], object)
 
 
 def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
@@ -273,21 +400,28 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
 
 def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> JointColumns:
     taken = {q: _numbers(topic, columns, fields[q]) for q in IN_JOINTS if q in fields}
-    most = max(len(row) for rows in taken.values() for row in rows)
-    unnamed = list(given.joints) if len(given.joints) == most else [f"joint{i + 1}" for i in range(most)]
-    named = [list(_at(topic, m, fields["name"])) for m in columns.messages] if "name" in fields else []
-    own = [names or unnamed for names in named] if named else [unnamed] * len(columns.messages)
-    names = tuple(dict.fromkeys(name for some in {tuple(some): None for some in own} for name in some))
-    place = {name: i for i, name in enumerate(names)}
+    irregular = Counter[str]()
+    own: list[tuple[str, ...]] = []
+    for k, message in enumerate(columns.messages):
+        widths = {q: len(rows[k]) for q, rows in taken.items()}
+        most = max(widths.values())
+        names = [*_at(topic, message, fields["name"])] if "name" in fields else []
+        is_named = not names and len(given.joints) == most
+        if "name" in fields and not is_named:
+            irregular.update(irregularities(names, widths))
+        own.append(joint_names(given.joints if is_named else names, most))
+    every = tuple(dict.fromkeys(name for some in dict.fromkeys(own) for name in some))
+    place = {name: i for i, name in enumerate(every)}
     arrays = []
     for quantity in IN_JOINTS:
         rows = taken.get(quantity, [])
-        array = np.full((len(columns.messages), len(names) if any(map(len, rows)) else 0), np.nan)
+        array = np.full((len(own), len(every) if any(map(len, rows)) else 0), np.nan)
         for k, (some, row) in enumerate(zip(own, rows, strict=False)):
-            for name, value in zip(some, row, strict=False):
-                array[k, place[name]] = value
+            if len(some) == len(row):
+                array[k, [place[name] for name in some]] = row
         arrays.append(given.scaled(quantity)[0] * array)
-    return JointColumns(columns.log_time_ns, _times(topic, columns, fields, given), _frames(columns), names, *arrays)
+    times, (p, v, e) = _times(topic, columns, fields, given), arrays
+    return JointColumns(columns.log_time_ns, times, _frames(columns), every, p, v, e, irregular)
 
 
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:

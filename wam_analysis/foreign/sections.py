@@ -1,13 +1,12 @@
 """The analysis of another robot's recording: a section for each question."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.clocks import CLOCK_SET
-from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines
+from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
     DRAG,
@@ -16,15 +15,18 @@ from wam_analysis.foreign.mechanics import (
     friction,
     hidden_motion,
     is_sure,
+    rests,
     sticking,
     velocity_factor,
 )  # fmt: skip
-from wam_analysis.foreign.sources import Source, alternates, clocks_of, sources
+from wam_analysis.foreign.sources import Source, Treated, Treatment, alternates, clocks_of, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.thresholds import CYCLE, SHAFT
-from wam_bag.bag import Bag, JointColumns, WrenchColumns
+from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
+from wam_bag.limits import READING_LIMITS
 
+NAMED = READING_LIMITS.named
 TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
 ALSO = {
     WEIGHT: "with its weight",
@@ -96,44 +98,119 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
         if given.is_given
         else "This is not a recording of this stack."
     )
-    sentences = [what]
-    clocks = {name: clock for name, clock in clocks_of(bag, given).items() if clock.note}
-    for name, columns in sorted(bag.topics.items()):
-        if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-            sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
-            angles = columns.position[np.isfinite(columns.position)]
-            if len(angles) and not given.units.get("position") and float(np.max(np.abs(angles))) > TURNS:
-                sentences.append(
-                    f"{name}: positions up to {shown(float(np.max(np.abs(angles))), 'rad')}, taken as radians; if they "
-                    "are degrees, give --unit position=deg."
-                )
-            numbers = np.hstack([columns.position, columns.velocity, columns.effort])
-            known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
-            if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
-                sentences.append(f"{name}: {', '.join(none)} without a value that is a number.")
-        elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-            sizes = np.sqrt((columns.force**2).sum(axis=1))
-            sizes = sizes[np.isfinite(sizes)]
-            what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
-            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, {what}.")
-    sentences += [f"{name}: {clock.note}." for name, clock in clocks.items()]
-    others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
-    if others:
-        sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
-    if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
-        sentences.append(f"Taken as commands: {topics}.")
-    sentences += [f"{one.label}: {_sparse(one, q)}; it is not analysed." for one in found for q in one.sparse]
-    verdict = [
+    sentences = [what, *(line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, given))]
+    clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
+    wrong = [*_treated(found), *clocks]
+    wrong += [
         f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]
-    two_clocks = [f"{name}: {clock.note}." for name, clock in clocks.items() if clock.note != CLOCK_SET]
-    return Section("happened", "What happened", (*sentences, *verdict), (), (), (*verdict, *two_clocks))
+    for name, columns in bag.topics.items():
+        if isinstance(columns, JointColumns):
+            wrong += [f"{name}: {_counted(n, what)}." for what, n in columns.irregular.items()]
+    if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
+        sentences.append(f"Taken as commands: {topics}.")
+    sentences += [*wrong, *_alike(found), *_unread(bag)]
+    if not found:
+        wrong += _unread(bag) or ["nothing in it can be analysed."]
+    return Section("happened", "What happened", tuple(sentences), _treated_findings(found), (), (), tuple(wrong))
 
 
-def _sparse(one: Source, quantity: str) -> str:
-    return f"{quantity} is a number in only {100.0 * one.sparse[quantity]:.0f} % of its messages"
+def _topic(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+    """What a topic holds."""
+    if isinstance(columns, JointColumns) and len(columns.stamp_ns):
+        yield f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}."
+        angles = columns.position[np.isfinite(columns.position)]
+        if len(angles) and not given.units.get("position") and float(np.max(np.abs(angles))) > TURNS:
+            largest = shown(float(np.max(np.abs(angles))), "rad")
+            yield f"{name}: positions up to {largest}, taken as radians; if they are degrees, give --unit position=deg."
+        numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
+        if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
+            yield f"{name}: {', '.join(none)} without a value that is a number."
+    elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
+        sizes = np.sqrt((columns.force**2).sum(axis=1))
+        sizes = sizes[np.isfinite(sizes)]
+        what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
+        yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} message{'s' * (number != 1)} with {what}"
+
+
+DONE_TO = {
+    Treatment.COARSE: "{number} of {of} stamps repeat the one before; times of reception are used",
+    Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are spread evenly between them",
+    Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
+    Treatment.WRAPPED: "the {quantity} jumps {number} times by {size}; it is unwrapped",
+    Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}, which is taken off",
+    Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
+}
+
+
+def _treated(found: Sequence[Source]) -> list[str]:
+    """What was done to raw values, a sentence for all joints of a topic and quantities to which the same was done."""
+    alike: dict[tuple[str, Treated], tuple[list[Source], list[str]]] = {}
+    for one in found:
+        for treated in one.treated:
+            those, quantities = alike.setdefault((one.topic, treated._replace(quantity="")), ([], []))
+            those += [one] * (one not in those)
+            quantities += [treated.quantity] * (treated.quantity not in quantities)
+    sentences = []
+    for (topic, treated), (those, quantities) in alike.items():
+        is_whole = not quantities[0] or 1 < len(those) == sum(one.topic == topic for one in found)
+        subject = topic if is_whole else ", ".join(one.label for one in those)
+        words = DONE_TO[treated.what].format(
+            quantity=" and ".join(quantities),
+            number=treated.number,
+            of=treated.of,
+            size=shown(abs(treated.size), those[0].units.get(quantities[0], "")),
+            times=times(treated.number),
+            share=100.0 * (1.0 - treated.number / treated.of),
+        )
+        sentences.append(f"{subject}: {words}.")
+    return sentences
+
+
+def _treated_findings(found: Sequence[Source]) -> tuple[Finding, ...]:
+    every = [
+        Finding(
+            f"{one.label}: {treated.what}{' ' * bool(treated.quantity)}{treated.quantity}", "", float(treated.number)
+        )
+        for one in found
+        for treated in one.treated
+    ]
+    return tuple(every)
+
+
+def _alike(found: Sequence[Source]) -> list[str]:
+    """How to say which of several topics with the same joints is the command: their values do not tell."""
+    topics: dict[str, list[str]] = {}
+    for one in found:
+        if one.is_joint and not one.is_command:
+            topics.setdefault(one.name, []).append(one.topic)
+    shared = {tuple(dict.fromkeys(some)): joint for joint, some in topics.items() if len({*some}) > 1}
+    if any(one.is_command for one in found):
+        return []
+    return [
+        f"{joint} is in {' and '.join(some)}; if one of them is what was commanded, give --command {some[-1]}."
+        for some, joint in shared.items()
+    ]
+
+
+def _unread(bag: Bag) -> list[str]:
+    """Topics that were not read, and how to."""
+    others = {
+        name: n for name, n in bag.counts.items() if n and not any(one.split(" ")[0] == name for one in bag.topics)
+    }
+    if not others:
+        return []
+    most = sorted(others, key=lambda name: -others[name])[:NAMED]
+    listed = ", ".join(f"{name} ({bag.types.get(name, '')})" for name in most) + ", ..." * (len(others) > NAMED)
+    number = f"{sum(others.values())} messages of other topics"
+    return [f"{number} were not analysed: {listed}; --topic {most[0]} --map QUANTITY=FIELD names what they hold."]
 
 
 # forces
@@ -174,9 +251,9 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         error = shown(abs(worst.response.final - worst.commanded), "N")
         number = f"{len(steps)} force step{'s' * (len(steps) != 1)}"
         verdict = f"{number}; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
-        return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
+        return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict,), tuple(doubts))
     stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
-    return Section("force", "Force", stated, (), (), tuple(doubts))
+    return Section("force", "Force", stated, (), (), (), tuple(doubts))
 
 
 def _arrival(command: Source) -> str:
@@ -208,7 +285,8 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         sentence = _cycle_sentence(one)
         sentences.append(sentence)
         if one.origin not in (COMMANDED_CYCLE, HARMONIC):
-            verdict.append(sentence)
+            size = f"{shown(one.frequency, 'Hz')}, {shown(one.peak_to_peak, one.unit)} peak to peak"
+            verdict.append(f"{one.label}: {size}{', not commanded' * (one.origin == LIMIT_CYCLE)}.")
         findings += [
             Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin, error=one.error),
             Finding(f"{label}: frequency", "Hz", one.frequency, note=one.origin),
@@ -238,7 +316,7 @@ def _cycle_sentence(one: FoundCycle) -> str:
             f"{one.label} repeats at {frequency}, {size}, {where}, near a multiple of the commanded frequency: a limit "
             "cycle, or the commanded motion that is not followed linearly."
         )
-    return f"{one.label} repeats at {frequency}, {size}, {where}; whether it was commanded to is not in this bag."
+    return f"{one.label} repeats at {frequency}, {size}, {where}; no command of it is known, --command names one."
 
 
 def _spectrum(states: Sequence[Source]) -> Section:
@@ -247,8 +325,14 @@ def _spectrum(states: Sequence[Source]) -> Section:
         sentences.append(f"{label}: {shown(line.frequency, 'Hz')}, amplitude {shown(line.amplitude, unit)}.")
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: amplitude", unit, line.amplitude))
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: frequency", "Hz", line.frequency))
-    stated = tuple(sentences) or ("No frequency is above the noise.",)
-    return Section("frequency", "Spectrum", stated, tuple(findings))
+    begins = [first for one in states if math.isfinite(first := slowest(one))]
+    if not begins:
+        return Section("frequency", "Spectrum", ("No stretch is long enough.",), ())
+    span = f"from {shown(min(begins), 'Hz')} on, five cycles of the longest stretch"
+    if sentences:
+        return Section("frequency", "Spectrum", (*sentences, f"Looked for {span}."), tuple(findings))
+    silent = f"No frequency is above the noise {span}; slower ones were not looked for."
+    return Section("frequency", "Spectrum", (silent,), (), (), (silent,))
 
 
 # mechanics
@@ -274,7 +358,8 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
         if not found.slips:
             sentences.append(f"{one.label}: never moved.")
             continue
-        sentence = f"{one.label}: at rest for {100.0 * found.stuck:.0f} % of the time, slipped {times(found.slips)}"
+        at_rest = f"at rest for {100.0 * found.stuck:.0f} % of the time, moved {times(found.slips)}"
+        sentence = f"{one.label}: {at_rest if found.stuck or found.slips > 1 else 'moved all the time'}"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")
@@ -284,18 +369,18 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
 
 
 def _friction(states: Sequence[Source]) -> Section:
-    sentences, findings, doubts = [], [], []
+    sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
         factor = velocity_factor(one)
         if math.isfinite(factor):
-            doubts.append(
+            wrong.append(
                 f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
                 f"of another unit or sign, so that neither friction nor inertia is given."
             )
-        if "effort" in one.sparse:
-            doubts.append(f"{one.label}: neither friction nor inertia is given, because its {_sparse(one, 'effort')}.")
         whole = friction(one) if one.is_joint else None
         if whole is None:
+            if not math.isfinite(factor) and {"effort"} < one.values.keys() and not rests(one):
+                doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
             continue
         found = whole.friction
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
@@ -311,13 +396,14 @@ def _friction(states: Sequence[Source]) -> Section:
             numbers.append(("inertia", inertia, found.inertia, found.inertia_error))
         findings += [Finding(f"{one.label}: {what}", unit, value, error=error) for what, unit, value, error in numbers]
         stated = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
+        brief.append(f"{one.label}: {', '.join(f'{what} {shown(value, unit)}' for what, unit, value, _ in numbers)}.")
         missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
         if math.isnan(found.inertia):
             missing.remove("inertia")
             stated += (
-                "; it moved at one frequency, so that its inertia cannot be separated from its weight, nor its viscous "
-                f"friction from a delay of the effort, 1 ms of which changes it by {shown(1e-3 * abs(whole.per_lag))}"
+                f"; one frequency, 1 ms of delay changes the viscous friction by {shown(1e-3 * abs(whole.per_lag))}"
             )
+            alone.append(one.label)
         stated += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
         stated += "".join(f"; {ALSO[name]}" for name in whole.also)
         if whole.lag:
@@ -332,11 +418,15 @@ def _friction(states: Sequence[Source]) -> Section:
             "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
             "that it may also hold are taken off where they are found, and otherwise count in the errors:"
         )
-        return Section(
-            "friction", "Friction", (assumed, *sentences, *doubts), tuple(findings), (), (*sentences, *doubts)
-        )
+        if alone:
+            doubts.append(
+                f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
+                "friction from a delay of the effort."
+            )
+        every = (assumed, *sentences, *doubts, *wrong)
+        return Section("friction", "Friction", every, tuple(findings), (), tuple(brief), tuple(wrong))
     why = "The friction of the joints cannot be identified: no recorded effort determines a dry or viscous friction."
-    return Section("friction", "Friction", (why, *doubts), (), (), tuple(doubts))
+    return Section("friction", "Friction", (why, *doubts, *wrong), (), (), (), tuple(wrong))
 
 
 # timing
@@ -370,4 +460,4 @@ def _timing(found: Sequence[Source]) -> Section:
             sentences.append(f"{name}: {timing.missed} periods without a message, the longest gap {gap}.")
             verdict.append(sentences[-1])
     stated = tuple(sentences) or ("Every period has its message." if findings else "No stamped topic was recorded.",)
-    return Section("timing", "Timing", stated, tuple(findings), (), tuple(verdict))
+    return Section("timing", "Timing", stated, tuple(findings), (), (), tuple(verdict))

@@ -1,13 +1,14 @@
-"""One joint or one wrench of one sender and frame: gaps, doubled stamps and lacking velocities handled."""
+"""One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
-import re
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.foreign.clocks import Clock, clocks
+from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import SHAFT, STREAM
@@ -15,9 +16,38 @@ from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Times = NDArray[np.int64]
 
-COMMAND = re.compile(r"(^|[/_ ])(command|commands|cmd|desired|reference|ref|target|setpoint|goal)($|[/_ ])")
 AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+
+
+class Treatment(StrEnum):
+    """What was found in raw values, and done to them before the analysis."""
+
+    COARSE = "coarse stamps"  # times of reception were used
+    SPREAD = "coarse stamps, spread"  # as are the times of reception: the messages were spread evenly
+    TWICE = "messages that came twice"  # the second was left out
+    WRAPPED = "wraps of the angle"  # were unwrapped
+    MOVED_ZERO = "jumps of the zero"  # were taken off
+    SPARSE = "messages without"  # the others were used
+
+
+class Treated(NamedTuple):
+    """What was done to the raw values of a source.
+
+    Attributes
+    ----------
+    what : the kind.
+    quantity : of which, '' for the messages.
+    number, of : how many, of all.
+    size : of a wrap, or the largest of the jumps, in the unit of the quantity.
+    """
+
+    what: Treatment
+    quantity: str
+    number: int
+    of: int
+    size: float = math.nan
 
 
 class Source(NamedTuple):
@@ -31,9 +61,9 @@ class Source(NamedTuple):
     time : (n,), s from the first stamp of the recording, rising.
     sent, received : (m,), s from the first stamp, all stamps of its sender and when the recorder got them.
     away : (k,), s from the first stamp, rising: stamps of its sender's messages in another frame.
-    values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; all finite.
+    values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; NaN where a message has none.
     units : by quantity.
-    sparse : the share of the messages in which a quantity is a number, by those that are left out because it is small.
+    treated : what was done to the raw values.
     """
 
     label: str
@@ -47,7 +77,15 @@ class Source(NamedTuple):
     away: Numbers
     values: dict[str, Numbers]
     units: dict[str, str]
-    sparse: dict[str, float]
+    treated: tuple[Treated, ...]
+
+    def only(self, *quantities: str) -> "Source":
+        """The source with those of some quantities that it has, in the messages that have all of them."""
+        values = {q: self.values[q] for q in quantities if q in self.values}
+        known = (
+            np.isfinite(np.column_stack([*values.values()])).all(axis=1) if values else np.zeros(len(self.time), bool)
+        )
+        return self._replace(time=self.time[known], values={q: v[known] for q, v in values.items()})
 
     @property
     def is_joint(self) -> bool:
@@ -96,31 +134,83 @@ def _last(stamps: Numbers, time: Numbers) -> Numbers:
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
     """The joints of a bag, each once for each topic and sender, and the wrenches, each once for each frame, too."""
     found: list[Source] = []
-    found_clocks = clocks_of(bag, given)
+    found_clocks = clocks_of(bag)
     origin = min((int(clock.times.min()) for clock in found_clocks.values()), default=0)
-    for topic, columns in _stamped(bag, given).items():
-        is_command = _is_command(topic, given)
-        time, received = ((each - origin) / 1e9 for each in (found_clocks[topic].times, columns.log_time_ns))
-        for frame, rows, sent in _frames(columns, time, is_command):
+    for topic, columns in _stamped(bag).items():
+        is_command = bag.types.get(topic) == COMMAND
+        clock, received = found_clocks[topic].times - origin, columns.log_time_ns - origin
+        timed: dict[bytes, _Timed] = {}
+        for frame, own, sent in _frames(columns, clock / 1e9, is_command):
             for name, values, units in _parts(columns, given):
-                given_by = (time[rows], time[sent], received[sent], np.unique(time[sent & ~rows]))
-                one = Source(topic, topic, name, frame, is_command, *given_by, values, units, {})
-                if (whole := _whole(one, rows)) is not None:
-                    found.append(whole)
+                # a joint may be in some messages of a topic only, a wrench is in all
+                known = (
+                    np.isfinite(np.column_stack([*values.values()])).any(axis=1) if values else np.zeros(len(own), bool)
+                )
+                of_sender = sent & known if name else sent
+                if not np.any(of_sender & own):
+                    continue
+                one = timed.get(of_sender.tobytes()) or _timed(clock, received, columns, of_sender)
+                timed[of_sender.tobytes()] = one
+                mine = (own & known)[one.rows]
+                rows, seconds = one.rows[mine], one.time[mine]
+                taken = {q: v[rows] for q, v in values.items() if np.isfinite(v[rows]).any()}
+                away = np.unique(clock[sent & ~own] / 1e9)
+                arrived = received[one.rows] / 1e9
+                source = Source(
+                    topic, topic, name, frame, is_command, seconds, one.time, arrived, away, taken, units, one.treated
+                )
+                if len(rows) >= (1 if is_command else SHAFT.fewest_samples):
+                    found.append(_treated(source))
     return _labelled(found)
 
 
-def clocks_of(bag: Bag, given: TopicMap) -> dict[str, Clock]:
+class _Timed(NamedTuple):
+    """Messages of a sender in the order of their times, s, each once."""
+
+    rows: NDArray[np.intp]
+    time: Numbers
+    treated: tuple[Treated, ...]
+
+
+def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns, sent: Mask) -> _Timed:
+    """The messages of a sender with times that rise: by their stamps, or by what is known where these repeat."""
+    rows = np.flatnonzero(sent)
+    rows = rows[np.argsort(clock[rows], kind="stable")]
+    stamps = clock[rows]
+    same = np.diff(stamps) == 0
+    number, of = int(np.sum(same)), len(rows)
+    if not number:
+        return _Timed(rows, stamps / 1e9, ())
+    waits = np.diff(received[rows])
+    is_seldom = number <= STREAM.repeated * of
+    if not (is_seldom or np.all(same)) and np.median(waits[same]) >= STREAM.paced * np.median(waits[~same]):
+        late = int(np.min(received[rows] - stamps))
+        order = np.argsort(received[rows], kind="stable")
+        times = np.maximum.accumulate(received[rows][order] - late)
+        kept = np.concatenate([[True], np.diff(times) > 0])
+        return _Timed(rows[order][kept], times[kept] / 1e9, (Treated(Treatment.COARSE, "", number, of),))
+    numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
+    twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
+    if is_seldom or 2 * np.sum(twice) >= number:
+        kept = np.concatenate([[True], ~same])
+        return _Timed(rows[kept], stamps[kept] / 1e9, (Treated(Treatment.TWICE, "", number, of),))
+    firsts = np.flatnonzero(np.concatenate([[True], ~same]))
+    period = (stamps[-1] - stamps[0]) / max(len(firsts) - 1, 1)
+    ends = np.interp(np.arange(of), [*firsts, of], [*stamps[firsts], stamps[-1] + period])
+    return _Timed(rows, ends / 1e9, (Treated(Treatment.SPREAD, "", number, of),))
+
+
+def clocks_of(bag: Bag) -> dict[str, Clock]:
     """The times of the topics of joints and wrenches with enough messages, by name."""
-    return clocks(_stamped(bag, given))
+    return clocks(_stamped(bag))
 
 
-def _stamped(bag: Bag, given: TopicMap) -> dict[str, JointColumns | WrenchColumns]:
+def _stamped(bag: Bag) -> dict[str, JointColumns | WrenchColumns]:
     return {
         topic: columns
         for topic, columns in sorted(bag.topics.items())
         if isinstance(columns, (JointColumns, WrenchColumns))
-        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else SHAFT.fewest_samples)
+        and len(columns.stamp_ns) >= (1 if bag.types.get(topic) == COMMAND else SHAFT.fewest_samples)
     }
 
 
@@ -131,7 +221,7 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     wrench of zero, which a sender may give in any frame.  One that comes besides is of another sender; of commands that
     are sent now and then it is not known.
     """
-    frames = np.asarray(columns.frames, dtype=str)
+    frames = np.char.lstrip(np.asarray(columns.frames, dtype=str), "/")
     masks = {frame: frames == frame for frame in dict.fromkeys(frames.tolist())}
     most = max(masks.values(), key=np.count_nonzero)
     is_seldom = is_command and np.count_nonzero(most) < SHAFT.fewest_samples
@@ -152,16 +242,15 @@ def _is_besides(time: Numbers, own: Mask) -> bool:
     return bool(np.any(has_others)) and float(np.median(steps[has_others])) < STREAM.absent * float(np.median(steps))
 
 
-def _is_command(topic: str, given: TopicMap) -> bool:
-    return topic in given.commands or bool(COMMAND.search(topic))
-
-
 def alternates(source: Source) -> bool:
     """Whether a quantity jumps back and forth from message to message, as where two publishers share a topic.
 
     No motion does: it would have to be faster than 0.47 of the rate of the messages.
     """
-    for values in source.values.values():
+    for quantity in source.values:
+        values = source.only(quantity).values[quantity]
+        if len(values) < SHAFT.fewest_samples:
+            continue
         once, twice = (float(np.median(np.abs(values[n:] - values[:-n]))) for n in (1, 2))
         if once > STREAM.alternates * twice and once > STREAM.loud * np.finfo(float).eps * float(
             np.max(np.abs(values))
@@ -187,24 +276,52 @@ def _parts(
     ]
 
 
-def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
-    """The source with the values of its own messages that all it has are known in, each stamp once; None if too few."""
-    values = {q: v[own] for q, v in one.values.items()}
-    known = {q: np.isfinite(v) for q, v in values.items()}
-    most = max((int(np.sum(there)) for there in known.values()), default=0)
-    kept = {q: v for q, v in values.items() if 2 * int(np.sum(known[q])) > most > 0}
-    if not kept:
-        return None
-    sparse = {q: share for q, there in known.items() if q not in kept and (share := float(np.sum(there)) / most)}
-    rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
-    rows = rows[np.unique(one.time[rows], return_index=True)[1]]
-    if len(rows) < (1 if one.is_command else SHAFT.fewest_samples):
-        return None
-    values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
-    # a joint may be in some messages of a topic only, a wrench is in all
-    sent = rows if one.is_joint else np.unique(one.sent, return_index=True)[1]
-    one = one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent])
-    return one._replace(values=values, sparse=sparse)
+def _treated(one: Source) -> Source:
+    """The source without wraps and jumps of the zero, and with what is known of its gaps."""
+    values, treated = dict(one.values), list(one.treated)
+    for quantity, value in values.items():
+        if lacking := int(np.sum(~np.isfinite(value))):
+            treated.append(Treated(Treatment.SPARSE, quantity, lacking, len(value)))
+    if "position" in values and one.units["position"] == "rad":
+        known = np.isfinite(values["position"])
+        unwrapped, wraps, turn = _unwrapped(one.time[known], values["position"][known])
+        if wraps:
+            values["position"] = values["position"].copy()
+            values["position"][known] = unwrapped
+            treated.append(Treated(Treatment.WRAPPED, "position", wraps, len(unwrapped), turn))
+    both = one._replace(values=values).only("position", "velocity")
+    if {"position", "velocity"} <= both.values.keys() and not one.is_command:
+        jumps = _jumps(both)
+        if len(sizes := jumps[jumps != 0.0]):
+            whole = np.cumsum(jumps)[np.maximum(np.searchsorted(both.time, one.time, side="right") - 1, 0)]
+            values["position"] = values["position"] - whole
+            treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
+    return one._replace(values=values, treated=tuple(treated))
+
+
+def _unwrapped(time: Numbers, position: Numbers) -> tuple[Numbers, int, float]:
+    """An angle without its wraps, their number and the turn: it stays within a turn and jumps by nearly one."""
+    steps = np.diff(position)
+    for turn in STREAM.turns:
+        jumps = (np.abs(steps) > STREAM.wraps * turn) & ~after_gaps(time)[1:]
+        if np.any(jumps) and np.ptp(position) <= STREAM.within * turn:
+            return np.unwrap(position, period=turn), int(np.sum(jumps)), turn
+    return position, 0, math.nan
+
+
+def _jumps(both: Source) -> Numbers:
+    """By how much the zero of the position moved before each message: what its velocity does not explain, (n,)."""
+    position, velocity = both.values["position"], both.values["velocity"]
+    result = np.zeros(len(position))
+    if len(position) < SHAFT.fewest_samples:
+        return result
+    steps, moved = np.diff(position), 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(both.time)
+    rest = steps - moved
+    usual = np.quantile(np.maximum(np.abs(steps), np.abs(moved)), 1.0 - STREAM.repeated)
+    jumps = (np.abs(rest) > max(STREAM.zero * float(usual), SHAFT.joint_rest)) & ~after_gaps(both.time)[1:]
+    if np.sum(jumps) <= STREAM.repeated * len(steps):
+        result[1:][jumps] = rest[jumps]
+    return result
 
 
 def _labelled(found: list[Source]) -> list[Source]:
@@ -221,8 +338,16 @@ def _labelled(found: list[Source]) -> list[Source]:
     return result
 
 
-def pieces(source: Source) -> list[Piece]:
-    """The stretches of a source between gaps, at a constant rate; velocities made from positions if need be."""
+def pieces(source: Source, *quantities: str) -> list[Piece]:
+    """The stretches of a source between gaps, at a constant rate; velocities made from positions if need be.
+
+    Parameters
+    ----------
+    quantities : which are needed: messages without one of them are left out; all if none is given.
+    """
+    source = source.only(*(quantities or source.values))
+    if len(source.time) < SHAFT.fewest_samples:
+        return []
     period = float(np.median(np.diff(source.time)))
     inner = np.flatnonzero(after_gaps(source.time)).tolist()
     found = []

@@ -16,7 +16,7 @@ STANDARD_OUTPUT = Path("-")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "bag", type=Path, help="directory of the bag, or its file: MCAP, or .bag and .db3 through rosbags"
+        "bag", type=Path, help="directory of the bag, or its file: MCAP, CSV, or .bag and .db3 through rosbags"
     )
     parser.add_argument(
         "--html", type=HTML, metavar="FILE", help="also write one HTML page with pictures; it needs no network"
@@ -66,7 +66,7 @@ def run(given: argparse.Namespace) -> int:
         progress("drawing")
         given.html.write_text(page(analysis), encoding="utf-8")
         progress(f"wrote {given.html}")
-    return 0
+    return int(analysis.has_failed)
 
 
 def _steps(given: argparse.Namespace) -> int:

@@ -1,24 +1,25 @@
-"""`wam experiment`: experiments of the thesis, run over topics in lockstep, recorded, evaluated; their sample bags."""
+"""`wam experiment`: experiments of the thesis, run in lockstep, recorded, evaluated; their sample bags."""
 
 import argparse
 import contextlib
+import os
 import shutil
 import sys
 import time
 from pathlib import Path
 
-from wam_cli.options import PAGE, writable_directory
-from wam_ros.process_signals import Stop
-from wam_studies.experiment_runs import record
+from wam_cli.options import PAGE, bounded, writable_directory
+from wam_ros.bring_up import Composition
+from wam_sim.batch import processes, results
+from wam_sim.progress import Progress
 from wam_studies.figures.panels import draw_panels
-from wam_studies.thesis.definition import Experiment, Run, load, names, tasks
+from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.page import write
-from wam_studies.thesis.rows import Result
 from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
+from wam_studies.thesis.sweeping import RecordedRun, record_run
 
 PICTURE = "result.png"
-SHOWN_EVERY = 0.2  # s
 RECORDED = "recorded"  # in the directory of the samples: what they are cut from, by a path that is the same everywhere
 
 
@@ -44,6 +45,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
     parser.add_argument(
+        "--jobs", type=bounded(int, 1), default=os.cpu_count() or 1, help="processes; default: one for each core"
+    )
+    parser.add_argument(
         "--write", type=PAGE, metavar="PAGE", help="also write tables and pictures into this documentation page"
     )
 
@@ -59,19 +63,13 @@ def run(given: argparse.Namespace) -> int:
     if bool(given.experiment) == given.all:
         raise ValueError("name an experiment, or give --all; --list prints the names")
     writable_directory(str(given.directory))
-    results: dict[str, tuple[Experiment, Result, Path]] = {}
-    chosen = names() if given.all else given.experiment
-    is_one = len(chosen) == 1 and not given.all
-    for number, experiment in enumerate(map(load, chosen), 1):
-        if given.evaluate:
-            directory = given.evaluate if is_one else given.evaluate / experiment.name
-            picture = given.directory / f"{experiment.name}.png"
-        else:
-            name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-            directory = given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}")
-            picture = directory / PICTURE
-            if not _record(experiment, directory, "" if is_one else f"{number}/{len(chosen)} "):
-                return 130
+    chosen = list(map(load, names() if given.all else given.experiment))
+    directories = [_directory(given, one, len(chosen) == 1 and not given.all) for one in chosen]
+    if not given.evaluate:
+        _record(chosen, directories, given.jobs)
+    found = []
+    for experiment, directory in zip(chosen, directories, strict=True):
+        picture = given.directory / f"{experiment.name}.png" if given.evaluate else directory / PICTURE
         result = evaluate(experiment, directory)
         drawn = ""
         if result.panels:
@@ -79,45 +77,29 @@ def run(given: argparse.Namespace) -> int:
             draw_panels(result.panels, picture, 2, f"{experiment.title} (section {experiment.section})")
             drawn = f"picture  {picture}\n"
         print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
-        results[experiment.name] = (experiment, result, picture)
+        found.append((experiment, result, picture))
     if given.write:
-        write(given.write, list(results.values()))
-    return 0 if all(result.agrees for _, result, _ in results.values()) else 1
+        write(given.write, found)
+    return 0 if all(result.agrees for _, result, _ in found) else 1
 
 
-def _record(experiment: Experiment, directory: Path, place: str) -> bool:
-    """Record every run; False where it was interrupted."""
-    stop = Stop()
-    for i, each in enumerate(experiment.runs):
-        play(experiment, each, directory, f"{place}{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
-        if stop.is_set:
-            print(f"stopped; what was recorded until then is in {directory}")
-            return False
-    return True
+def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) -> Path:
+    """Where the bags of an experiment are."""
+    if given.evaluate:
+        return Path(given.evaluate if is_one else given.evaluate / experiment.name)
+    name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    return Path(given.directory / (name if is_one or not given.name else f"{name}/{experiment.name}"))
 
 
-def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: Stop) -> None:
-    """Record one run, with its progress."""
-    shown = [0.0]
-
-    def is_stopped(seconds: float) -> bool:
-        now = time.monotonic()
-        if now >= shown[0]:
-            shown[0] = now + SHOWN_EVERY
-            _show(f"{label}: {seconds:5.1f} of {each.seconds:.1f} s")
-        return stop.is_set
-
-    played = record(experiment, each, directory, is_stopped)
-    ended = f"stopped by the driver: {played.fault}" if played.fault else "done" if played.is_done else "stopped"
-    _show(f"{label}: {ended}", end="\n")
-
-
-def _show(words: str, end: str = "") -> None:
-    """Show the progress: in one line on a terminal, otherwise only the end."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{words}", end=end, file=sys.stderr, flush=True)
-    elif end:
-        print(words, file=sys.stderr, flush=True)
+def _record(chosen: list[Experiment], directories: list[Path], jobs: int) -> None:
+    """Record every run of each experiment into its directory, in processes; progress goes to stderr."""
+    cases = [
+        RecordedRun(experiment, run, str(directory))
+        for experiment, directory in zip(chosen, directories, strict=True)
+        for run in experiment.runs
+    ]
+    with processes(min(jobs, len(cases))) as executor:
+        results(record_run, cases, executor, report=Progress("runs", sys.stderr))
 
 
 def _samples(given: argparse.Namespace) -> int:
@@ -125,8 +107,8 @@ def _samples(given: argparse.Namespace) -> int:
     folder = given.directory
     every = [load(name) for name in given.experiment or [*names(), *tasks()]]
     chosen = [experiment for experiment in every if given.experiment or experiment.sample is not None]
-    if given.samples == "make" and not _make(chosen, folder):
-        return 130
+    if given.samples == "make":
+        _make(chosen, folder)
     entries = read_index(folder)
     wrong = []
     for experiment in chosen:
@@ -146,25 +128,22 @@ def _samples(given: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
-def _make(chosen: list[Experiment], folder: Path) -> bool:
-    """Record, cut and list; False if it was interrupted."""
-    stop = Stop()
+def _make(chosen: list[Experiment], folder: Path) -> None:
+    """Record over topics, with all that nodes publish; cut and list."""
     entries = read_index(folder)
     for experiment in chosen:
         if experiment.sample is None:
             raise ValueError(f"experiment {experiment.name} declares no sample; add one to its YAML")
         recorded = folder / RECORDED / experiment.name
         shutil.rmtree(recorded, ignore_errors=True)
-        play(experiment, experiment.run(experiment.sample.run), recorded, experiment.name, stop)
-        if stop.is_set:
-            return False
+        with Composition(configured(experiment, experiment.run(experiment.sample.run), recorded)) as nodes:
+            nodes.play()
         shutil.rmtree(folder / FOLDER / experiment.name, ignore_errors=True)
         entries[experiment.name] = make(experiment, recorded / experiment.sample.run, folder)
         shutil.rmtree(recorded)
         write_index(folder, entries)
     with contextlib.suppress(OSError):  # where another one's recording was left in it
         (folder / RECORDED).rmdir()
-    return True
 
 
 def _stated(entry: Entry, folder: Path, is_right: bool) -> str:

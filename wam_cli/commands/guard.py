@@ -18,6 +18,7 @@ from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration, packaged
+from wam_description.interface import require_parameters
 from wam_studies.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
@@ -76,6 +77,7 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _assess_configuration(configuration: Configuration) -> int:
+    require_parameters(configuration)
     shared, parameters = configuration.shared, configuration.node("force_loop", ForceLoopParameters)
     report = ForceLoop(shared.model_arm, shared.servo, parameters, shared.timing).report
     width = max(map(len, report.facts))

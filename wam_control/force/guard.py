@@ -144,6 +144,7 @@ class Watch:
     ----------
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
+    largest : factor that is tried at most, so that a `scale` of this size is a least one.
     assessed : contacts of the last assessment, none before the first; another list after each.
     """
 
@@ -160,6 +161,7 @@ class Watch:
         self._least = math.inf
         self._since = math.inf
         self.factor, self.scale = 1.0, found.scale
+        self.largest = GUARD.largest_scale if is_scheduled else self._needed
 
     def step(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if the factor has changed.
@@ -190,8 +192,10 @@ class Watch:
         return self.factor != before
 
     def _tried(self) -> list[float]:
-        top = GUARD.largest_scale if self._is_scheduled else self._needed
-        return [part * top for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else GUARD.scales)]
+        return [
+            part * self.largest
+            for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else GUARD.scales)
+        ]
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
         return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
@@ -237,7 +241,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "guard": mode,
         "domain": str(assessment.domain),
         "margin": _margin(assessment.scale),
-        "margin here": _margin(here),
+        "margin here": _margin(here, watch.largest if watch.assessed else GUARD.largest_scale),
         "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
         if watch.assessed
         else UNKNOWN,
@@ -253,6 +257,6 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
     return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
 
 
-def _margin(scale: float) -> str:
-    """Factor by which the gains may be larger."""
-    return f"more than {GUARD.largest_scale:g}" if scale >= GUARD.largest_scale else f"{scale:.4g}"
+def _margin(scale: float, largest: float = GUARD.largest_scale) -> str:
+    """Factor by which the gains may be larger, of which no more than `largest` was tried."""
+    return f"at least {largest:.4g}" if scale >= largest else f"{scale:.4g}"

@@ -155,10 +155,9 @@ class PostureMotion:
         return [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
 
     def _timed(self, postures: Sequence[list[float]], points: Sequence[PathPoint]) -> list["_Part"]:
-        parts: list[_Part] = []
         rest = [0.0] * len(postures[0])
-        before, rate = 0.0, rest
-        for a, b, point in zip(postures, postures[1:], points, strict=False):
+        before = 0.0
+        for point in points:
             require(
                 point.time > before,
                 f"a point of the trajectory is at {point.time:g} s, after one at {before:g} s; the times have to rise "
@@ -170,18 +169,30 @@ class PostureMotion:
                 f"allowed: {MOTION.shortest:g} to {MOTION.longest:g} s between them",
             )
             self._require_within(1, list(map(abs, point.velocity)) or rest)  # what is far beyond has no polynomial
-            parts.append(part := _Polynomials(a, rate, b, point.velocity or rest, point.time - before))
-            for order in range(1, len(UNITS) + 1):
-                self._require_within(order, part.largest(order))
-            for extreme in part.extremes():
-                self._require_inside(extreme)
-            before, rate = point.time, list(point.velocity) or rest
+            before = point.time
+        rates = [rest, *(list(point.velocity) or rest for point in points)]
+        quintics = _Quintics(postures, rates, [0.0, *(point.time for point in points)])
+        self._require_all(quintics)
+        rate = rates[-1]
         require(
             not any(rate),
             f"the trajectory ends with {max(map(abs, rate)):.3g} rad/s; it has to end at rest: leave out the "
             "velocities of the last point",
         )
-        return parts
+        return quintics.parts()
+
+    def _require_all(self, quintics: "_Quintics") -> None:
+        """Refuse a part whose derivatives or angles are beyond the limits, the first one by name."""
+        allowed = (self._limits.joint_speed, self._limits.joint_acceleration, self._limits.joint_jerk)
+        largest = [quintics.largest(order) for order in range(1, len(allowed) + 1)]
+        is_doubtful = quintics.may_leave(self._joints.lower, self._joints.upper)
+        for found, limit in zip(largest, allowed, strict=True):
+            is_doubtful |= (found > limit).any(axis=1)
+        for part in np.flatnonzero(is_doubtful):
+            for order, found in enumerate(largest, 1):
+                self._require_within(order, found[part].tolist())
+            for extreme in quintics.extremes(int(part)):
+                self._require_inside(extreme)
 
     def _require_there(self, start: Sequence[float], first: PathPoint) -> None:
         for name, angle, begin in zip(self._joints.names, start, first.position, strict=True):
@@ -344,47 +355,106 @@ class _Straight:
 
 
 class _Polynomials:
-    """A polynomial of degree five for each joint, without acceleration at its ends."""
+    """One part of a trajectory: a polynomial for each joint, coefficients (k, n), the lowest order first."""
 
-    def __init__(
-        self, a: Sequence[float], va: Sequence[float], b: Sequence[float], vb: Sequence[float], duration: float
-    ) -> None:
-        self.duration = duration
-        self._orders = [[_quintic(*ends, duration) for ends in zip(a, va, b, vb, strict=True)]]
-        for _ in range(3):
-            self._orders.append([one.deriv() for one in self._orders[-1]])
-        self.fastest = self.largest(1)
+    def __init__(self, coefficients: Array, duration: float, fastest: list[float]) -> None:
+        self._orders = (coefficients, _derivative(coefficients))
+        self.duration, self.fastest = duration, fastest
 
     def at(self, time: float) -> Moving:
-        return Moving(*([float(one(time)) for one in order] for order in self._orders[:2]))
-
-    def largest(self, order: int) -> list[float]:
-        """Largest size of a derivative of each joint."""
-        return [max(abs(float(one(t))) for t in self._turns(one)) for one in self._orders[order]]
-
-    def extremes(self) -> list[list[float]]:
-        """The least and the largest angle of each joint."""
-        found = [[float(one(t)) for t in self._turns(one)] for one in self._orders[0]]
-        return [[min(values) for values in found], [max(values) for values in found]]
-
-    def _turns(self, one: Polynomial) -> list[float]:
-        roots: list[complex] = one.deriv().roots().astype(complex).tolist()
-        real = [r.real for r in roots if abs(r.imag) < MOTION.rounding * (1.0 + abs(r))]
-        return [0.0, self.duration, *(r for r in real if 0.0 < r < self.duration)]
+        return Moving(*(_value(order, time).tolist() for order in self._orders))
 
 
 _Part = _Straight | _Polynomials
 
 
-def _quintic(a: float, va: float, b: float, vb: float, t: float) -> Polynomial:
-    way = b - a
-    return Polynomial(
-        [
+class _Quintics:
+    """Polynomials of degree five of p parts, without acceleration at their ends, for n joints: looked at all at once.
+
+    Parameters
+    ----------
+    postures, rates : at the ends of the parts (p + 1, n), rad and rad/s.
+    times : of these ends (p + 1,), s.
+    """
+
+    def __init__(
+        self, postures: Sequence[Sequence[float]], rates: Sequence[Sequence[float]], times: Sequence[float]
+    ) -> None:
+        angles, speeds = np.array(postures), np.array(rates)
+        self._spans = np.diff(np.array(times))
+        t = self._spans[:, np.newaxis]
+        a, va, vb, way = angles[:-1], speeds[:-1], speeds[1:], np.diff(angles, axis=0)
+        coefficients = [
             a,
             va,
-            0.0,
+            np.zeros_like(a),
             (10.0 * way - (6.0 * va + 4.0 * vb) * t) / t**3,
             (-15.0 * way + (8.0 * va + 7.0 * vb) * t) / t**4,
             (6.0 * way - 3.0 * (va + vb) * t) / t**5,
         ]
-    )
+        self._orders = [np.array(coefficients)]
+        for _ in UNITS:
+            self._orders.append(_derivative(self._orders[-1]))
+        # the control points of a polynomial bound it between its ends
+        self._bounds = np.array(
+            [a, a + va * t / 5.0, a + va * t * 0.4, a + way, a + way - vb * t / 5.0, a + way - vb * t * 0.4]
+        )
+
+    def parts(self) -> list[_Part]:
+        """The parts, one by one."""
+        fastest = self.largest(1).tolist()
+        return [
+            _Polynomials(self._orders[0][:, i], float(span), fastest[i]) for i, span in enumerate(self._spans.tolist())
+        ]
+
+    def largest(self, order: int) -> Array:
+        """Largest size of a derivative of the order 1 to 3 in each part (p, n)."""
+        one = self._orders[order]
+        slope = self._orders[order + 1] if order < len(UNITS) else _derivative(one)
+        # the slope of the speed is 0 at the start of a part, so that a quadratic remains
+        turns = _roots(*(slope[1:] if order == 1 else slope))
+        spans = self._spans[:, np.newaxis] + np.zeros_like(one[0])
+        sizes = [
+            np.abs(_value(one, t)) for t in (np.zeros_like(spans), spans, *(np.clip(t, 0.0, spans) for t in turns))
+        ]
+        largest: Array = np.max(sizes, axis=0)
+        return largest
+
+    def may_leave(self, lower: Sequence[float], upper: Sequence[float]) -> NDArray[np.bool_]:
+        """Which parts (p,) may leave the limits (n,), rad, between their ends."""
+        return np.asarray(((self._bounds < lower) | (self._bounds > upper)).any(axis=(0, 2)))
+
+    def extremes(self, part: int) -> list[list[float]]:
+        """The least and the largest angle of each joint in a part, rad."""
+        span = float(self._spans[part])
+        found = []
+        for one in self._orders[0][:, part].T:
+            roots: list[complex] = Polynomial(one).deriv().roots().astype(complex).tolist()
+            real = [r.real for r in roots if abs(r.imag) < MOTION.rounding * (1.0 + abs(r))]
+            found.append([float(_value(one, t)) for t in (0.0, span, *(r for r in real if 0.0 < r < span))])
+        return [[min(values) for values in found], [max(values) for values in found]]
+
+
+def _derivative(coefficients: Array) -> Array:
+    """Of polynomials, coefficients (k, ...), the lowest order first."""
+    factors = np.arange(1, len(coefficients)).reshape(-1, *[1] * (coefficients.ndim - 1))
+    derived: Array = factors * coefficients[1:]
+    return derived
+
+
+def _value(coefficients: Array, t: Array | float) -> Array:
+    """Of polynomials, coefficients (k, ...), at a time."""
+    value: Array = coefficients[-1] + 0.0 * t
+    for one in coefficients[-2::-1]:
+        value = one + value * t
+    return value
+
+
+def _roots(c: Array, b: Array, a: Array | float = 0.0) -> tuple[Array, ...]:
+    """Real roots of a t^2 + b t + c; 0 in place of one that there is not."""
+    with np.errstate(all="ignore"):
+        # the form without cancellation, which also has the root where a is 0
+        half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
+        return np.nan_to_num(c / half, nan=0.0, posinf=0.0, neginf=0.0), np.nan_to_num(
+            half / a, nan=0.0, posinf=0.0, neginf=0.0
+        )

@@ -3,4 +3,9 @@
 - frames: requests, packed torques and replies as bytes
 - properties: numbers of the controllers' properties by firmware
 - safety_module: its modes, and what the pendant shows
+- line: python-can and a clock
+- start_up: finds, wakes, checks and zeroes the controllers
+- bus_fault: what is wrong, as data
+- arm_bus: the driver, one call per period
+- simulator: controllers, safety module and a person, in bus time
 """

@@ -5,15 +5,32 @@ only.
 """
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from enum import IntEnum
+from typing import NamedTuple
 
-HOST: Final = 0
-SAFETY_MODULE: Final = 10
-TORQUE_GROUPS: Final = (1, 2)  # controllers 1 to 4 and 5 to 7
-ALL_MOTORS: Final = 4
-POSITION_GROUP, VALUE_GROUP = 3, 6  # that replies are sent to
-GROUP, WRITE = 0x400, 0x80
-LARGEST_TORQUE: Final = 8191  # counts, of 14 bits
+
+class Node(IntEnum):
+    """Nodes that are no motor controllers, which have 1 to 7."""
+
+    HOST = 0
+    SAFETY_MODULE = 10
+
+
+class Group(IntEnum):
+    """Groups of nodes that take a frame."""
+
+    ARM = 1  # torques of the controllers 1 to 4
+    WRIST = 2  # torques of the controllers 5 to 7
+    POSITIONS = 3  # replies
+    MOTORS = 4
+    VALUES = 6  # replies
+
+
+class Bit(IntEnum):
+    """Bits of an identifier, and of the first byte."""
+
+    GROUP = 0x400
+    WRITE = 0x80
 
 
 class Frame(NamedTuple):
@@ -35,7 +52,7 @@ class Frame(NamedTuple):
     @property
     def is_to_group(self) -> bool:
         """Whether the receiver is a group."""
-        return bool(self.identifier & GROUP)
+        return bool(self.identifier & Bit.GROUP)
 
 
 class Value(NamedTuple):
@@ -55,18 +72,18 @@ class Position(NamedTuple):
 
 
 def get(receiver: int, number: int, group: int = 0) -> Frame:
-    """Ask a node for a property, or all nodes of a group with `group=GROUP`."""
+    """Ask a node for a property, or all nodes of a group with `group=Bit.GROUP`."""
     return Frame(group | receiver, bytes([number]))
 
 
 def put(receiver: int, number: int, value: int, group: int = 0) -> Frame:
     """Write a property of a node, signed 32 bits; nobody acknowledges it."""
-    return Frame(group | receiver, bytes([WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
+    return Frame(group | receiver, bytes([Bit.WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
 
 
 def reply(node: int, number: int, value: int) -> Frame:
     """The answer of a node to `get`."""
-    return put(VALUE_GROUP, number, value, GROUP | node << 5)
+    return put(Group.VALUES, number, value, Bit.GROUP | node << 5)
 
 
 def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
@@ -75,7 +92,7 @@ def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
     for count in counts:
         packed = packed << 14 | count & 0x3FFF
     packed <<= 14 * (4 - len(counts))
-    return Frame(GROUP | group, bytes([WRITE | number]) + packed.to_bytes(7, "big"))
+    return Frame(Bit.GROUP | group, bytes([Bit.WRITE | number]) + packed.to_bytes(7, "big"))
 
 
 def read_torques(frame: Frame) -> list[int]:
@@ -88,18 +105,18 @@ def position(node: int, motor: int, joint: int | None = None) -> Frame:
     """The answer of a controller to `get` of its position."""
     counts = [motor] if joint is None else [motor, joint]
     data = b"".join((count & 0x3FFFFF).to_bytes(3, "big") for count in counts)
-    return Frame(GROUP | node << 5 | POSITION_GROUP, data)
+    return Frame(Bit.GROUP | node << 5 | Group.POSITIONS, data)
 
 
 def read(frame: Frame) -> Value | Position | None:
     """What a node has answered; None for any other frame."""
     data, size = frame.data, len(frame.data)
-    to = frame.identifier & (GROUP | 31)
-    if to == GROUP | POSITION_GROUP and size in (3, 6):
+    to = frame.identifier & (Bit.GROUP | 31)
+    if to == Bit.GROUP | Group.POSITIONS and size in (3, 6):
         counts = [_signed(int.from_bytes(data[at : at + 3], "big"), 22) for at in range(0, size, 3)]
         return Position(frame.sender, counts[0], counts[1] if size > 3 else None)
-    if to == GROUP | VALUE_GROUP and size in (4, 6) and data[0] & WRITE:
-        return Value(frame.sender, data[0] & ~WRITE, int.from_bytes(data[2:], "little", signed=True))
+    if to == Bit.GROUP | Group.VALUES and size in (4, 6) and data[0] & Bit.WRITE:
+        return Value(frame.sender, data[0] & ~Bit.WRITE, int.from_bytes(data[2:], "little", signed=True))
     return None
 
 

@@ -4,8 +4,14 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 WATCHED: Final = ("velocity", "torque", "voltage", "heartbeat", "other")  # three bits each, from bit 0
-WARNING, FAULT = 2, 4  # of the three
-BUTTON_SHIFT: Final = 26
+
+
+class Lamp(IntEnum):
+    """Of a watched quantity, one of three bits."""
+
+    SAFE = 1
+    WARNING = 2
+    FAULT = 4
 
 
 class SafetyMode(IntEnum):
@@ -42,14 +48,14 @@ class Pendant(NamedTuple):
     def of(cls, value: int) -> "Pendant":
         """From the property PEN."""
         lamps = {name: value >> 3 * at & 7 for at, name in enumerate(WATCHED)}
-        lit = [tuple(name for name, lamp in lamps.items() if lamp & bit) for bit in (WARNING, FAULT)]
-        return cls(Button(value >> BUTTON_SHIFT & 3), *lit)
+        lit = [tuple(name for name, lamp in lamps.items() if lamp & bit) for bit in (Lamp.WARNING, Lamp.FAULT)]
+        return cls(Button(value >> 26 & 3), *lit)
 
     @property
     def value(self) -> int:
         """As the property PEN, without the segments and the lamps of the buttons."""
-        value = int(self.button) << BUTTON_SHIFT
+        value = int(self.button) << 26
         for at, name in enumerate(WATCHED):
-            lamp = FAULT if name in self.faults else WARNING if name in self.warnings else 1
+            lamp = Lamp.FAULT if name in self.faults else Lamp.WARNING if name in self.warnings else Lamp.SAFE
             value |= lamp << 3 * at
         return value

@@ -10,7 +10,6 @@ from wam_sim import batch
 from wam_studies.figures import (
     backdrivability,
     closed_forms,
-    friction_claims,
     inner_loops,
     open_loop,
     reducer,
@@ -43,13 +42,6 @@ FIGURES: dict[str, ThesisFigure] = {
         ("4.5", "Where the reducer is, and the torque that bandwidth by feedback costs.", reducer.reducer),
         ("4.9", "Open-loop force bandwidth versus contact stiffness.", closed_forms.breakpoints),
         ("5.3", "Step response with a simple transmission.", responses.simple_responses),
-        ("5.4-start", "Asymmetric start of the stiction cycle.", friction_claims.asymmetric_start),
-        (
-            "5.5.1-harmonics",
-            "Harmonics that the describing function neglects, and the cycles it has and has not.",
-            friction_claims.harmonics_of_friction,
-        ),
-        ("5.5.2-contact", "Step down that loses contact.", friction_claims.kept_contact),
         ("5.5", "Step response in a nearly-inertialess transmission with stiction.", responses.staircase),
         ("5.7", "SIDF analysis: complex plot of -1/N(A) and G(jω) for two G_I.", stability.describing_function),
         ("5.8", "Extended stability region for a system with Coulomb friction.", stability.stability_bound),

@@ -52,12 +52,6 @@ class FigureConditions:
     gain_share: float = 0.5  # of the largest stable gain
     first_gain_scale: float = 1e3  # scale at which the search of the largest gain begins
 
-    # 5.4 to 5.5.2, in words
-    stiffness: float = 2.0  # k_tr = k_c
-    static_friction: float = 1.3  # F_static where there is stiction; F_dynamic is 1
-    zetas: tuple[float, ...] = (0.02, 0.25, 0.6)  # damping of the node
-    harmonics: tuple[float, ...] = (3.0, 5.0, 7.0)  # orders that the describing function neglects
-
     # 4.5
     speed_change: float = 0.5  # s, in which the link comes to rest under its damping
 

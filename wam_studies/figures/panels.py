@@ -168,7 +168,9 @@ def _name(axes: Axes, mark: Mark) -> None:
     if math.isnan(mark.y):
         axes.axvline(mark.x, color=GREY, linewidth=0.7, linestyle=":")
         across = axes.get_xaxis_transform()
-        axes.text(mark.x, 0.5, mark.text, transform=across, fontsize=7.5, color=GREY, rotation=90, ha="right")
+        axes.text(
+            mark.x, 0.1, mark.text, transform=across, fontsize=7.5, color=GREY, rotation=90, ha="right", in_layout=False
+        )
     elif math.isnan(mark.x):
         axes.axhline(mark.y, color=GREY, linewidth=0.7, linestyle=":")
         axes.text(0.6, mark.y, mark.text, transform=axes.get_yaxis_transform(), fontsize=7.5, color=GREY)

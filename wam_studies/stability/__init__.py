@@ -1,5 +1,5 @@
 """Studies of stability.
 
 guard_validation   the stability guard validated by Monte Carlo simulation (`wam evaluate guard`)
-map_picture        figure 5.8 with a loop of your own on it
+map_picture        the bound of figure 5.8 with a loop on it
 """

@@ -10,7 +10,7 @@ import numpy as np
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.tasks.object_traces import ObjectTrace, object_traces, world_of
 from wam_studies.thesis.recording import Forces, Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, below, near, noted
 
 NO_CLAIM = math.nan
 
@@ -44,14 +44,12 @@ def pushing(runs: Runs) -> Result:
     slides = pushed.during(*_sliding(pushed))
     along, lift = float(slides.arm_force[:, 0].mean()), float(slides.arm_force[:, 2].mean())
     rows = [
-        Comparison("press 4 N, true force across", 4.0, _across(run, press), "N", BOUNDS.slipped, "commanded"),
-        Comparison("press 4 N, the box moves", 0.0, _moved(pressed), "m", BOUNDS.still, "friction holds", True),
-        Comparison(
-            "horizontal force while it slides, mean", friction * (weight - lift), along, "N", BOUNDS.force, "mu N"
-        ),
-        Comparison("weight carried by the table", weight - lift, _mean_size(slides, 2), "N", 0.02, "m g - lift"),
-        Comparison("distance pushed", NO_CLAIM, _moved(pushed), "m", NO_CLAIM),
-        Comparison("aside of the push", 0.0, float(np.ptp(pushed.position[:, 1])), "m", 0.01, "straight", True),
+        near("press 4 N, true force across", 4.0, _across(run, press), "N", "commanded", BOUNDS.slipped),
+        below("press 4 N, the box moves", _moved(pressed), "m", BOUNDS.still, "friction holds"),
+        near("horizontal force while it slides, mean", friction * (weight - lift), along, "N", "mu N", BOUNDS.force),
+        near("weight carried by the table", weight - lift, _mean_size(slides, 2), "N", "m g - lift", 0.02),
+        noted("distance pushed", _moved(pushed), "m"),
+        below("aside of the push", np.ptp(pushed.position[:, 1]), "m", 0.01, "straight"),
         *_estimate(run, push),
     ]
     return Result(rows, [_forces(run, press.begin, push.end), _path({"box": pushed}, 0)])
@@ -67,10 +65,10 @@ def sweeping(runs: Runs) -> Result:
     calm = max(float(np.linalg.norm(trace.velocity[-1])) for trace in swept.values())
     rows = [
         Comparison("objects that the link takes along", float(len(objects)), float(moved), "", 0.0, "all"),
-        Comparison("angle about the base over all objects, before", NO_CLAIM, before, "rad", NO_CLAIM),
-        Comparison("the same, after, of that before", 0.0, after / before, "", BOUNDS.together, "together", True),
-        Comparison("speed of the fastest, after", 0.0, calm, "m/s", 0.01, "at rest", True),
-        Comparison("largest true force of the arm", NO_CLAIM, _largest(swept), "N", NO_CLAIM),
+        noted("angle about the base over all objects, before", before, "rad"),
+        below("the same, after, of that before", after / before, "", BOUNDS.together, "together"),
+        below("speed of the fastest, after", calm, "m/s", 0.01, "at rest"),
+        noted("largest true force of the arm", _largest(swept), "N"),
         *_estimate(run, sweep),
     ]
     return Result(rows, [_forces(run, sweep.begin, rest.end), _path(swept, 1)])
@@ -89,15 +87,13 @@ def holding(runs: Runs) -> Result:
     start, lowered = (objects[name].during(press.begin + 1.0, press.end) for name in ("tube", "shelf"))
     capacity = squeeze * (bodies.friction[0] + bodies.ground_friction[0])
     rows = [
-        Comparison("true force across the tube", 15.0, squeeze, "N", BOUNDS.force, "commanded"),
-        Comparison("weight carried by friction", weight, carried, "N", 0.02, "m g"),
-        Comparison("of it by the link", NO_CLAIM, lift, "N", NO_CLAIM),
-        Comparison("friction that is needed", NO_CLAIM, weight / capacity, "of what 15 N give", NO_CLAIM),
-        Comparison("shelf lowered by", NO_CLAIM, float(np.ptp(objects["shelf"].position[:, 2])), "m", NO_CLAIM),
-        Comparison("force of the shelf, after", 0.0, float(np.abs(shelf.other_force).max()), "N", 1e-6, "", True),
-        Comparison(
-            "the tube sinks", 0.0, float(np.ptp(start.position[:, 2])), "m", 2 * BOUNDS.still, "friction holds", True
-        ),
+        near("true force across the tube", 15.0, squeeze, "N", "commanded", BOUNDS.force),
+        near("weight carried by friction", weight, carried, "N", "m g", 0.02),
+        noted("of it by the link", lift, "N"),
+        noted("friction that is needed", weight / capacity, "of what 15 N give"),
+        noted("shelf lowered by", np.ptp(objects["shelf"].position[:, 2]), "m"),
+        below("force of the shelf, after", np.abs(shelf.other_force).max(), "N", 1e-6),
+        below("the tube sinks", np.ptp(start.position[:, 2]), "m", 2 * BOUNDS.still, "friction holds"),
         *_estimate(run, press),
     ]
     return Result(rows, [_forces(run, press.begin, press.end), _path({"tube": start, "shelf": lowered}, 2)])
@@ -114,18 +110,18 @@ def opening(runs: Runs) -> Result:
     error = float(np.sqrt(np.mean((torque - predicted)[turning] ** 2)))
     held = door.late(hold, BOUNDS.steady)
     rows = [
-        Comparison(
+        near(
             "torque on the hinge while it turns, mean",
             mean,
-            float(torque[turning].mean()),
+            torque[turning].mean(),
             "N m",
-            BOUNDS.closed_form,
             "I a + d w + k phi + friction",
+            BOUNDS.closed_form,
         ),
-        Comparison("the same, rms difference", 0.0, error, "N m", 0.05, "", True),
-        Comparison("angle of the door, held", NO_CLAIM, float(held.angle.mean()), "rad", NO_CLAIM),
-        Comparison("angle of the door, changes while held", 0.0, float(np.ptp(held.angle)), "rad", 0.01, "", True),
-        Comparison("largest true force of the arm", NO_CLAIM, _largest({"door": open_}), "N", NO_CLAIM),
+        below("the same, rms difference", error, "N m", 0.05),
+        noted("angle of the door, held", held.angle.mean(), "rad"),
+        below("angle of the door, changes while held", np.ptp(held.angle), "rad", 0.01),
+        noted("largest true force of the arm", _largest({"door": open_}), "N"),
         *_estimate(run, step),
     ]
     curves = [
@@ -145,13 +141,13 @@ def following(runs: Runs) -> Result:
     force = _along(run.forces("sim/contact/wrench"), follow.begin + 1.0, follow.end)
     speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
     rows = [
-        Comparison("at rest, true force across", 10.0, _across(run, press), "N", BOUNDS.force, "commanded"),
-        Comparison("moving, mean", 10.0, float(force.mean()), "N", BOUNDS.force, "commanded"),
-        Comparison("moving, rms error", 0.0, float(np.sqrt(np.mean((force - 10.0) ** 2))), "N", 1.0, "", True),
-        Comparison("moving, largest error", 0.0, float(np.abs(force - 10.0).max()), "N", 2.0, "", True),
-        Comparison("time without contact", 0.0, float(np.mean(force == 0.0)), "of the time", 0.0, "never", True),
-        Comparison("motion of the surface", NO_CLAIM, float(np.ptp(surface.position[:, 2])), "m", NO_CLAIM),
-        Comparison("largest speed of the surface", NO_CLAIM, speed, "m/s", NO_CLAIM),
+        near("at rest, true force across", 10.0, _across(run, press), "N", "commanded", BOUNDS.force),
+        near("moving, mean", 10.0, force.mean(), "N", "commanded", BOUNDS.force),
+        below("moving, rms error", np.sqrt(np.mean((force - 10.0) ** 2)), "N", 1.0),
+        below("moving, largest error", np.abs(force - 10.0).max(), "N", 2.0),
+        below("time without contact", np.mean(force == 0.0), "of the time", 0.0, "never"),
+        noted("motion of the surface", np.ptp(surface.position[:, 2]), "m"),
+        noted("largest speed of the surface", speed, "m/s"),
         *_estimate(run, follow),
     ]
     return Result(rows, [_forces(run, press.begin, follow.end), _path({"surface": surface}, 2)])

@@ -10,7 +10,7 @@ from wam_bag.bag import BagError, PointColumns
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Forces, Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, below, near
 
 NO_CONTACT = "base"  # frame of a contact wrench without contact
 
@@ -38,23 +38,21 @@ def pressing(runs: Mapping[str, Recording]) -> Result:
         # the last half of that time: before it the joints may still stick and slip
         rest = (found.time > step.end - 0.5 * BOUNDS.steady_press) & (found.time < step.end)
         rows += [
-            Comparison(f"{step.name}, true", force, true, "N", BOUNDS.force_at_rest, "no error, 5.1.2"),
-            Comparison(
+            near(f"{step.name}, true", force, true, "N", "no error, 5.1.2", BOUNDS.force_at_rest),
+            near(
                 f"{step.name}, estimated",
                 true,
                 estimated,
                 "N",
-                max(BOUNDS.estimate, BOUNDS.smallest_estimate_error / force),
                 "chapter 2",
+                max(BOUNDS.estimate, BOUNDS.smallest_estimate_error / force),
             ),
-            Comparison(
+            below(
                 f"{step.name}, peak to peak",
-                0.0,
-                float(np.ptp(found.true[rest])),
+                np.ptp(found.true[rest]),
                 "N",
                 max(BOUNDS.arm_cycle * force, BOUNDS.single_slip),
                 "no cycle",
-                True,
             ),
         ]
     rows.append(_position(run, _named(run, "press")))
@@ -73,21 +71,9 @@ def sliding(runs: Mapping[str, Recording]) -> Result:
         true = found.true[during]
         error = float(np.sqrt(np.mean((found.estimated[during] - true) ** 2)))
         rows += [
-            Comparison(
-                f"{step.name}, true, mean", force, float(true.mean()), "N", BOUNDS.force_at_rest, "no error, 5.1.2"
-            ),
-            Comparison(
-                f"{step.name}, largest error",
-                0.0,
-                float(np.abs(true - force).max()),
-                "N",
-                BOUNDS.force_sliding * force,
-                "",
-                True,
-            ),
-            Comparison(
-                f"{step.name}, error of the estimate, rms", 0.0, error, "N", BOUNDS.estimate * force, "chapter 2", True
-            ),
+            near(f"{step.name}, true, mean", force, true.mean(), "N", "no error, 5.1.2", BOUNDS.force_at_rest),
+            below(f"{step.name}, largest error", np.abs(true - force).max(), "N", BOUNDS.force_sliding * force),
+            below(f"{step.name}, error of the estimate, rms", error, "N", BOUNDS.estimate * force, "chapter 2"),
         ]
     rows.append(_position(run, steps))
     every = [*_named(run, "press"), *steps, *_named(run, "rest")]
@@ -105,10 +91,8 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
             force, true = float(found.commanded[late].mean()), found.true[late]
             label = f"{name}, {step.name} at {place:.2f} m"
             rows += [
-                Comparison(f"{label}, true", force, float(true.mean()), "N", BOUNDS.force_along_link, "7.3"),
-                Comparison(
-                    f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", BOUNDS.force_along_link * force, "", True
-                ),
+                near(f"{label}, true", force, true.mean(), "N", "7.3", BOUNDS.force_along_link),
+                below(f"{label}, peak to peak", np.ptp(true), "N", BOUNDS.force_along_link * force),
                 Comparison(
                     f"{label}, estimated",
                     float(true.mean()),
@@ -158,7 +142,7 @@ def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
             late = (time > step.end - BOUNDS.steady_press) & (time < step.end)
             means.append(float(np.nanmean(position[late])))
         errors.append(abs(means[1] - means[0]))
-    return Comparison("position error, worst step", 0.0, max(errors), "m", BOUNDS.position, "chapter 2", True)
+    return below("position error, worst step", max(errors), "m", BOUNDS.position, "chapter 2")
 
 
 def _positions(run: Recording, topic: str) -> tuple[Numbers, Numbers]:
@@ -204,22 +188,12 @@ def pushed(runs: Mapping[str, Recording]) -> Result:
     quiet = estimate.time < begin
     before = float(np.mean([bool(frame) and frame != NO_CONTACT for frame in np.array(estimate.frames)[quiet]]))
     rows = [
-        Comparison(
-            "detections before the push, fraction of the time", 0.0, before, "", BOUNDS.wrong_link, "chapter 2", True
+        below("detections before the push, fraction of the time", before, "", BOUNDS.wrong_link, "chapter 2"),
+        below(
+            "detection latency", float(first[0]) - begin if len(first) else math.nan, "s", BOUNDS.latency, "chapter 2"
         ),
-        Comparison(
-            "detection latency",
-            0.0,
-            float(first[0]) - begin if len(first) else math.nan,
-            "s",
-            BOUNDS.latency,
-            "chapter 2",
-            True,
-        ),
-        Comparison(
-            f"detection on {link}, fraction of the time after that", 1.0, correct, "", BOUNDS.wrong_link, "chapter 2"
-        ),
-        Comparison("force, mean", true, estimated, "N", BOUNDS.push_in_motion, "chapter 2"),
+        near(f"detection on {link}, fraction of the time after that", 1.0, correct, "", "chapter 2", BOUNDS.wrong_link),
+        near("force, mean", true, estimated, "N", "chapter 2", BOUNDS.push_in_motion),
         Comparison("position, median", positions[0], positions[1], "m", BOUNDS.position, "chapter 2", True),
     ]
     force = [np.linalg.norm(each.force, axis=1) for each in (truth, estimate)]

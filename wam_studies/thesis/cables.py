@@ -9,7 +9,7 @@ from wam_description.arm import Arm
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, near
 from wam_theory import cable
 
 
@@ -24,16 +24,7 @@ def efficiency(runs: Mapping[str, Recording]) -> Result:
         torque, input_work, output_work = work(run, step, after)
         predicted = 1.0 - cable.efficiency(_losses(arm, torque))
         lost = 1.0 - output_work / input_work
-        rows.append(
-            Comparison(
-                f"power lost, {torque:.2f} N m at the motor",
-                100 * predicted,
-                100 * lost,
-                "%",
-                BOUNDS.within,
-                "(6.15)",
-            )
-        )
+        rows.append(near(f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * lost, "%", "(6.15)"))
         torques.append(torque)
         losses.append(lost)
         predictions.append(predicted)
@@ -88,9 +79,7 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
         if step.name.startswith("rest"):
             at = int(np.searchsorted(time, step.end - BOUNDS.rounding)) - 1
             label = f"creep after {travel[at]:.1f} rad of the motor, {step.name.removeprefix('rest ')}"
-            rows.append(
-                Comparison(label, float(1e3 * predicted[at]), float(1e3 * creep[at]), "mrad", BOUNDS.within, "(6.19)")
-            )
+            rows.append(near(label, 1e3 * predicted[at], 1e3 * creep[at], "mrad", "(6.19)"))
     curves = [("measured", measured(travel, 1e3 * creep)), ("(6.19)", line_only(travel, 1e3 * predicted))]
     remark = "with the printed signed differential, (6.19) would be zero after each return"
     return Result(

@@ -9,7 +9,7 @@ from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link, response, set_until
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.stiction import play
 
 
@@ -37,18 +37,14 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     desired, force = _fed_forward(run, link)
     expected = play(desired, friction)
     begin = float(desired[np.argmax(force > BOUNDS.least_contact)])
-    rows = [
-        Comparison(
-            "deadband, F_des at which F_c begins", friction, begin - BOUNDS.least_contact, "N", BOUNDS.within, "5.2"
-        )
-    ]
+    rows = [near("deadband, F_des at which F_c begins", friction, begin - BOUNDS.least_contact, "N", "5.2")]
     times = run.joints("joint_sensors").time
     for step in run.steps:
         last = int(np.searchsorted(times, step.end)) - 1
         label = f"F_c at {desired[last]:.0f} N, {step.name}"
-        rows.append(Comparison(label, float(expected[last]), float(force[last]), "N", BOUNDS.within, "5.2"))
+        rows.append(near(label, expected[last], force[last], "N", "5.2"))
     worst = float(np.abs(force - expected).max() / expected.max())
-    rows.append(Comparison("largest difference", 0.0, worst, "of F_c", BOUNDS.within, "5.2", True))
+    rows.append(below("largest difference", worst, "of F_c", BOUNDS.within, "5.2"))
     each = slice(None, None, 40)
     curves = [("measured", measured(desired[each], force[each])), ("play", line_only(desired, expected))]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
@@ -88,9 +84,7 @@ def active_pretension(runs: Mapping[str, Recording]) -> Result:
                 "c (T1 + T2)",
                 True,
             ),
-            Comparison(
-                f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", BOUNDS.within, "slack strand"
-            ),
+            near(f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", "slack strand"),
         ]
         curves.append((label, measured(desired[::20], force[::20])))
     return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
@@ -113,4 +107,4 @@ def _calibration(name: str, run: Recording, link: OneLink, force: Numbers) -> Co
     """Settled force of a loop that knows another stiffness of its spring: F_des k/k_known."""
     known = run.node("force_loop", ForceLoopParameters).spring_stiffness[0]
     expected = desired_force(run, run.steps[0].begin) * link.node.contact_stiffness / known
-    return Comparison(f"settled force, {name}", expected, float(force.mean()), "N", BOUNDS.within, "2.2")
+    return near(f"settled force, {name}", expected, force.mean(), "N", "2.2")

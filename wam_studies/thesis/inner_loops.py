@@ -11,7 +11,7 @@ from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, growth, joint_stiffness, one_link, response
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, near
 
 FRICTION = ("torque_fed_forward", "torque_loop", "position_loop")  # runs with friction at the motor
 
@@ -46,11 +46,7 @@ def friction_left(runs: Runs) -> Result:
         rising = np.interp(middle, command[there], shown.force[there], math.nan, math.nan)
         falling = np.interp(middle, command[again][::-1], shown.force[again][::-1], math.nan, math.nan)
         expected = friction * _part_left(run, link)
-        rows.append(
-            Comparison(
-                f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", BOUNDS.within, "2.1.2"
-            )
-        )
+        rows.append(near(f"{label}, friction left", expected, 0.5 * (falling - rising), "N", "2.1.2"))
         curves.append((label, measured(command[::20], shown.force[::20])))
     panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
     return Result(rows, [panel])
@@ -96,7 +92,7 @@ def _largest(label: str, below: Recording, above: Recording) -> Comparison:
     (first, gain), (second, other) = ((_growth(run), _gain(run)) for run in (below, above))
     measured = gain + (other - gain) * first / (first - second) if first < second else math.nan
     unit = "" if _has(below, "torque_loop") else "N m/rad"
-    return Comparison(label, _expected(below), measured, unit, BOUNDS.within, "sampled loop")
+    return near(label, _expected(below), measured, unit, "sampled loop")
 
 
 def _expected(run: Recording) -> float:

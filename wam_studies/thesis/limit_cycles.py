@@ -17,7 +17,7 @@ from wam_studies.thesis.one_link import (
     response,
 )
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cycle_work
 from wam_theory.stick_slip import assess, simulate
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, stiction_cycle_period
@@ -33,8 +33,8 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
     force = float(rows[0].predicted)
     exact, curve = _exact(run, link, shown)
     rows += [
-        Comparison("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", BOUNDS.within, "integrator"),
-        Comparison("period, exact", exact.period, found.period, "s", BOUNDS.within, "integrator"),
+        near("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", "integrator"),
+        near("period, exact", exact.period, found.period, "s", "integrator"),
     ]
     curves = [("without deadband", measured(shown.time, shown.force)), curve]
     rows += _with_deadband(runs["with_deadband"], force)
@@ -63,8 +63,8 @@ def _closed_form(link: OneLink, found: CycleExtent) -> tuple[list[Comparison], s
     force = float(stiction_cycle_force(*stiffness, *friction, link.zeta)) / link.lever
     period = float(stiction_cycle_period(gain, *stiffness, *friction, link.zeta))
     rows = [
-        Comparison("F_c peak to peak", force, found.peak_to_peak, "N", BOUNDS.neglected * number, "(5.8)"),
-        Comparison("period", period, found.period, "s", BOUNDS.neglected * number, "(5.9)"),
+        near("F_c peak to peak", force, found.peak_to_peak, "N", "(5.8)", BOUNDS.neglected * number),
+        near("period", period, found.period, "s", "(5.9)", BOUNDS.neglected * number),
     ]
     return rows, f"(5.8) and (5.9) hold for (5.11) far below 1; here it is {number:.3f}"
 
@@ -77,11 +77,9 @@ def _with_deadband(run: Recording, force: float) -> list[Comparison]:
     deadband = link.loop.deadband / link.lever
     rest = abs(desired_force(run, shown.time[0]) - float(late[-1]))
     return [
-        Comparison("deadband that removes it", 0.5 * force, deadband, "N", BOUNDS.within, "(5.7), (5.8)"),
-        Comparison(
-            "remaining peak to peak with it", 0.0, float(np.ptp(late)), "N", BOUNDS.within * force, "(5.7)", True
-        ),
-        Comparison("remaining error with it", 0.0, rest, "N", deadband, "(5.7)", True),
+        near("deadband that removes it", 0.5 * force, deadband, "N", "(5.7), (5.8)"),
+        below("remaining peak to peak with it", np.ptp(late), "N", BOUNDS.within * force, "(5.7)"),
+        below("remaining error with it", rest, "N", deadband, "(5.7)"),
     ]
 
 
@@ -118,30 +116,27 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
     swing = float(actuator_cycle(node.dynamic_friction, node.transmission_stiffness, link.gamma, link.zeta))
     work, power, error, half = half_cycle_work(run, link, shown)
     rows = [
-        Comparison("motor at the joint, peak to peak", swing, found.peak_to_peak, "rad", BOUNDS.within, "(5.20)"),
-        Comparison(
+        near("motor at the joint, peak to peak", swing, found.peak_to_peak, "rad", "(5.20)"),
+        near(
             "work of a half cycle",
-            float(actuator_cycle_work(node.dynamic_friction, node.transmission_stiffness)),
+            actuator_cycle_work(node.dynamic_friction, node.transmission_stiffness),
             work,
             "N m",
-            BOUNDS.within,
             "(5.21)",
         ),
-        Comparison(
+        near(
             f"power of a half cycle of {half:.2f} s",
-            float(actuator_cycle_power(link.loop.gain, error, node.dynamic_friction)),
+            actuator_cycle_power(link.loop.gain, error, node.dynamic_friction),
             power,
             "W",
-            0.05,
             "(5.22)",
+            0.05,
         ),
-        Comparison(
+        below(
             "contact force, remaining error",
-            0.0,
-            float(np.abs(shown.force[-1] - desired_force(run, shown.time[0]))),
+            np.abs(shown.force[-1] - desired_force(run, shown.time[0])),
             "N",
             BOUNDS.within * desired_force(run, shown.time[0]),
-            absolute=True,
         ),
     ]
     exact = simulate(node, link.loop, desired_force(run, shown.time[0]) * link.lever, float(np.ptp(shown.time)))

@@ -11,7 +11,7 @@ from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, desired_force, one_link
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Result, below, near
 from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
 
 Runs = Mapping[str, Recording]
@@ -28,29 +28,25 @@ def quantised(runs: Runs) -> Result:
     node = link.node
     natural = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     rows = [
-        Comparison("no friction, F_c", middle, float(force[late].mean()), "N", BOUNDS.within, "between two steps"),
-        Comparison("no friction, error of F_c", 0.0, float(force[late].mean()) - desired, "N", 0.5 * level, "", True),
-        Comparison(
+        near("no friction, F_c", middle, force[late].mean(), "N", "between two steps"),
+        below("no friction, error of F_c", float(force[late].mean()) - desired, "N", 0.5 * level),
+        near(
             "no friction, peak to peak",
-            float(hunting(level, link.gamma, desired)),
+            hunting(level, link.gamma, desired),
             swing.peak_to_peak,
             "N",
-            BOUNDS.neglected_harmonics,
             "relay, (5.15)",
+            BOUNDS.neglected_harmonics,
         ),
-        Comparison(
-            "no friction, period", 2.0 * math.pi / natural, swing.period, "s", BOUNDS.neglected_harmonics, "relay"
-        ),
+        near("no friction, period", 2.0 * math.pi / natural, swing.period, "s", "relay", BOUNDS.neglected_harmonics),
         *sampled({"friction": runs["friction"]}).rows,
     ]
     with_deadband = runs["with_deadband"]
     time, force, motor = _true(with_deadband, link)
     late = time > time[-1] - 1.0
     moved = float(np.ptp(motor[late]))
-    rows.append(Comparison("deadband of 3/4 of a step, the motor moves", 0.0, moved, "rad", 1e-4, "5.7", True))
-    rows.append(
-        Comparison("deadband, error of F_c", 0.0, float(force[-1]) - desired, "N", 1.25 * level, "deadband + 1/2", True)
-    )
+    rows.append(below("deadband of 3/4 of a step, the motor moves", moved, "rad", 1e-4, "5.7"))
+    rows.append(below("deadband, error of F_c", float(force[-1]) - desired, "N", 1.25 * level, "deadband + 1/2"))
     curves, motors = [], []
     for name, each in runs.items():
         time, force, motor = _true(each, link)
@@ -74,18 +70,16 @@ def sampled(runs: Runs) -> Result:
     friction, k_tr = link.node.dynamic_friction, link.node.transmission_stiffness
     period = quantised_cycle_period(link.loop.gain, k_tr, friction, desired * link.lever, level * link.lever)
     rows = [
-        Comparison(
+        near(
             "friction, cycle of the motor",
             2.0 * friction / k_tr,
             cycle.peak_to_peak,
             "rad",
-            BOUNDS.neglected_delays,
             "(5.20)",
+            BOUNDS.neglected_delays,
         ),
-        Comparison(
-            "friction, its period, which stays", float(period), cycle.period, "s", BOUNDS.neglected_delays, "(5.3)"
-        ),
-        Comparison("friction, error of F_c", 0.0, float(force[there].mean()) - desired, "N", level, "a step", True),
+        near("friction, its period, which stays", period, cycle.period, "s", "(5.3)", BOUNDS.neglected_delays),
+        below("friction, error of F_c", float(force[there].mean()) - desired, "N", level, "a step"),
     ]
     return Result(rows, [Panel("motor", "time [s]", "motor at the joint [rad]", [("", measured(time, motor))])])
 

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, SupportsFloat
 
 from wam_analysis import table
 from wam_studies.figures.panels import Panel
+from wam_studies.thesis.bounds import BOUNDS
 
 
 class Comparison(NamedTuple):
@@ -43,6 +44,28 @@ class Comparison(NamedTuple):
         if isinstance(self.predicted, str) or isinstance(self.measured, str):
             return self.predicted == self.measured
         return abs(self.deviation) <= self.bound
+
+
+def near(
+    quantity: str,
+    predicted: SupportsFloat,
+    measured: SupportsFloat,
+    unit: str,
+    equation: str = "",
+    within: float = BOUNDS.within,
+) -> Comparison:
+    """A measured number that is near the predicted one, relative to it."""
+    return Comparison(quantity, float(predicted), float(measured), unit, within, equation)
+
+
+def below(quantity: str, measured: SupportsFloat, unit: str, most: float, equation: str = "") -> Comparison:
+    """A measured number that should be zero, and is at most another one in its unit."""
+    return Comparison(quantity, 0.0, float(measured), unit, most, equation, True)
+
+
+def noted(quantity: str, measured: SupportsFloat, unit: str) -> Comparison:
+    """A measured number of which nothing is claimed."""
+    return Comparison(quantity, math.nan, float(measured), unit, math.nan)
 
 
 class Result(NamedTuple):

@@ -10,7 +10,7 @@ from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import MeasuredResponse, OneLink, desired_force, one_link, response
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
 from wam_theory.regimes import gamma_a, gamma_b, psi
 from wam_theory.stick_slip import Kind, simulate
@@ -29,11 +29,7 @@ def responses(runs: Mapping[str, Recording]) -> Result:
         label = name.replace("_", " ")
         rows += _first(label, link, shown, force)
         largest = float(np.abs(shown.force - predicted).max()) / force
-        rows.append(
-            Comparison(
-                f"{label}, largest difference from the exact response", 0.0, largest, "of step", BOUNDS.within, "", True
-            )
-        )
+        rows.append(below(f"{label}, largest difference from the exact response", largest, "of step", BOUNDS.within))
         curves = [
             ("measured", measured(shown.time, shown.force)),
             ("exact", line_only(shown.time, predicted)),
@@ -64,9 +60,7 @@ def _first(label: str, link: OneLink, shown: MeasuredResponse, force: float) -> 
     stiffness = node.transmission_stiffness, node.contact_stiffness
     if not node.static_friction:
         constant = float(integral_time_constant(gain, series_stiffness(*stiffness)))
-        return [
-            Comparison(f"{label}, time constant", constant, time_constant(shown, force), "s", BOUNDS.within, "(5.2)")
-        ]
+        return [near(f"{label}, time constant", constant, time_constant(shown, force), "s", "(5.2)")]
     delay = float(breakaway_delay(gain, node.transmission_stiffness, node.static_friction, force * link.lever))
     moves = shown.time[np.flatnonzero(np.abs(shown.speed) > BOUNDS.stuck_speed)[0]] - shown.time[0]
     rows = [Comparison(f"{label}, delay", delay, float(moves), "s", BOUNDS.slip_delay, "(5.3)", True)]
@@ -75,8 +69,8 @@ def _first(label: str, link: OneLink, shown: MeasuredResponse, force: float) -> 
         ratio = float(-psi(link.gamma, link.zeta))
         exact = exact_ratio(link, force)
         quantity = f"{label}, error at the second rest over the first"
-        rows.append(Comparison(quantity, ratio, errors[1] / errors[0], "", BOUNDS.sample_and_hold, "(5.18)"))
-        rows.append(Comparison(f"{quantity}, sampled", exact, errors[1] / errors[0], "", BOUNDS.within, "integrator"))
+        rows.append(near(quantity, ratio, errors[1] / errors[0], "", "(5.18)", BOUNDS.sample_and_hold))
+        rows.append(near(f"{quantity}, sampled", exact, errors[1] / errors[0], "", "integrator"))
     return rows
 
 

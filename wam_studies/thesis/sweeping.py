@@ -1,4 +1,4 @@
-"""An experiment or task with many parameter sets: what each set predicts and measures, without ROS."""
+"""The runs of experiments and tasks, also with many parameter sets: cases for a batch, without ROS."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,9 +12,17 @@ from wam_description.parameters import ParameterError
 from wam_description.wiring import raised
 from wam_sim.simulated_bag import record
 from wam_sim.sweep import Axis
-from wam_studies.thesis.definition import Experiment, configured
+from wam_studies.thesis.definition import Experiment, Run, configured
 from wam_studies.thesis.evaluation import evaluate
 from wam_studies.thesis.rows import Comparison
+
+
+class RecordedRun(NamedTuple):
+    """A run of an experiment, and the directory of its bag."""
+
+    experiment: Experiment
+    run: Run
+    directory: str
 
 
 class ExperimentPoint(NamedTuple):
@@ -46,6 +54,13 @@ def points(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence
     return [ExperimentPoint(experiment, tuple(values.items())) for values in named]
 
 
+def record_run(case: RecordedRun) -> str:
+    """Record a run into a bag of its name, in lockstep without ROS; why it ended early, '' if it did not."""
+    configuration = configured(case.experiment, case.run, Path(case.directory))
+    steps = scenario.load_for(configuration, f"{case.directory}/{case.run.name}.yaml")
+    return record(configuration, steps, Path(case.directory, case.run.name))
+
+
 def outcome(point: ExperimentPoint) -> ExperimentOutcome:
     """Record every run and evaluate the bags; what is refused or does not end is a failure of this set alone."""
     experiment = point.experiment
@@ -54,9 +69,7 @@ def outcome(point: ExperimentPoint) -> ExperimentOutcome:
     with TemporaryDirectory(prefix="wam_sweep_") as folder:
         try:
             for run in runs:
-                configuration = configured(experiment, run, Path(folder))
-                steps = scenario.load_for(configuration, f"{folder}/{run.name}.yaml")
-                record(configuration, steps, Path(folder, run.name))
+                record_run(RecordedRun(experiment, run, folder))
             rows = evaluate(experiment, Path(folder)).rows
         except (ParameterError, BagError) as error:
             return ExperimentOutcome(str(error).replace(f"{folder}/", ""), ())

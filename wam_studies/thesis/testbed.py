@@ -25,7 +25,7 @@ from wam_studies.thesis.one_link import (
     set_until,
 )
 from wam_studies.thesis.recording import Recording, Step
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, near
 from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
 from wam_theory.stick_slip import Verdict, simulate
 
@@ -55,15 +55,8 @@ def as_described(runs: Mapping[str, Recording]) -> Result:
     gain = gains[0] + (gains[1] - gains[0]) * (1.0 - below[1]) / (above[1] - below[1])
     expected = friction_margin(link, BOUNDS.small_step)
     rows += [
-        Comparison(
-            "marginal gain with the rod",
-            link.tip_gain(expected),
-            link.tip_gain(gain),
-            "m/s/N",
-            BOUNDS.within,
-            "integrator",
-        ),
-        Comparison("over that without", expected / link.margin.gain, gain / link.margin.gain, "", BOUNDS.within, "5.6"),
+        near("marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", "integrator"),
+        near("over that without", expected / link.margin.gain, gain / link.margin.gain, "", "5.6"),
     ]
     panels = [_panel(runs, (name,), name.replace("_", " ")) for name in runs]
     return Result(rows, panels)
@@ -163,8 +156,8 @@ def margin(below: Recording, above: Recording, how: str) -> list[Comparison]:
     frequency = first.frequency + fraction * (second.frequency - first.frequency)
     of, law = f"marginal gain, {how}", "(5.15) sampled"
     rows = [
-        Comparison(of, link.tip_gain(predicted.gain), link.tip_gain(gain), "m/s/N", BOUNDS.within, law),
-        Comparison(f"frequency at the margin, {how}", predicted.frequency, frequency, "rad/s", BOUNDS.within, law),
+        near(of, link.tip_gain(predicted.gain), link.tip_gain(gain), "m/s/N", law),
+        near(f"frequency at the margin, {how}", predicted.frequency, frequency, "rad/s", law),
     ]
     for one, oscillation in ((link, first), (other, second)):
         rows.append(_growth_row(one.loop.gain / one.margin.gain, oscillation, how, law))
@@ -193,15 +186,16 @@ def verdicts(run: Recording, name: str) -> list[Comparison]:
         if outcome.verdict is Verdict.LIMIT_CYCLE:
             found = last_cycle(shown.time, shown.force)
             rows.append(
-                Comparison(
+                near(
                     f"{label}, peak to peak",
                     outcome.peak_to_peak / link.lever,
                     found.peak_to_peak,
                     "N",
+                    "",
                     BOUNDS.long_cycle,
                 )
             )
-            rows.append(Comparison(f"{label}, period", outcome.period, found.period, "s", BOUNDS.long_cycle))
+            rows.append(near(f"{label}, period", outcome.period, found.period, "s", "", BOUNDS.long_cycle))
     return rows
 
 

@@ -10,7 +10,7 @@ from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
 from wam_studies.thesis.recording import Recording
-from wam_studies.thesis.rows import Comparison, Result
+from wam_studies.thesis.rows import Comparison, Result, near
 from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
 
@@ -36,12 +36,11 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     predicted = np.abs(response_of(run, found.frequency))
     rows = [
         *_resonance_rows(run, found),
-        Comparison(
+        near(
             f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
-            float(np.median(predicted[lowest])),
-            float(np.median(gain[lowest])),
+            np.median(predicted[lowest]),
+            np.median(gain[lowest]),
             "rad/(N m)",
-            BOUNDS.within,
             "(4.3)",
         ),
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
@@ -75,10 +74,7 @@ def resonances_sample(runs: Mapping[str, Recording]) -> Result:
 def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
     theory = resonances(run)
     expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
-    return [
-        Comparison(name, at, zero_of(found, at, _lead(run)), "Hz", BOUNDS.within, "(4.4)")
-        for name, at in expected.items()
-    ]
+    return [near(name, at, zero_of(found, at, _lead(run)), "Hz", "(4.4)") for name, at in expected.items()]
 
 
 def allocation(runs: Mapping[str, Recording]) -> Result:
@@ -98,13 +94,13 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
         predicted_ratio = stiffness_gain(at_joint)
         stiffness = at_joint.shared.arm.circuits[0].stiffness / at_motor.shared.arm.circuits[0].stiffness
         rows.append(
-            Comparison(
+            near(
                 f"stiffness with reducer at joint over at motor, N {ratio}",
                 predicted_ratio,
                 stiffness,
                 "",
-                1e-3,
                 "(4.1)",
+                1e-3,
             )
         )
     panel = Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", curves, "xy")
@@ -125,7 +121,7 @@ def allocation_sample(runs: Mapping[str, Recording]) -> Result:
 
 def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
     at = float(resonances(run).lower) * HZ
-    return Comparison(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", BOUNDS.within, "(4.4)")
+    return near(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", "(4.4)")
 
 
 def stiffness_gain(run: Recording) -> float:

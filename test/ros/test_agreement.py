@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import RosWorld
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
 from test_loss import Stack
@@ -17,6 +16,7 @@ from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.messages import diagnostic_status
 from wam_ros.ports import READY
+from wam_ros.testing import Network
 from wam_ros.topics import qos
 
 OWN = digests(WAM.shared)
@@ -101,7 +101,7 @@ def test_live_values_in_a_status_that_cannot_be_are_refused(text: str) -> None:
 class Apart(Stack):
     """The six nodes in this process, some of them started with other values; nobody has enabled the arm."""
 
-    def __init__(self, ros: RosWorld, folder: Path, others: dict[str, dict[str, Any]]) -> None:
+    def __init__(self, ros: Network, folder: Path, others: dict[str, dict[str, Any]]) -> None:
         self.ros, self.folder = ros, folder
         self.values = {"timing__mode": "lockstep", "timing__real_time_factor": 0.0}
         self.nodes = {name: self.made(name, **others.get(name, {})) for name in SIX}
@@ -142,7 +142,7 @@ class Apart(Stack):
 
 
 def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_until_it_is_started_again(
-    ros: RosWorld, tmp_path: Path
+    ros: Network, tmp_path: Path
 ) -> None:
     stack = Apart(ros, tmp_path, {"gravity": HEAVY})
     assert stack.refusal() == (
@@ -154,7 +154,7 @@ def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_unt
     stack.enable()
 
 
-def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: Network, tmp_path: Path) -> None:
     stack = Apart(ros, tmp_path, {})
     ros.remove(stack.nodes["driver"])
     fewer = changed([name for name in SIX if name != "gravity"], **stack.values)
@@ -165,7 +165,7 @@ def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: RosWorld, tmp
     assert "gravity was started with another arm.payload than the driver" in stack.refusal()
 
 
-def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: RosWorld, tmp_path: Path) -> None:
+def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: Network, tmp_path: Path) -> None:
     sensorless = {
         "arm.joint_sensors": False, "force_loop:feedback": "contact_estimate", "force_loop:force_gain": [0.01],
     }  # fmt: skip
@@ -177,7 +177,7 @@ def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: RosWorl
 
 
 def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_the_arm_braked(
-    ros: RosWorld, tmp_path: Path
+    ros: Network, tmp_path: Path
 ) -> None:
     stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
     assert stack.refusal().startswith("refused: force_loop: velocity_loop uses servo.* that are not accepted here: ")
@@ -190,7 +190,7 @@ def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_th
     assert stack.fault.startswith("force_loop: velocity_loop uses servo.* that are not accepted here: ")
 
 
-def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: Network, tmp_path: Path) -> None:
     stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
     ros.wait(stack.problem, what="gains that are not accepted")
     stack.set("force_loop", guard__mode="warn")
@@ -198,7 +198,7 @@ def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: Ro
     assert stack.problem() == ""
 
 
-def test_a_follower_that_is_started_again_takes_the_live_gains(ros: RosWorld, tmp_path: Path) -> None:
+def test_a_follower_that_is_started_again_takes_the_live_gains(ros: Network, tmp_path: Path) -> None:
     stack = Apart(ros, tmp_path, {})
     stiffer = [1.05 * gain for gain in SERVO.proportional_gain]
     stack.set("velocity_loop", servo__proportional_gain=stiffer)
@@ -208,9 +208,7 @@ def test_a_follower_that_is_started_again_takes_the_live_gains(ros: RosWorld, tm
     ros.wait(lambda: stack.force_servo().proportional_gain == tuple(stiffer), what="the live gains after the start")
 
 
-def test_a_follower_is_not_ready_before_it_has_heard_the_values_of_the_other_node(
-    ros: RosWorld, tmp_path: Path
-) -> None:
+def test_a_follower_is_not_ready_before_it_has_heard_the_values_of_the_other_node(ros: Network, tmp_path: Path) -> None:
     configured = changed(["velocity_loop", "force_loop"])
     velocity, force = (make(ros, tmp_path, name, "/wam", configured) for name in ("velocity_loop", "force_loop"))
     looks: list[int] = []
@@ -222,7 +220,7 @@ def test_a_follower_is_not_ready_before_it_has_heard_the_values_of_the_other_nod
     ros.wait(lambda: force._ports.ready, what="the status of the velocity loop")
 
 
-def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: RosWorld, tmp_path: Path) -> None:
+def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: Network, tmp_path: Path) -> None:
     force = make(ros, tmp_path, "force_loop", "/wam", changed(["force_loop"]))
     forger = ros.node("forger").create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
     ros.wait(forger.get_subscription_count, what="a listener")
@@ -238,7 +236,7 @@ def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: R
     ros.wait(lambda: not force._ports.problem, what="values that can be read")
 
 
-def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: RosWorld, tmp_path: Path) -> None:
+def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: Network, tmp_path: Path) -> None:
     stack = Apart(ros, tmp_path, {})
     stack.enable()
     driver = stack.nodes["driver"]

@@ -1,0 +1,309 @@
+"""Kinds of faults in other people's recordings, each at several rates and in several formats."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from foreign_bags import Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from wam_analysis.findings.analysis import analyse
+from wam_analysis.foreign.topic_map import topic_map
+from wam_bag.bag import BagError
+
+NOTHING = topic_map([], [], [], [], [])
+DEGREES = topic_map([], [], [], [], ["position=deg", "velocity=deg/s"])
+MAPPED = topic_map(["/state"], [], [], ["name=state.name", "position=state.position", "stamp=time"], [])
+DRY, VISCOUS = 1.5, 0.8
+
+
+def sqlite(path: Path, sent: list[Sent]) -> Path:
+    return by_rosbags(path, sent, "sqlite3")
+
+
+def ros1(path: Path, sent: list[Sent]) -> Path:
+    return by_rosbags(path, sent, "ros1")
+
+
+def json_directory(path: Path, sent: list[Sent]) -> Path:
+    path.mkdir()
+    by_json(path / "part", sent)
+    return path
+
+
+class Case(NamedTuple):
+    """A recording: what is in it, how it is written, what the reader gives, and what must come out."""
+
+    name: str
+    write: Callable[[Path, list[Sent]], Path]
+    sent: list[Sent]
+    numbers: dict[str, float]
+    wrong: str = ""
+    given: Any = NOTHING
+    absent: tuple[str, ...] = ()
+
+
+def motion(rate: float, frequency: float, size: float, seconds: float = 30.0) -> tuple[Any, Any, Any, Any]:
+    """Time, position, velocity and effort of a sine with friction."""
+    time, w = np.arange(0.0, seconds, 1.0 / rate), 2.0 * math.pi * frequency
+    velocity = size * w * np.cos(w * time)
+    noise = 0.01 * np.random.default_rng(3).normal(size=len(time))
+    return time, size * np.sin(w * time), velocity, DRY * np.sign(velocity) + VISCOUS * velocity + noise
+
+
+def one(
+    topic: str, rate: float, frequency: float, size: float, change: Any = None, seconds: float = 30.0
+) -> list[Sent]:
+    """A joint `a` in a sine, its position changed."""
+    time, q, v, effort = motion(rate, frequency, size, seconds)
+    q = q if change is None else change(q)
+    return joints(topic, time, ["a"], position=q[:, None], velocity=v[:, None], effort=effort[:, None])
+
+
+FRICTION = {"a: dry friction": DRY, "a: viscous friction": VISCOUS}
+
+
+def sine(frequency: float, size: float) -> dict[str, float]:
+    return {"a: frequency": frequency, f"a, {frequency:.3g} Hz: amplitude": size}
+
+
+def wrapped(low: float, turn: float = 2.0 * math.pi) -> Any:
+    return lambda q: (q - low) % turn + low
+
+
+def wraps() -> list[Case]:
+    degrees = one("/joint_states", 50.0, 0.25, 700.0, wrapped(-180.0, 360.0))
+    alone = [s._replace(fields={k: v for k, v in s.fields.items() if k in ("name", "position")})
+             for s in one("/joint_states", 60.0, 0.3, 5.0, wrapped(0.0))]  # fmt: skip
+    said, largest = "it is unwrapped", math.radians(700.0)
+    return [
+        Case("from zero", sqlite, one("/joint_states", 100.0, 0.25, 4.0, wrapped(0.0)), sine(0.25, 4.0) | FRICTION,
+             said),
+        Case("several turns", by_mcap_ros2, one("/arm/joint_states", 250.0, 0.2, 20.0, wrapped(-math.pi)),
+             sine(0.2, 20.0) | FRICTION, said),
+        Case("in degrees", ros1, degrees, sine(0.25, largest), said, DEGREES),
+        Case("position alone", by_rosbags, alone, sine(0.3, 5.0), said),
+    ]  # fmt: skip
+
+
+def without(sent: list[Sent], lacks: Callable[[int], bool], *fields: str) -> list[Sent]:
+    return [s._replace(fields={k: v for k, v in s.fields.items() if k not in fields}) if lacks(i) else s
+            for i, s in enumerate(sent)]  # fmt: skip
+
+
+def sparse() -> list[Case]:
+    made = [
+        ("every other", by_rosbags, 100.0, lambda i: i % 2, ("velocity", "effort"), 50),
+        ("three of four", sqlite, 200.0, lambda i: i % 4, ("velocity", "effort"), 25),
+        ("effort alone", ros1, 125.0, lambda i: i % 3 == 1, ("effort",), 67),
+        ("velocity alone", by_mcap_ros2, 80.0, lambda i: i % 5 == 0, ("velocity",), 80),
+    ]
+    return [
+        Case(name, write, without(one("/joint_states", rate, 0.7, 0.5), lacks, *fields),
+             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate, "/joint_states: missed periods": 0.0},
+             f"in only {share} % of the messages")
+        for name, write, rate, lacks, fields, share in made
+    ]  # fmt: skip
+
+
+def stamped(sent: list[Sent], change: Callable[[float], float]) -> list[Sent]:
+    return [s._replace(stamp=change(s.stamp)) for s in sent]
+
+
+def coarse() -> list[Case]:
+    made = [
+        ("seconds", by_rosbags, 100.0, math.floor),
+        ("centiseconds", sqlite, 250.0, lambda t: round(100.0 * t) / 100.0),
+        ("two of three", ros1, 150.0, lambda t: math.floor(50.0 * t) / 50.0),
+        ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
+    ]
+    return [
+        Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
+             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "times of reception are used")
+        for name, write, rate, change in made
+    ]  # fmt: skip
+
+
+def twice() -> list[Case]:
+    sent = one("/joint_states", 100.0, 0.7, 0.5)
+    again = [s._replace(received=s.received + 0.0004) for s in sent]
+    expected = sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 10.0}
+    return [
+        Case("all", by_rosbags, sent + again, expected, "the first message of each is used"),
+        Case("a part", sqlite, sent + again[: len(again) // 3], expected, "the first message of each is used"),
+    ]
+
+
+def names() -> list[Case]:
+    time = np.arange(0.0, 20.0, 0.01)
+    both = np.column_stack([0.3 * np.sin(2 * np.pi * 0.7 * time), 0.1 * np.sin(2 * np.pi * 1.9 * time)])
+
+    def called(*own: str) -> list[Sent]:
+        return joints("/joint_states", time, own, position=both)
+
+    def numbers(a: str, b: str) -> dict[str, float]:
+        return {
+            f"{a}: frequency": 0.7,
+            f"{b}: frequency": 1.9,
+            f"{a}, 0.7 Hz: amplitude": 0.3,
+            f"{b}, 1.9 Hz: amplitude": 0.1,
+        }
+
+    short = [s._replace(fields=s.fields | {"effort": [1.0]}) for s in called("x", "y")]
+    given = topic_map([], ["p", "q"], [], [], [])
+    return [
+        Case("none", by_mcap_ros2, called(), numbers("joint1", "joint2"), "without a name"),
+        Case("none, SQLite", sqlite, called(), numbers("joint1", "joint2"), "without a name"),
+        Case("none, ROS 1, given", ros1, called(), numbers("p", "q"), "", given),
+        Case("none, MCAP, given", by_rosbags, called(), numbers("p", "q"), "without a name", given),
+        Case("empty", by_rosbags, called("", ""), numbers("joint1", "joint2"), "without a name"),
+        Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
+        Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
+        Case("twice, SQLite", sqlite, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
+        Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
+        Case("short effort, ROS 1", ros1, short, numbers("x", "y"), "effort of another length than the names"),
+    ]  # fmt: skip
+
+
+def called_as_commands() -> list[Case]:
+    expected = sine(0.7, 0.5) | FRICTION
+    force = np.zeros((3000, 3))
+    force[:, 2] = 3.0 * np.sin(2.0 * np.pi * 2.1 * np.arange(3000) / 100.0)
+    cycle = {"/cmd/wrench force.z: frequency": 2.1, "/cmd/wrench force.z: cycle, peak to peak": 6.0}
+    named = topic_map(["/goal/ref"], [], [], [], [])
+    return [
+        Case("target", by_rosbags, one("/target/joint_states", 100.0, 0.7, 0.5), expected),
+        Case("desired", sqlite, one("/arm_desired/desired", 200.0, 0.7, 0.5), expected),
+        Case("goal", ros1, one("/goal/ref", 125.0, 0.7, 0.5), expected, "", named),
+        Case("wrench", by_mcap_ros2, wrenches("/cmd/wrench", np.arange(3000) / 100.0, force), cycle),
+    ]
+
+
+def few_cycles() -> list[Case]:
+    return [
+        Case(f"{frequency:g} Hz", write, one("/joint_states", rate, frequency, 0.4, None, seconds), {}, "", NOTHING,
+             ("No frequency is above the noise from",))
+        for write, rate, frequency, seconds in (
+            (by_rosbags, 250.0, 0.4, 10.0), (sqlite, 100.0, 0.1, 30.0), (ros1, 50.0, 0.03, 100.0),
+        )
+    ]  # fmt: skip
+
+
+def still() -> list[Case]:
+    def with_flicker(write: Any, seed: int, count: float, noise: float) -> Case:
+        drawn = np.random.default_rng(seed)
+        time = np.cumsum(drawn.choice([0.008, 0.01], 3000))
+        _, w = 0.0, 2.0 * math.pi * 0.3
+        a, speed = 0.5 * np.sin(w * time), 0.5 * w * np.cos(w * time)
+        b = 1.2 + count * np.where(drawn.random(3000) < 0.03, drawn.choice([-1, 1], 3000), 0)
+        position = np.column_stack([a, b])
+        velocity = np.column_stack([speed, noise * drawn.normal(size=3000)])
+        effort = np.column_stack(
+            [DRY * np.sign(speed) + VISCOUS * speed + 0.01 * drawn.normal(size=3000), 0.2 + 0.0 * time]
+        )
+        sent = joints("/joint_states", time, ["a", "b"], position=position, velocity=velocity, effort=effort)
+        return Case(f"{count:g}, {noise:g}", write, sent, FRICTION, "", NOTHING, ("b: never moved.",))
+
+    return [
+        with_flicker(by_rosbags, 1, 1e-4, 0.0),
+        with_flicker(sqlite, 2, 1e-3, 1e-4),
+        with_flicker(ros1, 3, 2e-5, 1e-3),
+    ]
+
+
+def zeros() -> list[Case]:
+    def moved(at: float, by: float, rate: float) -> Any:
+        return lambda q: q + by * (np.arange(len(q)) / rate > at)
+
+    return [
+        Case(f"{by:g}", write, one("/joint_states", rate, 0.7, 0.5, moved(12.0, by, rate)), sine(0.7, 0.5) | FRICTION,
+             "the zero of the position moves once")
+        for write, rate, by in ((by_rosbags, 100.0, 0.5), (sqlite, 250.0, -1.3), (ros1, 100.0, 3.0))
+    ]  # fmt: skip
+
+
+def contradictions() -> list[Case]:
+    def scaled(factor: float, write: Any, rate: float) -> Case:
+        sent = one("/joint_states", rate, 0.7, 0.5)
+        sent = [s._replace(fields=s.fields | {"velocity": factor * s.fields["velocity"]}) for s in sent]
+        return Case(f"{factor:g}", write, sent, sine(0.7, 0.5), f"velocity is {factor:.3g} times the rate")
+
+    return [scaled(57.3, by_rosbags, 100.0), scaled(-1.0, sqlite, 200.0), scaled(0.105, ros1, 50.0)]
+
+
+def formats() -> list[Case]:
+    sent = one("/state", 100.0, 0.7, 0.5)
+    time = np.arange(0.0, 12.0, 0.004)
+    force = np.zeros((len(time), 3))
+    force[time > 4.0, 2] = 10.0
+    frames = wrenches("/ft/wrench", time, force, "/tool0") + wrenches("/force_command", time, force, "tool0")
+    step = {"/ft/wrench, 10 N at 4.0 s: force in the steady state": 10.0}
+    commanded = topic_map([], [], ["/force_command"], [], [])
+    return [
+        Case("JSON in a directory", json_directory, sent, {"a: frequency": 0.7}, "", MAPPED),
+        Case("slash of a frame", by_rosbags, frames, step, "", commanded),
+        Case("slash of a frame, SQLite", sqlite, frames, step, "", commanded),
+    ]
+
+
+KINDS = (wraps, sparse, coarse, twice, names, called_as_commands, few_cycles, still, zeros, contradictions, formats)
+CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_fault_is_read_right_and_said(case: Case, tmp_path: Path) -> None:
+    analysis = analyse(case.write(tmp_path / "bag", case.sent), lambda doing: None, case.given)
+    numbers = {one.name: one.measured for section in analysis.sections for one in section.findings}
+    assert {name: numbers.get(name) for name in case.numbers} == pytest.approx(case.numbers, rel=0.02)
+    wrong = " ".join(sentence for section in analysis.sections for sentence in section.wrong)
+    assert case.wrong in wrong if case.wrong else not wrong
+    every = " ".join(sentence for section in analysis.sections for sentence in section.sentences)
+    assert all(sentence in every for sentence in case.absent)
+
+
+def other_topics(path: Path, storage: str, number: int) -> Path:
+    """A bag of numbers alone."""
+    is_ros1 = storage == "ros1"
+    store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_JAZZY)
+    kind = "std_msgs/msg/Float64"
+    file = path.with_suffix(".bag") if is_ros1 else path
+    plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
+    with Ros1Writer(file) if is_ros1 else Ros2Writer(file, version=9, storage_plugin=plugin) as writer:
+        topic = writer.add_connection("/state", kind, typestore=store)
+        take = store.serialize_ros1 if is_ros1 else store.serialize_cdr
+        for k in range(number):
+            writer.write(topic, 10**18 + k * 10**7, take(store.types[kind](float(k)), kind))
+    return file
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3", "ros1"])
+def test_topics_that_are_not_read_and_how_to_read_them_are_said(storage: str, tmp_path: Path) -> None:
+    analysis = analyse(other_topics(tmp_path / "bag", storage, 100), lambda doing: None)
+    assert "100 messages of other topics" in analysis.sections[0].sentences[1]
+    assert "--topic /state --map" in analysis.sections[0].sentences[1]
+    with pytest.raises(BagError, match="is empty"):
+        analyse(other_topics(tmp_path / "none", storage, 0), lambda doing: None)
+
+
+@pytest.mark.parametrize("kind", ["csv", "series", "renamed"])
+def test_a_table_is_read_as_a_recording(kind: str, tmp_path: Path) -> None:
+    time, position, velocity, effort = motion(100.0, 0.7, 0.5)
+    table = {"time": time, "position.a": position, "velocity.a": velocity, "effort.a": effort}
+    given = NOTHING
+    if kind == "renamed":
+        table = {{"time": "t", "position.a": "q.a"}.get(name, name): values for name, values in table.items()}
+        given = topic_map([], [], [], ["stamp=t", "position=q"], [])
+    source: Any = table
+    if kind == "csv":
+        source = tmp_path / "table.csv"
+        np.savetxt(source, np.column_stack([*table.values()]), delimiter=",", header=",".join(table), comments="")
+    analysis = analyse(source, lambda doing: None, given)
+    numbers = {one.name: one.measured for section in analysis.sections for one in section.findings}
+    expected = sine(0.7, 0.5) | FRICTION
+    assert {name: numbers.get(name) for name in expected} == pytest.approx(expected, rel=0.02)

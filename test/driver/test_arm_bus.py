@@ -1,0 +1,360 @@
+"""The driver of a real arm on a simulated bus: its start, torques and positions, and injected faults by name."""
+
+import math
+import random
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration, packaged
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.bus import frames
+from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.bus_fault import BusFault
+from wam_driver.bus.frames import Frame
+from wam_driver.bus.line import LineError
+from wam_driver.bus.safety_module import Button
+from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.bus.start_up import Wait
+from wam_driver.driver import DriverParameters
+from wam_driver.plant import Plant
+
+PERIOD = 0.002
+STOP = 0.050  # s of bus time, from a fault to zero torque
+NEW, OLD, OLDEST = 200, 60, 40
+
+
+@cache
+def loaded(name: str) -> tuple[Shared, Plant]:
+    configuration = Configuration.load(packaged(name)).with_values({"timing.period": PERIOD, "timing.substeps": 4})
+    shared, own = configuration.shared, configuration.node("driver", DriverParameters)
+    return shared, Plant(shared.arm, own.world, own.effects, shared.timing.substep, own.friction)
+
+
+class Rig:
+    """An arm, its simulated bus and the driver; the arm is carried by the torques of its links."""
+
+    def __init__(self, name: str = "barrett-wam4", version: int = NEW, is_homed: bool = True) -> None:
+        self.shared, self.plant = loaded(name)
+        self.plant.reset()
+        arm = self.shared.arm
+        self.bus = SimulatedBus(arm, self.shared.timing, self.plant, version, is_homed)
+        home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
+        self.arm = ArmBus(self.bus, arm.motors.torque_constant, home, PERIOD)
+        self.currents = [0.1 + 0.05 * at for at in range(len(home))]
+
+    def wake(self) -> None:
+        for node in range(1, 1 + len(self.currents)):
+            self.bus.controllers[node].values["STAT"] = 2
+
+    def start(self, most: float = 5.0) -> list[Wait]:
+        """Until it runs or there is a fault; what was waited for."""
+        waits, end = [], self.bus.now() + most
+        while not self.arm.is_running and self.arm.trouble is None and self.bus.now() < end:
+            self.arm.go_on()
+            if self.arm.wait not in waits[-1:]:
+                waits.append(self.arm.wait)
+        return waits
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD)):
+            self.step()
+
+    def step(self) -> None:
+        self.arm.exchange()
+        self.arm.command(self.currents)
+
+    def enable(self) -> None:
+        self.wake()
+        self.start()
+        assert self.arm.trouble is None
+        self.run(0.5)
+        assert self.arm.wait is Wait.NOTHING
+        self.arm.release()
+
+
+@pytest.mark.parametrize("version", [OLDEST, OLD, NEW])
+@pytest.mark.parametrize("name", ["barrett-wam4", "barrett-wam7"])
+def test_the_arm_starts_wakes_and_follows_torques_with_any_firmware(name: str, version: int) -> None:
+    rig = Rig(name, version)
+    assert rig.start() == [Wait.WAKE, Wait.ACTIVATE]
+    rig.run(0.1)
+    assert not any(rig.bus.commanded)
+    rig.run(0.4)
+    assert (rig.arm.wait, rig.arm.trouble) == (Wait.NOTHING, None)
+    assert not any(rig.bus.commanded), "active, not released"
+    rig.arm.release()
+    rig.run(0.02)
+    motors = rig.shared.arm.motors
+    torque = [i * k for i, k in zip(rig.currents, motors.torque_constant, strict=True)]
+    assert rig.bus.torque == pytest.approx(torque, abs=1.0 / 2700)
+    assert rig.arm.current == pytest.approx(rig.currents, abs=1.0 / 1000)
+    rig.arm.brake()
+    assert not any(rig.bus.commanded)
+    rig.run(0.1)
+    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
+    assert not any(rig.arm.current)
+
+
+def test_velocities_are_those_of_the_motors() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.run(0.1)
+    assert max(map(abs, rig.plant.thetad)) > 2.0
+    assert rig.arm.velocity == pytest.approx(rig.plant.thetad, abs=0.2 * max(map(abs, rig.plant.thetad)))
+
+
+def test_an_arm_without_a_zero_waits_for_a_person_at_home() -> None:
+    rig = Rig(is_homed=False)
+    rig.plant.brake(True)  # the person holds it
+    assert rig.start(3.0)[-1] is Wait.HOME
+    assert not rig.arm.is_running
+    assert rig.arm.confirm_home()
+    assert rig.start()[-1] is Wait.ACTIVATE
+    rig.run(0.1)
+    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
+    assert not rig.arm.confirm_home()
+
+
+def test_in_estop_the_start_waits_for_shift_idle() -> None:
+    rig = Rig()
+    rig.bus.is_attended = False
+    rig.bus.press(Button.ESTOP)
+    assert rig.start(1.0) == [Wait.IDLE]
+    rig.bus.press(Button.IDLE)
+    assert rig.start(3.0)[-1] is Wait.HOME
+
+
+def test_torques_are_clipped_where_the_arm_and_its_safety_module_clip_them() -> None:
+    rig = Rig("barrett-wam7")
+    rig.enable()
+    rig.currents = [1e3, -1e3] * 3 + [1e3]
+    rig.step()
+    sent = [rig.bus.controllers[node].values["T"] for node in range(1, 8)]
+    assert sent == [4731, -4731, 4731, -4320, 3900, -3900, 1600]
+
+
+def test_idle_motors_let_the_arm_sink_slowly() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.arm.brake()
+    rig.run(1.0)
+    speeds = [abs(speed) for speed in rig.plant.qd]
+    assert 0.01 < max(speeds) < 0.6
+
+
+def test_lost_frames_are_counted_and_no_fault_while_they_are_rare() -> None:
+    rig, draw = Rig(), random.Random(47)
+    rig.enable()
+    rig.bus.on_line = lambda frame: [] if draw.random() < 0.02 and frame.sender else [frame]
+    rig.run(0.2)
+    assert rig.arm.trouble is None
+    assert rig.arm.counts["lost replies"] > 0
+
+
+Inject = Callable[[Rig, random.Random], None]
+
+
+def motor(rig: Rig, draw: random.Random) -> int:
+    return draw.randint(1, len(rig.currents))
+
+
+def setting(name: str, value: int) -> Inject:
+    def inject(rig: Rig, draw: random.Random) -> None:
+        rig.bus.controllers[motor(rig, draw)].values[name] = value
+
+    return inject
+
+
+def on_line(change: Callable[[Rig, int], Callable[[Frame], list[Frame]]]) -> Inject:
+    def inject(rig: Rig, draw: random.Random) -> None:
+        rig.bus.on_line = change(rig, motor(rig, draw))
+
+    return inject
+
+
+def silence(nodes: Callable[[int], bool]) -> Inject:
+    """Frames of some of the nodes are lost."""
+    return on_line(lambda rig, chosen: lambda frame: [] if frame.sender and nodes(frame.sender) else [frame])
+
+
+def silent_motor(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    return lambda frame: [] if frame.sender == chosen else [frame]
+
+
+def doubled(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    return lambda frame: [frame] * (1 + (frame.sender == chosen))
+
+
+def jumping(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    def pass_on(frame: Frame) -> list[Frame]:
+        found = frames.read(frame)
+        if isinstance(found, frames.Position) and found.node == chosen:
+            return [frames.position(chosen, found.motor + 5000)]
+        return [frame]
+
+    return pass_on
+
+
+def foreign(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    return lambda frame: [frame, frames.get(chosen, 5)] if frame.sender == chosen else [frame]
+
+
+def refused(seconds: float) -> Inject:
+    """The adapter takes no frames for a time."""
+
+    def inject(rig: Rig, draw: random.Random) -> None:
+        end = rig.bus.now() + seconds
+
+        def refuse(frame: Frame) -> list[Frame]:
+            if not frame.sender and rig.bus.now() < end:
+                raise LineError("no buffer space available")
+            return [frame]
+
+        rig.bus.on_line = refuse
+
+    return inject
+
+
+def power_off(rig: Rig, draw: random.Random) -> None:
+    rig.bus.press(Button.ESTOP)
+    rig.bus.is_attended = False
+    rig.bus.on_line = lambda frame: [] if frame.sender else [frame]
+
+
+def reset_motor(rig: Rig, draw: random.Random) -> None:
+    values = rig.bus.controllers[motor(rig, draw)].values
+    values["STAT"] = values["MODE"] = values["T"] = 0
+
+
+def too_much_torque(rig: Rig, draw: random.Random) -> None:
+    rig.bus.controllers[10].values["TL2"] = 1
+
+
+def too_fast(rig: Rig, draw: random.Random) -> None:
+    rig.bus.controllers[10].values["VL2"] = 1
+
+
+def extra_motor(rig: Rig, draw: random.Random) -> None:
+    rig.bus.controllers[5] = type(rig.bus.controllers[1])(5, NEW, dict(rig.bus.controllers[1].values))
+
+
+def press(button: Button) -> Inject:
+    def inject(rig: Rig, draw: random.Random) -> None:
+        rig.bus.is_attended = False
+        rig.bus.press(button)
+
+    return inject
+
+
+def remove(choose: Callable[[Rig, random.Random], int]) -> Inject:
+    return lambda rig, draw: rig.bus.controllers.pop(choose(rig, draw)) and None
+
+
+def firmware(version: int) -> Inject:
+    def inject(rig: Rig, draw: random.Random) -> None:
+        at = draw.randint(2, len(rig.currents))
+        rig.bus.controllers[at] = type(rig.bus.controllers[at])(at, version, dict(rig.bus.controllers[at].values))
+        rig.bus.controllers[at].values["VERS"] = version
+
+    return inject
+
+
+AT_START: dict[str, tuple[Inject, BusFault]] = {
+    "no safety module": (remove(lambda rig, draw: 10), BusFault.NO_SAFETY_MODULE),
+    "missing controller": (remove(motor), BusFault.MISSING),
+    "one controller too many": (extra_motor, BusFault.UNKNOWN_NODE),
+    "another kind of node": (setting("ROLE", 5), BusFault.NOT_MOTOR),
+    "firmware that is too old": (firmware(20), BusFault.FIRMWARE),
+    "two firmwares": (firmware(55), BusFault.MIXED_FIRMWARE),
+    "stays asleep": (on_line(lambda rig, chosen: lambda f: [] if f.identifier == chosen and len(f.data) == 6 else [f]),
+                     BusFault.NOT_AWAKE),
+    "wrong counts": (setting("CTS", 1024), BusFault.COUNTS),
+    "wrong gain": (setting("IPNM", 500), BusFault.GAIN),
+    "no torque": (setting("MT", 0), BusFault.LIMIT),
+    "wrong index": (setting("PIDX", 9), BusFault.INDEX),
+    "wrong group": (setting("GRPC", 5), BusFault.INDEX),
+}  # fmt: skip
+RUNNING: dict[str, tuple[Inject, BusFault]] = {
+    "silent controller": (on_line(silent_motor), BusFault.NO_REPLY),
+    "reset controller": (reset_motor, BusFault.RESET),
+    "cut bus": (silence(lambda node: node <= 7), BusFault.ALL_SILENT),
+    "power loss": (power_off, BusFault.NO_POWER),
+    "E-stop": (press(Button.ESTOP), BusFault.ESTOP),
+    "idle by the person": (press(Button.IDLE), BusFault.SAFETY_IDLE),
+    "torque limit": (too_much_torque, BusFault.SAFETY_IDLE),
+    "velocity limit": (too_fast, BusFault.SAFETY_IDLE),
+    "silent safety module": (silence(lambda node: node == 10), BusFault.SAFETY_SILENT),
+    "idle controller": (setting("MODE", 0), BusFault.CONTROLLER_IDLE),
+    "doubled node": (on_line(doubled), BusFault.DOUBLED),
+    "jumping encoder": (on_line(jumping), BusFault.JUMP),
+    "second host": (on_line(foreign), BusFault.FOREIGN),
+    "full queue": (refused(0.03), BusFault.NOT_SENT),
+}
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("kind", AT_START)
+def test_an_arm_that_is_not_right_is_refused_by_name(kind: str, seed: int) -> None:
+    inject, fault = AT_START[kind]
+    rig = Rig()
+    if kind != "stays asleep":
+        rig.wake()
+    inject(rig, random.Random(seed))
+    rig.start()
+    assert rig.arm.trouble is not None
+    assert rig.arm.trouble.fault is fault, rig.arm.trouble.text
+    rig.arm.release()
+    rig.step()
+    assert not any(rig.bus.commanded)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("kind", RUNNING)
+def test_a_fault_of_the_bus_is_named_and_ends_the_torque(kind: str, seed: int) -> None:
+    inject, fault = RUNNING[kind]
+    rig, draw = Rig(), random.Random(seed)
+    rig.enable()
+    rig.run(0.02 + 0.03 * draw.random())
+    assert all(rig.bus.commanded)
+    inject(rig, draw)
+    begun = last = rig.bus.now()
+    while rig.bus.now() < begun + 0.15:
+        rig.step()
+        last = rig.bus.now() if any(rig.bus.commanded) else last
+    assert rig.arm.trouble is not None
+    assert rig.arm.trouble.fault is fault, rig.arm.trouble.text
+    assert last - begun <= STOP
+    assert not any(rig.arm.current)
+    if "limit" in kind:
+        assert f"fault of the {kind.split()[0]}" in rig.arm.trouble.text
+
+
+def test_an_adapter_that_takes_nothing_more_is_stopped_by_the_heartbeat() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.run(0.02)
+    refused(math.inf)(rig, random.Random(0))
+    begun = last = rig.bus.now()
+    while rig.bus.now() < begun + 0.3:
+        rig.step()
+        last = rig.bus.now() if any(rig.bus.commanded) else last
+    assert rig.arm.trouble is not None
+    assert rig.arm.trouble.fault is BusFault.NOT_SENT
+    assert last - begun <= 0.11
+
+
+def test_after_a_lost_controller_the_start_is_repeated() -> None:
+    rig = Rig()
+    rig.enable()
+    on_line(silent_motor)(rig, random.Random(1))
+    rig.run(0.02)
+    assert rig.arm.trouble is not None
+    rig.bus.on_line = lambda frame: [frame]
+    rig.arm.clear()
+    assert not rig.arm.is_running
+    rig.enable()
+    rig.run(0.02)
+    assert all(rig.bus.commanded)

@@ -1,0 +1,209 @@
+"""The test kit: what `arm` does for a test, also of a user's own node, and what it leaves behind."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+
+from wam_control.task.scenario import ScenarioStep
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration, packaged
+from wam_description.event import Level
+from wam_description.parameters import Nothing, ParameterError, parameter
+from wam_description.signals import State
+from wam_description.synchroniser import Inputs
+from wam_description.topics import BY_NAME, TASK_COLUMNS
+from wam_description.wiring import Input, Outputs, reaction
+from wam_ros.testing import ArmFault, RunningArm, configured
+from wam_ros.wire import encoder
+from wam_sim.simulation import Simulation
+
+OUTPUTS = ("joint_velocity_command", "joint_effort_command")
+TORQUE = State([], [], [])
+INNER = ["driver", "transform", "velocity_loop", "gravity"]
+pytest_plugins = ["pytester"]
+
+
+@dataclass(frozen=True)
+class DampingParameters:
+    damping: float = parameter("joint damping", "N m s/rad", low=0.0, high=10.0)
+
+
+class Damping:
+    """A user's node, in the place of the force loop."""
+
+    name, parameters = "damping", DampingParameters
+
+    def __init__(self, shared: Shared, own: DampingParameters) -> None:
+        self.damping = own.damping
+
+    @reaction(Input("joint_states", "velocity"), outputs=OUTPUTS)
+    def step(self, inputs: Inputs) -> Outputs:
+        efforts = [-self.damping * v for v in inputs["joint_states"].velocity]
+        return {"joint_velocity_command": TORQUE, "joint_effort_command": State([], [], efforts)}
+
+
+class Raising(Damping):
+    name, parameters = "raising", Nothing
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("joint_states", "velocity"), outputs=OUTPUTS)
+    def step(self, inputs: Inputs) -> Outputs:
+        raise ZeroDivisionError
+
+
+def test_an_own_node_damps_the_arm_in_the_place_of_the_force_loop(arm: RunningArm) -> None:
+    arm.start(force_loop=Damping, damping={"damping": 2.0}, timing={"outer_delay": 1})
+    arm.enable()
+    arm.send("sim/disturbance", frame="outer_link", force=(0.0, 20.0, 0.0))
+    arm.run(0.1)
+    assert np.abs(arm.truth.qd).max() > 0.05
+    states, efforts = arm.recorded["joint_states"], arm.recorded["joint_effort_command"]
+    assert states.position.shape == (len(states.stamp_ns), 4)
+    assert "force_loop" not in arm.nodes
+    common, at, of = np.intersect1d(states.stamp_ns, efforts.stamp_ns, return_indices=True)
+    assert len(common) > 10
+    np.testing.assert_array_equal(efforts.effort[of], -2.0 * states.velocity[at])
+
+
+def test_a_command_moves_the_arm_as_long_as_it_is_sent(arm: RunningArm) -> None:
+    arm.start(nodes=INNER)
+    arm.enable()
+    arm.send("joint_velocity_command", velocity=[0.0, 0.0, 0.2, 0.0], seconds=0.5)
+    arm.run_until(lambda: arm.newest("joint_states").velocity[2] > 0.15)
+    arm.run(1.0)
+    sent = arm.recorded["joint_velocity_command"].stamp_ns
+    assert sent[-1] - sent[0] == 500_000_000
+    assert abs(arm.truth.qd[2]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("taker", "topic", "text", "fields"),
+    [
+        ("velocity_loop", "joint_velocity_command", "allowed: 0.035 s", {"velocity": [0.0] * 4}),
+        ("force_loop", "joint_posture_command", "allowed: 0.2 s", {"position": [0.0, -0.6, 0.0, 0.5]}),
+        ("force_loop", "task_command", "1000 rows; send at most 4", {"rows": ((0.0,) * len(TASK_COLUMNS),) * 1000}),
+    ],
+)
+def test_a_command_that_is_refused_is_in_the_status_of_the_node_that_refuses_it(
+    taker: str, topic: str, text: str, fields: dict[str, Any], arm: RunningArm
+) -> None:
+    """The node says why and goes on; a thousand axes took seconds, in which nobody answered an emergency stop."""
+    arm.start(nodes=INNER if taker == "velocity_loop" else ())
+    arm.enable()
+    arm.run(1.0)
+    value = arm.value(topic, **fields)
+    arm.publisher(topic).publish(encoder(BY_NAME[topic], arm.configuration.shared)(1_000_000, value))
+    arm.run_until(lambda: arm.status(taker).level is Level.WARN)
+    assert text in arm.status(taker).message
+    assert topic.removeprefix("joint") in arm.status(taker).facts["refused"]
+
+
+def test_a_plain_node_shares_the_executor(arm: RunningArm) -> None:
+    from rclpy.node import Node
+
+    node, heard = Node("mine", namespace="wam", context=arm.start(nodes=INNER).context), []
+    node.create_subscription(JointState, "joint_states", heard.append, 10)
+    arm.add(node)
+    arm.run_until(lambda: len(heard) > 20)
+    assert list(heard[0].name) == list(arm.configuration.shared.arm.joints.names)
+
+
+def test_a_fault_is_an_exception_unless_it_is_expected(arm: RunningArm) -> None:
+    arm.enable()
+    assert arm.call("driver/estop").success
+    with pytest.raises(ArmFault, match="emergency stop"):
+        arm.run(0.1)
+    assert arm.run_until_fault() == "emergency stop"
+    arm.run(0.1)
+    status = arm.status("driver")
+    assert status
+    assert (status.level, status.fault) == (Level.ERROR, "emergency stop")
+
+
+def test_a_node_that_raises_is_named(arm: RunningArm) -> None:
+    arm.start(force_loop=Raising)
+    assert arm.run_until_fault().startswith("raising: unexpected ZeroDivisionError")
+
+
+def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) -> None:
+    with pytest.raises(AssertionError, match=r"not within 0\.1 s of the arm's time"):
+        arm.run_until(lambda: False, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"driver": {"watchdogg": 1.0}}, "did you mean"),
+        ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' is of no node"),
+        ({"timing": {"period": -1.0}}, "period"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text: str, arm: RunningArm) -> None:
+    with pytest.raises(ParameterError, match=text):
+        arm.start(**values)
+
+
+def test_a_scenario_gives_a_bag_with_the_numbers_of_the_simulation(arm: RunningArm) -> None:
+    bag = arm.play([{"name": "release", "seconds": 0.2, "request": "enable"}])
+    run = Simulation(Configuration.load(packaged("wam")), [ScenarioStep("release", 0.2, request="enable")])
+    assert run.play() == ""
+    there = np.array([row.values for row in run.rows["joint_states"]])
+    columns: Any = bag.topics["/wam/joint_states"]
+    assert there.tobytes() == np.hstack([columns.position, columns.velocity, columns.effort]).tobytes()
+
+
+def test_a_scenario_that_fails_is_an_exception(arm: RunningArm) -> None:
+    with pytest.raises(ArmFault, match="driver refuses"):
+        arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])
+
+
+def test_nested_values_and_a_class_in_the_place_of_a_node_make_a_configuration() -> None:
+    made = configured(force_loop=Damping, damping={"damping": 2.0}, arm={"joints": {"start": [0.1] * 4}})
+    assert made.shared.arm.joints.start == (0.1,) * 4
+    assert made.node("damping", DampingParameters).damping == 2.0
+    assert f"{__name__}:Damping" in made.shared.nodes
+    assert "force_loop" not in made.shared.nodes
+
+
+@pytest.mark.slow
+def test_after_a_failed_test_the_next_one_runs_and_workers_do_not_meet(
+    pytester: pytest.Pytester, domain_id: int
+) -> None:
+    """A user's project: the plugin by its name, as the entry point loads it; two workers at once."""
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.parametrize("number", range(2))
+        def test_that_fails(arm, number):
+            arm.run(0.02)
+            assert False
+
+        @pytest.mark.parametrize("number", range(2))
+        def test_that_passes(arm, number):
+            arm.run(0.02)
+            assert len(arm.recorded["motor_states"].stamp_ns) > 20
+        """
+    )
+    arguments = ("-p", "wam_ros.pytest_plugin", "-p", "no:cacheprovider", "-n", "2")
+    pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2, failed=2)
+
+
+@pytest.mark.slow
+def test_a_test_takes_no_more_than_a_few_times_its_simulation(arm: RunningArm, tmp_path: Path) -> None:
+    """In processor time, so that other programs do not count."""
+    steps = [ScenarioStep("wait", 2.0)]
+    run = Simulation(Configuration.load(packaged("wam")), steps)
+    begin = time.process_time()
+    run.play()
+    bare = time.process_time() - begin
+    arm.run(0.1)
+    begin = time.process_time()
+    arm.run(2.0)
+    assert time.process_time() - begin < 5.0 * bare

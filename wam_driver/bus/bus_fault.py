@@ -1,0 +1,63 @@
+"""What is wrong on the bus, as data, and its sentence."""
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class BusFault(Enum):
+    """What is wrong, with its sentence, in which the node, and a detail, have a place."""
+
+    # at the start
+    NO_SAFETY_MODULE = "motor controllers answer, the safety module, node 10, does not; check the cable to the pendant"
+    MISSING = "motor controller {node} does not answer; check its cable"
+    UNKNOWN_NODE = "node {node} is none of this arm; is the configuration that of your arm?"
+    NOT_MOTOR = "node {node} has the role {detail}, which is not that of a motor controller"
+    FIRMWARE = "node {node}: {detail}"
+    MIXED_FIRMWARE = "motor controller {node}: its firmware numbers {detail} differently from controller 1"
+    NOT_AWAKE = "motor controller {node} does not wake up; its status is {detail}"
+    WRIST = "motor 7 has {detail} poles, 6 are those of the wrist; gimbals have other ratios"
+    COUNTS = "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960"
+    GAIN = "motor controller {node} has {detail} counts per N m, too far from those of the maker"
+    LIMIT = "motor controller {node} has the largest torque {detail}, which is none"
+    INDEX = "motor controller {node} takes the wrong torque of a packed frame: {detail}"
+    NOT_ZEROED = "motor controller {node} is {detail} counts away from the home pose; it did not take its zero"
+    # later
+    NO_REPLY = "motor controller {node} sends no position"
+    JUMP = "the position of motor {node} jumps"
+    RESET = "motor controller {node} was reset; its zero is lost"
+    ALL_SILENT = "no motor controller answers, the safety module does; check the cable of the bus"
+    NO_POWER = "nothing answers on the bus; check power, cable and adapter"
+    ESTOP = "E-stop; release it and press Shift-Idle{detail}"
+    SAFETY_IDLE = "the safety module went to idle{detail}; press Shift-Activate when the arm may move"
+    SAFETY_SILENT = "the safety module does not answer"
+    CONTROLLER_IDLE = "motor controller {node} left the torque mode: {detail}"
+    FOREIGN = "another computer sends on this bus; end its program"
+    DOUBLED = "two nodes have the number {node}"
+    NOT_SENT = "the adapter does not take frames: {detail}"
+
+    @property
+    def loses_controllers(self) -> bool:
+        """Whether the start has to be repeated."""
+        kept = (BusFault.SAFETY_IDLE, BusFault.CONTROLLER_IDLE, BusFault.FOREIGN, BusFault.DOUBLED)
+        return self not in kept
+
+
+class Trouble(NamedTuple):
+    """A fault, of which node it is, and a detail."""
+
+    fault: BusFault
+    node: int = 0
+    detail: str = ""
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        return f"bus: {self.fault.value.format(node=self.node, detail=self.detail)}"
+
+
+class StartError(Exception):
+    """The start of the arm is refused."""
+
+    def __init__(self, fault: BusFault, node: int = 0, detail: object = "") -> None:
+        self.trouble = Trouble(fault, node, str(detail))
+        super().__init__(self.trouble.text)

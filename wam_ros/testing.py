@@ -1,0 +1,457 @@
+"""The test kit: the stack in the process of a test, on the simulated arm, in a ROS domain of its own.
+
+`wam_ros.pytest_plugin` has its fixtures; docs/test-your-node.md shows it.
+"""
+
+import fcntl
+import itertools
+import math
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
+
+from wam_bag.bag import Bag, read
+from wam_bag.columns import Columns, columns_of
+from wam_description.configuration import SHARED, Configuration, packaged
+from wam_description.interface import Interface, declared
+from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
+from wam_description.topics import JOINT_STATE, POINT, STATUS, TABLE, WRENCH
+from wam_ros.bring_up import Composition
+from wam_ros.limits import TEST_LIMITS
+from wam_ros.local_bus import BUSES
+from wam_ros.messages import message_type, read_status
+from wam_ros.network import is_inhabited
+from wam_ros.requests import switch_request
+from wam_ros.run import Connection
+from wam_ros.topics import DEPTH, NAMESPACE, SECOND, qos, topic_name
+from wam_ros.wire import decoder, encoder, stamp_of
+
+_EMPTY: Final[Mapping[str, Any]] = {
+    JOINT_STATE: State([], [], []),
+    WRENCH: Wrench(BASE, ZERO, ZERO),
+    POINT: Point(BASE, ZERO),
+    TABLE: Table(BASE, ()),
+}
+_COUNTER = itertools.count()
+
+
+class ArmFault(AssertionError):
+    """The driver has put on the brakes, and the test did not expect it."""
+
+
+@contextmanager
+def locked_domain() -> Iterator[int]:
+    """A ROS domain that nobody is in, locked against other test processes.
+
+    Raises
+    ------
+    TimeoutError
+        where all are in use for long.
+    """
+    domains = TEST_LIMITS.domains
+    end = time.monotonic() + 10.0 * TEST_LIMITS.patience
+    for attempt in itertools.count(os.getpid() + next(_COUNTER)):
+        number = domains[attempt % len(domains)]
+        path = Path(tempfile.gettempdir()) / f"wam_stack_test_domain_{number}"
+        lock = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not is_inhabited(number):
+                break
+        except OSError:
+            pass  # another test has it
+        os.close(lock)
+        if time.monotonic() > end:
+            raise TimeoutError(f"ROS domains {domains[0]} to {domains[-1]} are all in use; end what is there")
+        time.sleep(TEST_LIMITS.domain_retry)
+    try:
+        yield number
+    finally:
+        os.close(lock)
+
+
+class Network(Connection):
+    """A ROS domain for one test, with an executor for nodes that the test makes itself.
+
+    Parameters
+    ----------
+    domain_id : ROS domain.
+
+    Attributes
+    ----------
+    environment : for child processes that shall be in the same domain.
+    """
+
+    def __init__(self, domain_id: int) -> None:
+        super().__init__(domain_id=domain_id)
+        self.domain_id = domain_id
+        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+
+    def node(self, name: str, namespace: str = f"/{NAMESPACE}") -> Any:
+        """A plain node, spun and destroyed with the test."""
+        return self.add(Node(name, namespace=namespace, context=self.context))
+
+    def wait(self, until: Callable[[], Any], timeout: float = TEST_LIMITS.patience, what: str = "") -> None:
+        """Spin until something is true; the test fails if that takes longer than `timeout`, s."""
+        end = time.monotonic() + timeout
+        while not until():
+            assert time.monotonic() < end, f"not within {timeout} s: {what or until}"
+            self.executor.spin_once(timeout_sec=0.01)
+
+
+class Recorded(Mapping[str, Any]):
+    """The messages of a run so far, as arrays, by the topic's name in the table of topics."""
+
+    def __init__(self, types: Mapping[str, str]) -> None:
+        self._types = types
+        self.data: dict[str, list[bytes]] = {topic: [] for topic in types}
+        self._made: dict[str, tuple[int, Columns]] = {}
+
+    def __getitem__(self, topic: str) -> Any:
+        data = self.data[topic]
+        count, columns = self._made.get(topic, (-1, None))
+        if columns is None or count != len(data):
+            columns = columns_of(self._types[topic], data)
+            self._made[topic] = len(data), columns
+        return columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+
+class RunningArm:
+    """The stack of one test.  What is used first starts it, or `start` with other nodes or values.
+
+    Parameters
+    ----------
+    domain_id : ROS domain that the test has to itself.
+    folder : for the scenario and the bag.
+
+    Attributes
+    ----------
+    fault : present fault of the driver that the test expects; `run_until_fault` sets it.
+    """
+
+    def __init__(self, domain_id: int, folder: Path) -> None:
+        self._domain_id, self._folder = domain_id, folder
+        self._composition: Composition | None = None
+        self.fault = ""
+
+    def start(
+        self, *own: Any, configuration: str | Path | Configuration = "wam", nodes: Sequence[str] = (), **values: Any
+    ) -> "RunningArm":
+        """Start the nodes of a configuration, in lockstep as fast as they can, all in this process.
+
+        Parameters
+        ----------
+        own : further nodes: classes, or 'module:Class'.
+        configuration : name, path or object.
+        nodes : names of the nodes; by default those of the configuration.
+        values : by keyword: of a group of shared parameters or of a node, a mapping of values, as
+            ``timing={"outer_delay": 1}``; a node's class in place of the node of that name.
+
+        Raises
+        ------
+        ParameterError
+            where a value is refused, or there is no such node.
+        """
+        assert self._composition is None, "the stack of this test runs already; call start first, and once"
+        self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
+        self.interface = Interface(self.configuration.shared)
+        self._composition = Composition(self.configuration, domain_id=self._domain_id)
+        self.nodes, self.executor = self._composition.nodes, self._composition.executor
+        self.context = self._composition.context
+        driver: Any = self.nodes.get("driver")
+        self._driver: Any = driver.driver if driver else None
+        self.node = self.add(Node("test", namespace=NAMESPACE, context=self.context))
+        self._publishers: dict[str, Publisher] = {}
+        self._senders: dict[str, tuple[Publisher, Callable[[int, Any], Any]]] = {}
+        self._streams: dict[str, tuple[int, Any]] = {}  # until a stamp, ns: a value
+        self._statuses: dict[str, NodeStatus] = {}
+        self._listen()
+        return self
+
+    def _listen(self) -> None:
+        """Keep each message: as it is published where its publishers are of this process, else from the middleware."""
+        rows = self.interface.topics
+        self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
+        bus = BUSES[self.context] if self.configuration.shared.timing.mode == "lockstep" else None
+        for topic, row in rows.items():
+            take = self._taking(topic, self._recorded.data[topic].append)
+            if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
+                bus.subscribe(self.node.resolve_topic_name(topic), take)
+            else:
+                profile = qos(row)
+                profile.depth = DEPTH
+                self.node.create_subscription(message_type(row), topic_name(self.node, row), take, profile, raw=True)
+
+    def _taking(self, topic: str, keep: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        def take(data: bytes) -> None:
+            keep(data)
+            if topic == "joint_states":
+                self._stream(stamp_of(data))
+            elif topic == STATUS:
+                status = read_status(deserialize_message(data, message_type(self.interface.topics[STATUS])))
+                self._statuses[status.node] = status
+
+        return take
+
+    # what the arm does
+
+    @property
+    def stamp(self) -> int:
+        """The arm's time, ns."""
+        self._require_start()
+        return int(self._driver.stamp)
+
+    @property
+    def truth(self) -> Any:
+        """The simulated arm, a `wam_driver.plant.Plant`: `q`, `qd`, `loads()` and so on, which no sensor reports."""
+        self._require_start()
+        return self._driver.plant
+
+    @property
+    def recorded(self) -> Recorded:
+        """All messages so far as arrays: ``arm.recorded["joint_states"].position`` is (k, n), rad."""
+        self._require_start()
+        return self._recorded
+
+    def newest(self, topic: str) -> Any:
+        """The newest message of a topic as a value, None before the first; cheaper than `recorded` in a condition."""
+        data = self.recorded.data[topic]
+        row = self.interface.topics[topic]
+        return decoder(row, self.configuration.shared, "position? velocity? effort?")(data[-1]) if data else None
+
+    def status(self, node: str) -> NodeStatus | None:
+        """The newest status of a node, None before the first."""
+        self._require_start()
+        return self._statuses.get(node)
+
+    # what the test does
+
+    def add(self, node: Any) -> Any:
+        """Spin a plain rclpy node too; it was made with ``context=arm.context``, and ends with the test."""
+        self._require_start()
+        assert self._composition is not None
+        self._composition.add(node)
+        return node
+
+    def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
+        """Spin until a condition holds, which is looked at once in an outer period of the arm.
+
+        Raises
+        ------
+        ArmFault
+            where the driver has a fault that the test does not expect.
+        AssertionError
+            where the condition does not hold within `seconds` of the arm's time.
+        """
+        self._spin(condition, seconds, self._require_no_fault)
+
+    def _spin(self, condition: Callable[[], Any], seconds: float, look: Callable[[], None]) -> None:
+        self._require_start()
+        period = self.configuration.shared.timing.outer_period_ns
+        limit = self.stamp + seconds * SECOND if self._driver else math.inf
+        end = time.monotonic() + TEST_LIMITS.patience
+        looked, looked_at = -period, 0.0
+        while True:
+            stamp = self.stamp if self._driver else 0
+            now = time.monotonic()
+            if stamp - looked >= period or now - looked_at > TEST_LIMITS.look:
+                looked, looked_at = stamp, now
+                if condition():
+                    return
+                look()
+                assert stamp <= limit, f"not within {seconds} s of the arm's time: {condition}"
+                assert now < end, f"not within {TEST_LIMITS.patience} s: {condition}; the arm is at {stamp} ns"
+            self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
+
+    def run(self, seconds: float) -> None:
+        """Spin for a time of the arm, s."""
+        end = self.stamp + round(seconds * SECOND)
+        self.run_until(lambda: self.stamp >= end, seconds + 1.0)
+
+    def run_until_fault(self, seconds: float = TEST_LIMITS.arm_time) -> str:
+        """Spin until the driver has a fault, which the test expects; returns it."""
+
+        def is_faulty() -> bool:
+            self.fault = str(self._driver.safety.fault)
+            return bool(self.fault)
+
+        self._spin(is_faulty, seconds, lambda: None)
+        return self.fault
+
+    def _require_no_fault(self) -> None:
+        fault = str(self._driver.safety.fault) if self._driver else ""
+        if fault and fault != self.fault:
+            raise ArmFault(fault)
+
+    def call(self, service: str, switch: bool | None = None) -> Any:
+        """The answer of a service of a node, as ``call("driver/enable", True)``; it has `success` and `message`."""
+        self._require_start()
+        kind, message = switch_request(switch)
+        client = self.node.create_client(kind, service)
+        self.run_until(client.service_is_ready)
+        future = client.call_async(message)
+        self._spin(future.done, TEST_LIMITS.arm_time, lambda: None)  # a fault that it causes is no failure of the call
+        self.node.destroy_client(client)
+        return future.result()
+
+    def enable(self) -> None:
+        """Release the brakes.
+
+        Raises
+        ------
+        ArmFault
+            where the driver refuses it.
+        """
+        self.run_until(lambda: self.stamp > 0 and not self._driver_is_awaiting())
+        answer = self.call("driver/enable", True)
+        if not answer.success:
+            raise ArmFault(answer.message)
+
+    def _driver_is_awaiting(self) -> bool:
+        driver: Any = self.nodes["driver"]
+        return bool(driver.awaited)
+
+    def send(self, topic: str, value: Any = None, seconds: float = 0.0, **fields: Any) -> None:
+        """Publish on a topic with the stamp of the newest state.
+
+        Parameters
+        ----------
+        topic : name in the table of topics.
+        value : State, Wrench, Point, Table or PosturePath.
+        seconds : time of the arm in which it is sent again with each joint state, as a command is valid for a short
+            time only; 0 sends it once.
+        fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
+        """
+        publisher = self.publisher(topic)
+        self._senders[topic] = publisher, encoder(self.interface.topics[topic], self.configuration.shared)
+        states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
+        stamp = stamp_of(states[-1]) if states else 0
+        self._streams[topic] = stamp + round(seconds * SECOND), self.value(topic, **fields) if value is None else value
+        self._stream(stamp, topic)
+
+    def value(self, topic: str, **fields: Any) -> Any:
+        """A value of a topic; what is not given is empty or zero."""
+        return _EMPTY[self.interface.topics[topic].type]._replace(**fields)
+
+    def publisher(self, topic: str) -> Publisher:
+        """A publisher of the test, which all nodes of the stack that take the topic have found."""
+        self._require_start()
+        if topic not in self._publishers:
+            row = self.interface.topics[topic]
+            self._publishers[topic] = self.node.create_publisher(message_type(row), topic, qos(row))
+            takers = len(self.interface.subscribers(topic))
+            self.run_until(lambda: self._publishers[topic].get_subscription_count() >= takers)
+        return self._publishers[topic]
+
+    def _stream(self, stamp: int, only: str = "") -> None:
+        for topic, (end, value) in list(self._streams.items()):
+            if only in ("", topic):
+                publisher, encode = self._senders[topic]
+                publisher.publish(encode(stamp, value))
+            if stamp >= end:
+                self._streams.pop(topic)
+
+    def play(self, steps: Sequence[Mapping[str, Any]] = (), **start: Any) -> Bag:
+        """Play a scenario from start to end, recorded; the same steps give the same numbers, bit for bit.
+
+        Parameters
+        ----------
+        steps : of the scenario, as in its file; none where `start` was called with `playing`.
+        start : as `start` takes it.
+
+        Returns
+        -------
+        the bag, whose folder is `bag.path`.  The stack has ended then.
+
+        Raises
+        ------
+        ArmFault
+            where the scenario failed.
+        """
+        if self._composition is None:
+            self.start(configuration=playing(steps, self._folder, **start))
+        assert self._composition is not None
+        played = self._composition.play()
+        self.close()
+        if played.failure:
+            raise ArmFault(played.failure)
+        recorder = self.configuration.sections["recorder"]
+        return read(Path(recorder["directory"], recorder["name"]))
+
+    def close(self) -> None:
+        """Destroy all nodes, the driver first, the recorder last."""
+        if self._composition is not None:
+            self._composition.close()
+            self._composition = None
+
+    def _require_start(self) -> None:
+        if self._composition is None:
+            self.start()
+
+
+def configured(
+    *own: Any, configuration: str | Path | Configuration = "wam", nodes: Sequence[str] = (), **values: Any
+) -> Configuration:
+    """A configuration in lockstep without a pace, with nodes and values as `RunningArm.start` takes them."""
+    base = configuration
+    if not isinstance(base, Configuration):
+        path = Path(base)
+        base = Configuration.load(path if path.suffix else packaged(str(base)))
+    replaced = {name: _entry(value) for name, value in values.items() if _is_node(value)}
+    every = [*(nodes or base.shared.nodes), *map(_entry, own)]
+    entries = [replaced.pop(declared(entry).name, entry) for entry in every]
+    assert not replaced, f"{', '.join(replaced)} is no node of this stack; it has {', '.join(every)}"
+    groups = {name.partition(".")[0] for name in base.sections[SHARED]}
+    changed: dict[str, dict[str, Any]] = {
+        SHARED: {
+            "nodes": list(dict.fromkeys(entries)),
+            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
+            "timing.timeout": TEST_LIMITS.lockstep_timeout,
+        }
+    }
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            section, begin = (SHARED, f"{name}.") if name in groups else (name, "")
+            changed.setdefault(section, {}).update(_flat(value, begin))
+        elif not _is_node(value):
+            changed[SHARED][name] = value
+    return base.with_sections(changed)
+
+
+def playing(steps: Sequence[Mapping[str, Any]], folder: Path, *own: Any, **start: Any) -> Configuration:
+    """`configured` with a scenario of these steps and a recorder, whose bag is ``folder/bag``."""
+    script = folder / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": list(steps)}), encoding="utf-8")
+    recorder = {"directory": str(folder), "name": "bag", **start.pop("recorder", {})}
+    return configured("scenario", "recorder", *own, scenario={"script": str(script)}, recorder=recorder, **start)
+
+
+def _is_node(value: Any) -> bool:
+    return isinstance(value, type) or (isinstance(value, str) and ":" in value)
+
+
+def _entry(node: Any) -> str:
+    return node if isinstance(node, str) else f"{node.__module__}:{node.__qualname__}"
+
+
+def _flat(values: Mapping[str, Any], begin: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        found |= _flat(value, f"{begin}{key}.") if isinstance(value, Mapping) else {f"{begin}{key}": value}
+    return found
