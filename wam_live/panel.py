@@ -13,7 +13,7 @@ from viser import uplot
 
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
 from wam_description.arm import Arm
-from wam_description.event import Code, Level
+from wam_description.event import Level
 from wam_description.signals import BASE, Contact, NodeStatus, Triple
 from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters

@@ -901,7 +901,9 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
     assert (first.begin, first.end) == pytest.approx((0.52, 1.545))
     assert (summary.traces.zero, traces.zero) == (0, START + clock)
     reaction = RecordedReaction(
-        clock + START + 5000 * MS, clock + START + 7000 * MS, Event(Code.REFUSED, values={"reason": "why", "holds": 1.0})
+        clock + START + 5000 * MS,
+        clock + START + 7000 * MS,
+        Event(Code.REFUSED, values={"reason": "why", "holds": 1.0}),
     )
     assert sentences("press", [reaction], traces.zero) == ["press: refused (refused) from 5.00 to 7.00 s: why"]
 

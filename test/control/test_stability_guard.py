@@ -365,9 +365,7 @@ FREE = replace(
 
 @pytest.mark.slow
 def test_the_velocity_obeys_the_factor() -> None:
-    loop = Loop(
-        replace(OWN, force_gain=(0.09,), force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE)
-    )
+    loop = Loop(replace(OWN, force_gain=(0.09,), force_error_limit=(1e9,), joint_speed_limit=4.0, limits=FREE))
     follow(loop, OWN.guard.posture)
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -6.0))
     speeds = []

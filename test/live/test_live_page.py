@@ -34,7 +34,7 @@ from wam_cli.commands.live import NICENESS, PageProcess, lateness, page_next_to
 from wam_cli.options import take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
-from wam_description.event import Code, Event, Level, holding
+from wam_description.event import Code, Level, holding
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
 from wam_description.signals import (
@@ -241,7 +241,12 @@ def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap
 
 
 def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
-    loop = NodeStatus(Level.WARN, "another link is touched", node="force_loop", events=(holding(Code.UNEXPLAINED, "other_link", cover="outer_link", touched="inner_link"),))
+    loop = NodeStatus(
+        Level.WARN,
+        "another link is touched",
+        node="force_loop",
+        events=(holding(Code.UNEXPLAINED, "other_link", cover="outer_link", touched="inner_link"),),
+    )
     page = status_page(Snapshot(measured=0.0, statuses={"force_loop": loop}), pressing=5.0)
     assert "commanded 5.0 N, not done: another link is touched" in page
     loop = loop._replace(events=())

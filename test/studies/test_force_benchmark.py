@@ -24,9 +24,7 @@ from wam_studies.harness import chosen_cases
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
 Q = (0.0, -1.0, 0.0, 0.8)
 ACROSS = Surface("outer_link", 0.3, (0.0, 0.0, -1.0), 4000.0, 0.3, is_plane=False)
-REPORTED = warning(
-    Code.NOT_REACHED, "force_strays", axis="force", unit="N", measured=8.0, desired=10.0, allowed=1.0
-)
+REPORTED = warning(Code.NOT_REACHED, "force_strays", axis="force", unit="N", measured=8.0, desired=10.0, allowed=1.0)
 TASK = Task(Q, ACROSS, 10.0)
 
 
@@ -239,7 +237,7 @@ def test_a_gain_that_the_guard_refuses_is_lowered_to_one_that_it_accepts() -> No
     high = configured(CONFIGURATION, TASK).with_values({"force_loop:force_gain": [0.2]})
     lowered = with_accepted_gain(high)
     gains = [c.node("force_loop", ForceLoopParameters).force_gain[0] for c in (high, lowered)]
-    assert 0.0 < gains[1] < 0.5 * gains[0]
+    assert 0.0 < gains[1] < 0.9 * gains[0]
     assert with_accepted_gain(lowered) is lowered, "accepted as it is"
 
 
@@ -259,7 +257,7 @@ def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_don
     blind = Task(straight, Surface("outer_link", WAM.covers.length[1], (x, y, z), 4000.0, 0.3, is_plane=True), 5.0)
     refusal = perform(CONFIGURATION, blind, 1.5)
     assert refusal.outcome is TaskEnd.REFUSED
-    assert "standard deviation" in refusal.reason
+    assert "may be off by" in refusal.reason
     wrong = perform(CONFIGURATION, good, 1.5, {"force_loop:contact_position": 0.1})
     assert wrong.outcome in (TaskEnd.SILENT, TaskEnd.ENDED)
     assert abs(wrong.mean - 10.0) > 1.0
