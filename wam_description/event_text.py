@@ -41,7 +41,8 @@ SENTENCES: Final = {  # by cause
     "{unit} of {desired:.3g} {unit}; the surface moves, something else pushes, or friction turns",
     "rising": "{rising_sentence}",
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, and it is at {measured:.4g} {unit}; allowed: "
-    "{allowed:.2g} {unit}, for {time:b} s: something is in the way, a joint is at its end, or the arm has no lever for it here",
+    "{allowed:.2g} {unit}, for {time:b} s: something is in the way, a joint is at its end, or the arm has no lever "
+    "for it here",
     "speed": RAISE,
     "torques_differ": "the torques are not those of a force at {position:.3g} m of {cover} (chi^2 {chi2:.3g}, allowed: "
     "{allowed:g}): it acts elsewhere, or is not the only one; pin it where it acts, or free the arm",
