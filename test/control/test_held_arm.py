@@ -77,7 +77,7 @@ def test_an_arm_that_is_pushed_gives_way_no_further_than_allowed_and_comes_back(
     arm = Pushed(own, press)
     arm.go(0.3)
     begin = arm.at
-    arm.go(6.0, size * UP)
+    arm.go(2.0, size * UP)
     way = float(UP @ (arm.at - begin))
     assert 0.05 < way < own.limits.free_travel + 0.03
     assert Code.PUSHED in arm.codes
@@ -120,7 +120,7 @@ def test_an_arm_that_holds_presses_no_harder_than_commanded(hand: float, goes: b
     assert arm.loop.event.code is Code.REFUSED
     assert arm.loop.event.holds
     assert (float(UP @ (arm.at - begin)) > 0.005) is goes
-    arm.go(5.0)
+    arm.go(3.0)
     assert arm.at == pytest.approx(begin, abs=0.003), "it goes back"
 
 
