@@ -421,7 +421,10 @@ def test_on_a_surface_stiffer_than_the_gain_allows_the_force_does_not_jump() -> 
     """The law alone, 0.03 m/s/N at a filter of 20 ms, is unstable there."""
     highest = []
     for limits in (GIVEN.limits, replace(GIVEN.limits, impact=0.0, joint_acceleration=0.0)):
-        loop, world = force_loop(ARM, replace(GIVEN, contact_source="pinned", limits=limits)), World(4000.0)
+        loop, world = (
+            force_loop(ARM, replace(GIVEN, force_gain=(0.03,), contact_source="pinned", limits=limits)),
+            World(4000.0),
+        )
         found = []
         for _ in range(400):
             moved(loop, world, 10.0)

@@ -141,7 +141,7 @@ steps:
     configuration = Configuration.load(packaged("wam")).with_values({"force_loop:limits.doubt": 9.0})
     run = Simulation(configuration, load(file, configuration.shared))
     assert run.play() == run.unmet == ""
-    assert run.doubts.startswith("press, position_assumed: something is touched and where it is known from the torques")
+    assert run.doubts.startswith("press, refused: 35 N at ")
     table = tmp_path / "table.csv"
     vary = f"{GAIN}={configuration.sections['force_loop']['force_gain'][0]}"
     with pytest.raises(SystemExit, match="0"):
@@ -149,7 +149,7 @@ steps:
     with table.open() as stream:
         (row,) = csv.DictReader(stream)
     assert row["failure"] == ""
-    assert row["reported"] == "press: position_assumed"
+    assert row["reported"] == "press: refused"
     assert float(row["force_worst"]) > 5.0
     assert "1 sets, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
 

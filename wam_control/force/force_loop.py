@@ -18,7 +18,7 @@ from wam_control.force.advice import Advice, tries
 from wam_control.force.axes import Axis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import CommandRun
-from wam_control.force.contact_place import ContactPlace, Place, pinned_position
+from wam_control.force.contact_place import STEEPEST, ContactPlace, Place, pinned_position
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
@@ -28,7 +28,7 @@ from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time
 from wam_control.force.problem import Row, linear, solve
-from wam_control.force.stability_guard import GuardAssessment, GuardedContact, GuardedForces
+from wam_control.force.stability_guard import GuardAssessment, Guarded, GuardedContact, GuardedForces
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE, GUARD
 from wam_control.thresholds import MOTION
@@ -331,6 +331,9 @@ class ForceLoop:
         known = self._run.believe(axis, size, torques, own, wound)
         if axis.place is None or axis.place.is_pinned or known.force >= axis.desired:
             return known
+        along = self._body.cover_pose(self._q, axis.place.cover).rotation[:, 0]
+        if abs(float(axis.direction @ along)) > math.sin(STEEPEST):
+            return known  # nor will it be known
         # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
         sd = axis.place.position_sd * max(known.force / axis.desired, 0.0) if axis.place.is_known else 0.0
         place = axis.place._replace(position_sd=max(sd, own.contact_position_sd))
@@ -351,7 +354,7 @@ class ForceLoop:
         """Joint velocities and torques (n,), and what limits them."""
         own, run, q = self.parameters, self._run, np.array(self._q)
         holds = any(event.holds for event in found)
-        factor = self._gain_factor(axes, dt)
+        factor = self._gain_factor(axes, contact, dt)
         wanted = np.clip(
             own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate)),
             -own.joint_speed_limit,
@@ -384,7 +387,8 @@ class ForceLoop:
             limits += self._at_ends(unlimited, velocity)
         effort = [0.0] * len(q)
         if axes and not holds:
-            effort = run.feed_forward.step(self._fed(axes, dt), velocity.tolist(), own, dt)
+            fed = self._fed(axes, dt)
+            effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
         return velocity, effort, limits
 
     def _hold_at(self, axes: Sequence[Axis], found: Sequence[Event]) -> Array:
@@ -510,16 +514,18 @@ class ForceLoop:
     ) -> list[Row]:
         """What pushes harder than allowed."""
         own, torques = self.parameters, self._measurement.torques
+        pressed = math.fsum(axis.desired for axis in forces) if self._run.is_touching else 0.0
         if not holds:
-            allowed, pressed = own.limits.contact_force, math.fsum(axis.desired for axis in forces)
-            if pressed and len(forces) == len(axes) and self._run.is_touching:
+            allowed = own.limits.contact_force
+            if pressed and len(forces) == len(axes):
                 allowed = min(allowed, own.limits.whole_force * pressed)
         now = torques.now - self._run.resting.torques
         if torques.acceleration is not None:
             now = now + self._axes.forces.inertia(self._q) @ torques.acceleration
         chi2 = max((one.chi2 for one in known), default=0.0)
         gain = self._supervision.present * max(own.force_gain)
-        return self._pushed.step(self._q, forces, torques._replace(now=now), contact, chi2, allowed, gain, own, dt)
+        torques = torques._replace(now=now)
+        return self._pushed.step(self._q, forces, torques, contact, chi2, allowed, bool(pressed), gain, own, dt)
 
     def _at_ends(self, unlimited: Array, velocity: Array) -> list[Event]:
         """The joints that do not move on at their ends."""
@@ -596,13 +602,24 @@ class ForceLoop:
         )
         return [event.with_values(**self._run.advice.ways) if event.cause == "error" else event for event in found]
 
-    def _gain_factor(self, axes: Sequence[Axis], dt: float) -> float:
+    def _gain_factor(self, axes: Sequence[Axis], contact: Contact, dt: float) -> float:
         """The guard's factor of the gains."""
         if not axes:
             return 1.0
+        if self.parameters.mode == "joint_torque" and all(axis.is_joint for axis in axes):
+            return self._supervision.factor(lambda: self._torques_at(contact), dt)
         return self._supervision.factor(
             lambda: [one for each in self._possible(axes) for one in self._guarded(each)], dt
         )
+
+    def _torques_at(self, contact: Contact) -> list[Guarded]:
+        """Where the torques of the joints press, for the guard: at the estimated contact, or anywhere on the cover."""
+        own, covers = self.parameters, self._body.arm.covers
+        place = ContactPlace(covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
+        positions = [(place.position, place.position_sd)]
+        if own.schedule == "position" and not place.is_known:
+            positions = [(part * covers.length_of(place.cover), 0.0) for part in GUARD.positions]
+        return [each for position in positions for each in self._supervision.contacts(self._q, place.cover, *position)]
 
     def _possible(self, axes: Sequence[Axis]) -> list[Sequence[Axis]]:
         """The axes, and where the gains follow the position, and it is not known, those of other positions."""

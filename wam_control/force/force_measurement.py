@@ -88,7 +88,8 @@ class ForceMeasurement:
         self._external = torque - self._tare - self._zero
         counted = self._external if is_touched or not own.is_estimated else self._none
         before = self._filters["torque"].value
-        now = self._filters["torque"].step(counted, own.force_filter, dt)
+        lag = 0.0 if own.mode == "joint_torque" else own.force_filter
+        now = self._filters["torque"].step(counted, lag, dt)
         sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._none + sensing_of(own).torque_sd
         self.torques = Torques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
 

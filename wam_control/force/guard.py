@@ -15,8 +15,8 @@ from wam_control.force.belief import tolerance
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.force.stability_guard import (
     GuardAssessment,
+    Guarded,
     GuardedContact,
-    GuardedForces,
     GuardedTask,
     StabilityGuard,
     posture_of,
@@ -100,12 +100,16 @@ class Supervision:
         parameters = self._parameters
         self.report = report(self.assessment, self.watch, parameters.guard.mode, parameters.mode == "joint_torque")
 
+    def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
+        """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
+        return self._guard.contacts(q, cover, position, position_sd)
+
     def gains(self, joint: int, direction: Sequence[float]) -> tuple[float, float]:
         """G_I and G_P of a joint, or for -1 of the force along a unit vector of its frame (3,)."""
         law = self.torque_law if joint >= 0 else self.force_law.along(direction)
         return law.gain[max(joint, 0)], law.proportional_gain[max(joint, 0)]
 
-    def factor(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> float:
+    def factor(self, where: Callable[[], Sequence[Guarded]], dt: float) -> float:
         """Factor of the gains in this period.
 
         Parameters
@@ -163,7 +167,7 @@ class Watch:
         self.factor, self.scale = 1.0, found.scale
         self.largest = GUARD.largest_scale if is_scheduled else self._needed
 
-    def step(self, where: Callable[[], Sequence[GuardedForces]], dt: float) -> bool:
+    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if the factor has changed.
 
         Parameters

@@ -83,6 +83,7 @@ class PushedArm:
         contact: Contact,
         chi2: float,
         allowed: float,
+        is_pressing: bool,
         gain: float,
         own: ForceLoopParameters,
         dt: float,
@@ -97,6 +98,7 @@ class PushedArm:
         contact : estimated.
         chi2 : of the torques that the commanded forces do not explain.
         allowed : force, N, up to which nothing gives way.
+        is_pressing : whether the commanded force presses on something.
         gain : of the force law, m/s/N.
         own : parameters of the force loop.
         dt : s.
@@ -107,14 +109,13 @@ class PushedArm:
             self._from = tool
         rows: list[Row] = []
         pushes = [Push.at(torques.now, torques.sd, self._jacobian(q, axes, contact))]
-        if chi2 > FORCE.unexplained:  # what is left without the commanded force, on the link that explains it best
-            rest = torques.now + sum(axis.sensed.press * axis.force(torques.now) for axis in axes if axis.sensed)
-            pushes.append(Push.at(rest, torques.sd, likeliest_link(self._body, q, rest)))
-        # a force that was allowed, and falls with its command, is no push
-        fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
+        if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
+            pushes.append(Push.at(torques.now, torques.sd, likeliest_link(self._body, q, torques.now)))
         hardest = max(pushes, key=lambda push: push.least)
-        fading = min(self._allowed * (1.0 - fade), own.limits.whole_force * hardest.least)
-        self._allowed = allowed = max(allowed, fading)
+        # a commanded force that was allowed, and falls, is no push
+        fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
+        allowed = max(allowed, self._allowed * (1.0 - fade))
+        self._allowed = allowed if is_pressing else 0.0
         if hardest.least > allowed:
             self._since = 0.0
             values: dict[str, Value] = {"force": hardest.least, "allowed": allowed}
