@@ -259,8 +259,10 @@ class StreamThresholds:
         360.0,
     )  # rad, after which an angle wraps; or degrees as rad
     wraps: float = 0.75  # of a turn: a larger jump from message to message is a wrap
+    alike: float = 3.0  # times the largest other step: in a wrap an angle moves by less than that
     within: float = 1.01  # of a turn, which an angle that wraps does not leave
-    zero: float = 5.0  # times the usual step of a position: a larger one without a velocity moves its zero
+    zero: float = 5.0  # times what the velocity usually leaves of a step of the position: more may move its zero
+    beyond: float = 2.0  # times the largest step by the velocity: a larger one does
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
