@@ -243,7 +243,7 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     numbers = {one.name: one.measured for one in step_findings(recording.summary())}
     assert math.isnan(numbers["press 4 N: error of the true one"])
     analysis = " ".join(analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100).split())
-    assert "the worst true one +5.0 % off (press 8 N)." in analysis
+    assert "Forces: 1 of 1, worst +5.0 %." in analysis
     assert ("press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis) == (seconds > 0.3)
     assert "press 4 N: bias" not in analysis
 
