@@ -693,7 +693,7 @@ def test_without_truth_the_estimate_shows_what_was_too_hard():
     bag = with_limits(recording)
     of_bus = yaml.safe_load(bag.attachments["parameters.yaml"])
     own = of_bus["/wam/force_loop"]["ros__parameters"]
-    own["nodes"] = ["bus_driver:BusInterface" if node == "driver" else node for node in own["nodes"]]
+    own["nodes"] = ["bus_driver:OwnInterface" if node == "driver" else node for node in own["nodes"]]
     (hard,) = summarize(bag._replace(attachments={"parameters.yaml": yaml.safe_dump(of_bus).encode()})).unplanned.hard
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
 
