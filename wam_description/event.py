@@ -39,6 +39,7 @@ class Code(StrEnum):
     NOT_FOLLOWED = "not_followed"  # goes on: the commanded posture or position moves faster than the arm may
     REFUSED = "refused"  # a command is not taken: it is beyond a limit or has no effect
     FAULT = "fault"  # of the driver, which has put the brakes on
+    MODEL_OFF = "model_off"  # the model of the contact estimator is off by more than is tolerable
     DONE = "done"  # the scenario was played to its end
 
     @property

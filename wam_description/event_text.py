@@ -6,6 +6,26 @@ from typing import Any, Final
 
 from wam_description.event import CAUSE, Code, Event
 from wam_description.number_text import brief
+from wam_description.reasons import Reason
+
+REASONS: Final = {
+    Reason.MOMENT_ONLY: "only the moment is measured on this link: the contact position is unknown, the force is a "
+    "lower bound",
+    Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
+    Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
+    Reason.SHOULDER: "the axes of the shoulder leave one of its moments unmeasured in this pose",
+    Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
+    Reason.ELBOW: "torque of the elbow near 0: a contact there and one on the inner link cannot be distinguished",
+    Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
+    Reason.LINKS: "the torques do not identify the link",
+    Reason.MORE: "one contact does not explain the torques",
+    Reason.ALONG: "the force may act along the link: then its torques are the same at every position, and on the link "
+    "before",
+    Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is what those of the links "
+    "lack to 1",
+    Reason.TOO_EARLY: "too few samples yet",
+    Reason.BRAKED: "brakes hold the motors",
+}
 
 HOLDS: Final = "the arm holds its position"
 SENSORS: Final = "use joint sensors"
@@ -118,6 +138,7 @@ SENTENCES: Final = {  # by cause
     "command more force, or another direction or pose",
     "torque_uncertain": "{axis}: the torque is known to +-{sd:b} N m, {fraction:.0%} of the commanded {desired:b} N m; "
     f"sensing.reported_fraction, {{allowed:.0%}}, is to be known: {SENSORS}, or command more torque",
+    "model_off": "the model is off: {part}; see /diagnostics, run 'wam identify'",
     "cycle": "the measured force is in a limit cycle of {swing:b} N peak to peak and {period:b} s about {desired:.3g} "
     "N; allowed: limits.cycle_force, {allowed:g} of the commanded; friction or the surface keeps it up: lower "
     f"force_gain, or {SENSORS}",
@@ -185,6 +206,11 @@ def sentence(event: Event) -> str:
     if "rising" in values and cause != "rising":
         end += f"; {_fill(RISING, values)}"
     return _fill(text, values | parts) + end
+
+
+def reasons_in_words(reasons: Reason) -> str:
+    """Why an estimate of a contact is not to be trusted, in words; '' where it is."""
+    return "; ".join(text for reason, text in REASONS.items() if reason in reasons)
 
 
 def sentences(events: Iterable[Event]) -> str:

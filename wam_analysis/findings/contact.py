@@ -110,7 +110,6 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
     least = "the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
     yield Finding(f"{name}: standard deviation of the force", "N", one.force_sd)
-    yield Finding(f"{name}: second contact suspected", "%", 100.0 * one.second, note="of the time")
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be only the least one" * (not one.is_placed)
     yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
