@@ -295,7 +295,6 @@ class ReportLayout:
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
     grey: str = "#9aa3ad"  # of raw values behind a line
     png_dpi: int = 130  # of a picture on a page
-    ticks: int = 5  # at most, across a small picture
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
     dpi: int = 200  # of the demonstration's picture
     size: tuple[float, float] = (9.0, 4.0)  # inches

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.finding import Finding, Section, rest_words, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -356,11 +356,7 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
             Finding(f"{one.label}: slips", "", float(found.slips), note=f"{found.reversals} reverse the direction"),
         ]
-        if not found.slips:
-            sentences.append(f"{one.label}: never moved.")
-            continue
-        at_rest = f"at rest for {100.0 * found.stuck:.0f} % of the time, moved {times(found.slips)}"
-        sentence = f"{one.label}: {at_rest if found.stuck or found.slips > 1 else 'moved all the time'}"
+        sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")
