@@ -18,6 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from wam_analysis.findings.analysis import analyse
 from wam_analysis.table import markdown
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.task.scenario import STEP_KEYS
@@ -300,6 +301,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "claims, count": lambda: claims.count(itertools.chain(*claims.load(CLAIMS).values())),
         **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
         "verdict of the demonstration": verdict,
+        "verdicts of the samples": verdicts_of_samples,
         "joints of barrett-wam7": joints_of_today,
         "motors of barrett-wam7": motors_of_today,
         "demonstration of barrett-wam7": lambda: (
@@ -319,6 +321,13 @@ def verdict() -> str:
     """The verdict of the demonstration, as `wam demo` prints it."""
     _, head, rest = (ROOT / "docs" / "demo.txt").read_text(encoding="utf-8").partition("Result,")
     return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
+
+
+def verdicts_of_samples() -> str:
+    """The first lines of `wam analyse` on each sample."""
+    found = {bag.name: analyse(bag, lambda doing: None).sections[0].sentences for bag in sorted(SAMPLES.iterdir())}
+    rows = [[f"`{name}`", what, *(line.partition(": ")[2] for line in rest)] for name, (what, *rest) in found.items()]
+    return markdown(["sample", "what it is", "wrong", "shows"], rows)
 
 
 @cache

@@ -1,24 +1,56 @@
-"""A motor bus that is none: what `bus_driver.py` needs of yours."""
+"""A motor bus that is none: what `bus_driver.py` needs of yours, `wam_driver.bus.bus_driver_node.Hardware`."""
+
+from collections.abc import Sequence
 
 
 class FakeBus:
-    """Motors with inertia and damping; replace it by yours, with the same method and attributes.
+    """Motors with inertia and damping; replace it by yours, with the same methods and attributes.
 
     Attributes
     ----------
     position, velocity, current : of the motors, rad, rad/s, A, as measured.
+    is_running : whether they are known.
+    advice : what a person has to do before the motors may be released, '' where nothing.
+    fault : why they were braked, '' where there is no reason.
     """
 
     INERTIA, DAMPING = 2e-3, 0.02  # kg m^2, N m s/rad
+    is_running, advice, fault = True, "", ""
 
-    def __init__(self, torque_constant: tuple[float, ...]) -> None:
-        self._torque_constant = torque_constant
+    def __init__(self, torque_constant: tuple[float, ...], peak: list[float], period: float) -> None:
+        self._torque_constant, self._peak, self._period = torque_constant, peak, period
         self.position, self.velocity, self.current = ([0.0] * len(torque_constant) for _ in range(3))
+        self._is_released = False
 
-    def write(self, currents: list[float], brakes_on: bool, dt: float) -> None:
-        """Send currents, A, and the state of the brakes; here they also move the motors."""
-        self.current = list(currents)
-        for i, (current, constant) in enumerate(zip(currents, self._torque_constant, strict=True)):
+    def exchange(self, periods: int) -> None:
+        """Take the state of the motors; here they also move, by some periods."""
+        dt = periods * self._period
+        for i, (current, constant) in enumerate(zip(self.current, self._torque_constant, strict=True)):
             torque = current * constant - self.DAMPING * self.velocity[i]
-            self.velocity[i] = 0.0 if brakes_on else self.velocity[i] + torque / self.INERTIA * dt
+            self.velocity[i] = self.velocity[i] + torque / self.INERTIA * dt if self._is_released else 0.0
             self.position[i] += self.velocity[i] * dt
+
+    def command(self, currents: Sequence[float]) -> None:
+        """Send currents, A, clipped."""
+        if self._is_released:
+            self.current = [min(max(i, -most), most) for i, most in zip(currents, self._peak, strict=True)]
+
+    def release(self) -> None:
+        """Release the brakes."""
+        self._is_released = True
+
+    def brake(self) -> None:
+        """Put on the brakes, without a current."""
+        self._is_released = False
+        self.current = [0.0] * len(self.position)
+
+    stop = brake
+
+    def go_on(self) -> None:
+        """Start what has to be started."""
+
+    clear = close = go_on
+
+    def confirm_home(self) -> bool:
+        """These motors know their angles."""
+        return False

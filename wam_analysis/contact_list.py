@@ -23,14 +23,13 @@ from wam_analysis.demo_traces import (
 from wam_analysis.held_messages import held_rows
 from wam_analysis.measures.runs import runs
 from wam_analysis.thresholds import TOUCH
-from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, SECOND
+from wam_description.event_text import REASONS
 from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"
 NOT_CERTAIN = "Without contact/hypotheses it is not known how certain contacts are."
 NOT_PLACED = "not recorded (contact/point), so it is not known whether a force is only the least one"
 NOT_ESTIMATED = "the estimated contact was not recorded"
-TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 
 
 class CutBy(Enum):
@@ -53,8 +52,7 @@ class Estimate(NamedTuple):
     is_placed : whether positions were recorded.
     force, force_sd : size, N.
     is_lower_bound : whether that is the least force that explains the torques.
-    second : fraction of the time in which a second contact was suspected; NaN without `contact/hypotheses`.
-    reasons : why the estimate is not to be trusted for most of the time, a second contact left out.
+    reasons : why the estimate is not to be trusted for most of the time.
     """
 
     link: str
@@ -66,7 +64,6 @@ class Estimate(NamedTuple):
     force: float
     force_sd: float
     is_lower_bound: bool
-    second: float
     reasons: tuple[str, ...]
 
 
@@ -269,7 +266,7 @@ def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Es
     link = most(estimated.frame[rows])
     own = rows[estimated.frame[rows] == link]
     bits = certainty.reasons[own][certainty.reasons[own] >= 0]
-    lasting = {why: float(np.mean(bits >> i & 1)) for i, why in enumerate(REASONS)} if len(bits) else {}
+    lasting = {text: float(np.mean(bits & why > 0)) for why, text in REASONS.items()} if len(bits) else {}
     probability, position_sd, force_sd = (
         median(certainty.numbers[name][own]) for name in ("probability", "position_sd", "force_sd")
     )
@@ -285,8 +282,7 @@ def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Es
         median(estimated.size[own]),
         force_sd,
         float(np.sum(estimated.is_lower_bound[placed])) > TOUCH.lasting * len(placed),
-        float(np.mean(bits & sum(TWO) > 0)) if len(bits) else NAN,
-        tuple(why for why, part in lasting.items() if part > TOUCH.lasting and why not in (SECOND, CERTAIN_SECOND)),
+        tuple(why for why, part in lasting.items() if part > TOUCH.lasting),
     )
 
 

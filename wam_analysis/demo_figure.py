@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from wam_analysis import arm_picture
 from wam_analysis.contact_comparison import StepContact
 from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
+from wam_analysis.demo_traces import ForceSignal, Numbers
 from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_analysis.thresholds import LAYOUT
@@ -178,7 +178,7 @@ def _seconds(summary: DemoSummary) -> Numbers:
     return seconds
 
 
-def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 76, most: int = 0) -> None:
+def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 76) -> None:
     """Components along the commanded force; magnitudes if none is commanded.
 
     Parameters
@@ -187,9 +187,7 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     summary : what the bag shows.
     letter : label of the axes.
     room : characters that fit into its width for the names of the steps, 0 for none.
-    most : largest number of points of each line, 0 for all.
     """
-    summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
     pressed = traces.commanded.acts
 
@@ -224,9 +222,8 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     _name_steps(axes, summary, room)
 
 
-def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:
+def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)") -> None:
     """Contact position along the link, true and estimated; arguments as in `draw_forces`."""
-    summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
     length = max(arm.covers.length) * 100.0
     for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.estimated, ESTIMATED, 1.0)):
@@ -242,20 +239,6 @@ def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c
     axes.set_ylabel("position [cm]")
     axes.set_xlabel("time [s]")
     _frame(axes, summary, letter)
-
-
-def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
-    """The summary with at most so many instants, evenly spaced."""
-    traces = summary.traces
-    if not most or len(traces.stamp) <= most:
-        return summary
-    rows = np.linspace(0, len(traces.stamp) - 1, most).astype(np.int64)
-
-    def some(signal: ForceSignal) -> ForceSignal:
-        return ForceSignal(signal.frame[rows], signal.force[rows], signal.position[rows], signal.is_placed[rows])
-
-    signals = map(some, (traces.commanded, traces.measured, traces.true, traces.estimated, traces.push))
-    return summary._replace(traces=Traces(traces.stamp[rows], *signals))
 
 
 def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:

@@ -19,6 +19,7 @@ from wam_analysis.findings.text import table_lines
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.thresholds import LAYOUT, TOUCH
 from wam_bag.bag import BagError, read
+from wam_bag.errors import command
 from wam_description.event import Code
 from wam_sim.reactions import sentences, within
 from wam_sim.recording import recorded_run
@@ -53,8 +54,8 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
     summary = summary_of(run)
     if not summary.steps:
         raise BagError(
-            f"{bag} is not a recording of the demonstration: it has no step of a scenario; 'wam analyse {bag}' "
-            f"analyses any recording, 'wam bag info {bag}' lists its topics"
+            f"{bag} is not a recording of the demonstration: it has no step of a scenario; "
+            f"{command('wam analyse', bag)} analyses any recording, {command('wam bag info', bag)} lists its topics"
         )
     notes: tuple[str, ...] = ()
     if picture is not None:

@@ -259,8 +259,10 @@ class StreamThresholds:
         360.0,
     )  # rad, after which an angle wraps; or degrees as rad
     wraps: float = 0.75  # of a turn: a larger jump from message to message is a wrap
+    alike: float = 3.0  # times the largest other step: in a wrap an angle moves by less than that
     within: float = 1.01  # of a turn, which an angle that wraps does not leave
-    zero: float = 5.0  # times the usual step of a position: a larger one without a velocity moves its zero
+    zero: float = 5.0  # times what the velocity usually leaves of a step of the position: more may move its zero
+    beyond: float = 2.0  # times the largest step by the velocity: a larger one does
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions
@@ -293,7 +295,6 @@ class ReportLayout:
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
     grey: str = "#9aa3ad"  # of raw values behind a line
     png_dpi: int = 130  # of a picture on a page
-    ticks: int = 5  # at most, across a small picture
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
     dpi: int = 200  # of the demonstration's picture
     size: tuple[float, float] = (9.0, 4.0)  # inches

@@ -12,7 +12,7 @@ import yaml
 from mcap.records import Channel
 
 from wam_bag import safe_yaml
-from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError
+from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import MAGIC, Bytes
@@ -42,7 +42,7 @@ def files(path: Path) -> list[Path]:
     if forgotten := sorted({file.name for file in found} - set(named)) if named else []:
         raise BagError(
             f"{path} has the file {forgotten[0]}, which its metadata.yaml does not list; "
-            f"'wam bag repair {path}' writes it again, or give the file by itself"
+            f"{command('wam bag repair', path)} writes it again, or give the file by itself"
         )
     if named:
         return [path / name for name in named]
@@ -65,19 +65,19 @@ def _listed_files(path: Path) -> list[str]:
         listed = [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]]
     except (yaml.YAMLError, ValueError, KeyError, TypeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise BagError(f"{file} is damaged ({reason}); 'wam bag repair {path}' writes it again") from None
+        raise BagError(f"{file} is damaged ({reason}); {command('wam bag repair', path)} writes it again") from None
     for name in listed:
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise BagError(
-                f"{file} lists {name}, which is outside the bag; 'wam bag repair {path}' writes metadata.yaml again "
-                "from the files in the directory"
+                f"{file} lists {name}, which is outside the bag; {command('wam bag repair', path)} writes "
+                "metadata.yaml again from the files in the directory"
             )
         if name.endswith(COMPRESSED):
             raise _compressed(path)
         if not name.endswith(".mcap"):
             raise BagError(f"{path} is recorded as {name}; only storage 'mcap' is read")
     if len(set(listed)) < len(listed):
-        raise BagError(f"{file} lists a file twice; 'wam bag repair {path}' writes it again")
+        raise BagError(f"{file} lists a file twice; {command('wam bag repair', path)} writes it again")
     return listed
 
 
@@ -97,7 +97,7 @@ def _compressed(path: Path) -> BagError:
     file, bag = (path, path.parent) if path.is_file() else (path / f"*{COMPRESSED}", path)
     return BagError(
         f"{path} was compressed as a whole by rosbag2 (compression mode 'file') and is not read; decompress it with "
-        f"'zstd -d --rm {file}', then 'wam bag repair {bag}' writes its metadata.yaml again"
+        f"'zstd -d --rm {file}', then {command('wam bag repair', bag)} writes its metadata.yaml again"
     )
 
 

@@ -20,7 +20,7 @@ from mcap.records import Attachment
 from wam_bag import safe_yaml
 from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
-from wam_bag.errors import RecordingError
+from wam_bag.errors import RecordingError, command
 from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata
 
@@ -336,7 +336,7 @@ class BagWriter:
         except OSError as second:
             raise RecordingError(
                 f"{reason}, and the bag could not be closed ({second.strerror}){hint}; "
-                f"then 'wam bag repair {self.path}' closes it"
+                f"then {command('wam bag repair', self.path)} closes it"
             ) from None
         raise RecordingError(f"{reason}; the bag is closed, what was recorded until then can be read{hint}") from None
 

@@ -12,7 +12,7 @@ from mcap.records import Attachment, Channel, Schema
 from wam_bag import safe_yaml
 from wam_bag.bag_file import TopicPart, files, is_selected, opened, parts
 from wam_bag.contents import add_attachments
-from wam_bag.errors import BagError, Damage
+from wam_bag.errors import BagError, Damage, command
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import HEAD
 from wam_bag.mcap_writer import McapWriter
@@ -78,11 +78,12 @@ def cut(source: Path, target: Path, part: Cut) -> Path:
     if lacking := [
         name for name in part.topics or () if not any(is_selected(topic, [name]) for topic in taken.channels)
     ]:
-        raise BagError(f"{source} has no topic {', '.join(lacking)}; what it has: 'wam bag info {source}'")
+        raise BagError(f"{source} has no topic {', '.join(lacking)}; what it has: {command('wam bag info', source)}")
     times = [message.log_time for some in taken.messages.values() for message in some]
     if not any(part.begin_ns <= time < part.end_ns for time in times):
         raise BagError(
-            f"{source} has nothing from {part.begin_ns} to {part.end_ns} ns; its times: 'wam bag info {source}'"
+            f"{source} has nothing from {part.begin_ns} to {part.end_ns} ns; "
+            f"its times: {command('wam bag info', source)}"
         )
     target.mkdir(parents=True)
     file = target / f"{target.name}_0.mcap"

@@ -1,6 +1,8 @@
 """What can be wrong with a bag: the errors that reach the user and those within the package."""
 
+import shlex
 import struct
+from pathlib import Path
 from typing import Final
 
 import zstandard
@@ -25,6 +27,12 @@ class TooLargeError(Damage):
 
 class NotClosedError(Damage):
     """A file that was not finished."""
+
+
+def command(words: str, path: Path | str, options: str = "") -> str:
+    """A command on a path as the reader of a message can copy it, in quotes."""
+    text = f"{words} {shlex.quote(str(path))} {options}".rstrip()
+    return f'"{text}"' if "'" in text else f"'{text}'"
 
 
 BROKEN: Final = (

@@ -170,6 +170,11 @@ class Configuration(NamedTuple):
                 raise ParameterError(
                     f"{path}: section '{SHARED}/{name}' is of no node in 'nodes'; the base has {known}"
                 )
+        if any(":" in str(entry) for entry in listed):  # a node of one's own may have more parameters
+            for name, flat in changes.items():
+                if name != SHARED:
+                    sections[name] = {**flat, **sections[name]}
+            whole = Configuration(path, _frozen(sections))
         return whole.with_values(
             {
                 key if name == SHARED else f"{name}:{key}": value

@@ -30,6 +30,7 @@ class Code(StrEnum):
     AT_LIMIT = "at_limit"  # a bound of the motion is reached
     OSCILLATING = "oscillating"  # the measured force turns back again and again
     FAULT = "fault"  # of the driver, which has put the brakes on
+    MODEL_OFF = "model_off"  # the model of the contact estimator is off by more than is tolerable
     DONE = "done"  # the scenario was played to its end
 
     @property

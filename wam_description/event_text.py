@@ -7,6 +7,26 @@ from typing import Any, Final
 
 from wam_description.event import Code, Event
 from wam_description.number_text import brief
+from wam_description.reasons import Reason
+
+REASONS: Final = {
+    Reason.MOMENT_ONLY: "only the moment is measured on this link: the contact position is unknown, the force is a "
+    "lower bound",
+    Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
+    Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
+    Reason.SHOULDER: "the axes of the shoulder leave one of its moments unmeasured in this pose",
+    Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
+    Reason.ELBOW: "torque of the elbow near 0: a contact there and one on the inner link cannot be distinguished",
+    Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
+    Reason.LINKS: "the torques do not identify the link",
+    Reason.MORE: "one contact does not explain the torques",
+    Reason.ALONG: "the force may act along the link: then its torques are the same at every position, and on the link "
+    "before",
+    Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is what those of the links "
+    "lack to 1",
+    Reason.TOO_EARLY: "too few samples yet",
+    Reason.BRAKED: "brakes hold the motors",
+}
 
 PINNED: Final = "pin the force where it acts (the torque of a command across a link, or contact_source)"
 RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm goes on and is late"
@@ -82,6 +102,11 @@ def sentence(event: Event) -> str:
     values = {**event.values, **_parts(event.values)}
     end = HOLDING if event.holds and "hold" not in SENTENCES[cause] and "goes back" not in SENTENCES[cause] else ""
     return _fill(SENTENCES[cause], values) + end
+
+
+def reasons_in_words(reasons: Reason) -> str:
+    """Why an estimate of a contact is not to be trusted, in words; '' where it is."""
+    return "; ".join(text for reason, text in REASONS.items() if reason in reasons)
 
 
 def sentences(events: Iterable[Event]) -> str:

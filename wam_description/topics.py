@@ -44,7 +44,7 @@ HYPOTHESIS_COLUMNS: Final = (
     "moment_y",
     "moment_z",
     "residual",  # chi^2 that the contact leaves unexplained
-    "reasons",  # why the position is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact.contact_inference.REASONS`
+    "reasons",  # why the position is unknown or the answer is not to be trusted: bits of `wam_description.reasons.Reason`
 )
 
 FRICTION_COLUMNS: Final = (

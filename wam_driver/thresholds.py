@@ -58,7 +58,6 @@ class BusThresholds:
     collect: float = 0.6  # of a period, in which the positions have to come
     stray: int = 3  # frames that none of ours sends, before there is a fault: one may be left over in a queue
     jump: float = 0.25  # turn of a motor between two positions, above which one is dropped: 157 rad/s in 10 ms
-    velocity_bandwidth: float = 180.0  # rad/s, of the filter of the velocities, as in libbarrett; a count is 0.8 rad/s
     gain_ratio: float = (
         1.5  # of a controller's counts per N m and the nominal ones, either way; real ones differ by 1.3
     )

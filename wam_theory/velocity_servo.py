@@ -91,7 +91,7 @@ def least_damping(period_map: Array, slow: float) -> float:
     values = np.linalg.eigvals(period_map).astype(np.complex128)
     rates = np.log(values[np.abs(values) > SEARCH.mode_memory])
     size = np.abs(rates)
-    used = (np.abs(rates.imag) > 0.0) & (size < slow)
+    used = (np.abs(rates.imag) > 0.0) & (size > SEARCH.mode_growth) & (size < slow)  # slower: a constant, rounded
     return float(min(-rates.real[used] / size[used], default=1.0))
 
 

@@ -122,6 +122,7 @@ def coarse() -> list[Case]:
         ("centiseconds", sqlite, 250.0, lambda t: round(100.0 * t) / 100.0),
         ("two of three", ros1, 150.0, lambda t: math.floor(50.0 * t) / 50.0),
         ("never set", by_mcap_ros2, 50.0, lambda t: -1.7e9),
+        ("milliseconds", by_mcap_ros2, 400.0, lambda t: round(t, 3)),
     ]
     return [
         Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
@@ -224,7 +225,9 @@ def zeros() -> list[Case]:
     return [
         Case(f"{by:g}", write, one("/joint_states", rate, 0.7, 0.5, moved(12.0, by, rate)), sine(0.7, 0.5) | FRICTION,
              "the zero of the position moves once")
-        for write, rate, by in ((by_rosbags, 100.0, 0.5), (sqlite, 250.0, -1.3), (ros1, 100.0, 3.0))
+        for write, rate, by in (
+            (by_rosbags, 100.0, 0.5), (sqlite, 250.0, -1.3), (ros1, 100.0, 3.0), (by_mcap_ros2, 100.0, 0.06),
+        )
     ]  # fmt: skip
 
 

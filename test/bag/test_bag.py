@@ -33,6 +33,7 @@ from wam_bag.bag import BagError, BoolColumns, JointColumns, Messages, PointColu
 from wam_bag.bag_writer import BagWriter, RecordingError, exact_cdr, policies
 from wam_bag.cdr import ExactLength, stamp_reader
 from wam_bag.definitions import DefinitionError, definition, schema, type_hash
+from wam_bag.errors import command
 from wam_bag.mcap_writer import McapWriter
 from wam_description.topics import TOPICS
 
@@ -412,3 +413,11 @@ def test_bags_are_read_without_the_rest_of_the_project(tmp_path: Path) -> None:
         check=False,
     )
     assert (done.stderr, done.stdout.split()) == ("", ["wam_bag"])
+
+
+@pytest.mark.parametrize(
+    ("path", "stated"),
+    [("bags/a", "'wam bag repair bags/a'"), ("my bags/a", "\"wam bag repair 'my bags/a'\"")],
+)
+def test_a_command_in_a_message_can_be_copied(path: str, stated: str) -> None:
+    assert command("wam bag repair", path) == stated

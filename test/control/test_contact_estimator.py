@@ -12,17 +12,15 @@ from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_analysis.findings.analysis import analyse
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact.contact_estimator_node import ContactEstimatorNode
-from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_control.contact.thresholds import CONTACT
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
+from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, State
-from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
@@ -135,21 +133,21 @@ def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> Non
     assert estimate.position == pytest.approx(0.28, abs=max(0.03, estimate.position_sd))
     assert abs(estimate.position - 0.28) < 2 * estimate.position_sd
     assert np.linalg.norm(np.subtract(estimate.force, force)) < 0.15 * size
-    assert estimate.reason == ""
+    assert not estimate.reasons
 
 
 def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
     estimate = at_rest("inner_link", 0.3, (0.0, 8.0, 0.0))
     assert estimate.link == "inner_link"
     assert math.isnan(estimate.position)
-    assert "the shoulder measures only the moment" in estimate.reason
+    assert Reason.MOMENT_ONLY in estimate.reasons
     assert estimate.moment[2] == pytest.approx(2.4, rel=0.05)
     assert np.linalg.norm(estimate.force) <= 8.0
 
 
 def test_a_push_on_the_inner_link_whose_torques_are_those_of_one_along_the_outer_is_certain_on_neither() -> None:
     estimate = at_rest("inner_link", 0.3, (0.0, 0.0, 8.0))
-    assert "the force may act along the link" in estimate.reason
+    assert Reason.ALONG in estimate.reasons
     inner = next(one for one in estimate.hypotheses if one.cover == "inner_link")
     assert 0.05 < inner.probability < 0.95
     assert inner.moment[1] == pytest.approx(-2.4, rel=0.05)
@@ -174,123 +172,12 @@ def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
 
 
 TILTED = (0.0, -1.05, 0.3, 0.9)
-FIRST = ("outer_link", 0.3, (0.0, 0.0, 8.0))
-
-
-def after_steady_contact(
-    cover: str, x: float, force: tuple[float, float, float], threshold: float
-) -> list[ContactEstimate]:
-    """What joint sensors feel in the 0.25 s after another push began 0.3 s after the first."""
-    arm, found = plant(TILTED), []
-    estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(SENSORS, second=threshold))
-    for tick in range(600):
-        if tick == 50:
-            push(arm, *FIRST)
-        if tick == 350:
-            push(arm, cover, x, force)
-        for _ in range(SUBSTEPS):
-            arm.step(ZERO)
-        sense(estimator, arm, ZERO)
-        if tick % OUTER == 0:
-            found.append(estimator.estimate())
-    assert not any(estimate.contacts > 1 for estimate in found[:70])
-    assert found[69].contacts == 1
-    return found[70:]
-
-
-@pytest.mark.parametrize(
-    ("cover", "x", "force"), [("outer_link", 0.1, (0.0, 6.0, 0.0)), ("inner_link", 0.3, (0.0, 6.0, 0.0))]
-)
-def test_a_second_contact_is_noticed_by_the_change_of_the_torques(
-    cover: str, x: float, force: tuple[float, float, float]
-) -> None:
-    found = after_steady_contact(cover, x, force, SENSORS.second)
-    noticed = [estimate for estimate in found if estimate.contacts == 2]
-    assert len(noticed) > 0.6 * len(found)
-    assert found[-1].contacts == 2
-    assert len({hypothesis.reasons >> REASONS.index(SECOND) for hypothesis in noticed[-1].hypotheses} & {1, 2}) == 1
-    assert SECOND in noticed[-1].reason or CERTAIN_SECOND in noticed[-1].reason
-    assert not any(estimate.contacts > 1 for estimate in after_steady_contact(cover, x, force, 0.0))
-
-
-@pytest.mark.slow
-def test_a_second_contact_is_reported_once_in_a_contact_if_it_lasts() -> None:
-    arm, node = plant(TILTED), ContactEstimatorNode(CONFIGURATION.shared, SENSORS)
-    reported = []
-    for tick in range(2200):
-        if tick in (50, 450):
-            push(arm, *FIRST)
-        if tick in (350, 900):
-            push(arm, "outer_link", 0.1, (0.0, 6.0, 0.0))
-        if tick == 2000:
-            push(arm, *FIRST[:2], (0.0, 0.0, 0.0))
-        for _ in range(SUBSTEPS):
-            arm.step(ZERO)
-        state = {
-            "motor_states": (tick, State(arm.theta, arm.thetad, ZERO)),
-            "joint_sensors": (tick, State(arm.q, arm.qd, arm.strain_torque)),
-        }
-        out = node.step(Inputs.of((tick + 1) * 1_000_000, DT, state))
-        reported += [(tick, out["status"].message)] if "status" in out else []
-    ((begin, warning), (end, nothing)) = reported
-    assert (warning, nothing) == (SECOND, "")
-    assert 1200 < begin < 1450
-    assert end > 2000
-
-
-@pytest.mark.slow
-def test_a_second_contact_is_certain_where_friction_of_the_first_could_not_be_it() -> None:
-    """Of 8 N, friction with a coefficient of 0.8 that turns back is 12.8 N at 0.3 m, as 38 N at 0.1 m across it."""
-    for force, share in (((0.0, 6.0, 0.0), 0.0), ((0.0, 18.0, 0.0), 0.0), ((0.0, 0.0, 18.0), 0.5)):
-        found = after_steady_contact("outer_link", 0.1, force, SENSORS.second)
-        certain = [estimate for estimate in found if CERTAIN_SECOND in estimate.reason]
-        assert len(certain) > share * len(found) if share else not certain
-
-
-def test_where_friction_of_the_only_contact_turns_the_reason_names_that_too() -> None:
-    """As where a stuck joint lets go while the arm presses: the same change as by a light second contact."""
-    turned = after_steady_contact("outer_link", 0.3, (0.0, 6.0, 8.0), SENSORS.second)  # in place of the first force
-    suspected = [estimate for estimate in turned if estimate.contacts == 2]
-    assert suspected
-    for estimate in suspected:
-        assert CERTAIN_SECOND not in estimate.reason
-        assert "or friction of this one has turned" in estimate.reason
-
-
-def test_a_contact_that_presses_harder_is_no_second_one() -> None:
-    """`push` replaces the force on a cover: at the same place there is one contact, elsewhere another torque."""
-    harder = after_steady_contact("outer_link", 0.3, (0.0, 0.0, 20.0), SENSORS.second)
-    assert {estimate.contacts for estimate in harder} == {1}
-    elsewhere = after_steady_contact("outer_link", 0.1, (0.0, 0.0, 20.0), SENSORS.second)
-    assert any(estimate.contacts == 2 for estimate in elsewhere)
-
-
-@pytest.mark.parametrize(("force", "fast"), [((40.0, 0.0, 10.0), 0.1), ((40.0, 10.0, 0.0), 0.2)])
-def test_a_force_along_the_link_is_no_second_contact_when_the_arm_turns(
-    force: tuple[float, float, float], fast: float
-) -> None:
-    """A force that is constant in the link's frame; the strain torques are exact."""
-    body = RigidBody(ARM, SENSORS.observer.mass_scale)
-    wrench = np.concatenate((force, np.cross((0.3, 0.0, 0.0), force)))
-    estimator, found, before = ContactEstimator(ARM, TIMING, SENSORS), [], np.zeros(4)
-    ways, rate = fast * np.array([1.0, 0.7, -1.0, -1.0]), 2.0 * math.pi
-    for tick in range(520):
-        q = np.array(TILTED) + ways * (1.0 - math.cos(rate * tick * DT))
-        qd = ways * rate * math.sin(rate * tick * DT)
-        momentum = body.mass_matrix(q) @ qd
-        bias = body.momentum_bias(q, qd)
-        torque = (momentum - before) / DT - bias - (wrench @ body.cover_jacobian(q, "outer_link")) * (tick >= 100)
-        before = momentum
-        state = State(q.tolist(), qd.tolist(), torque.tolist())
-        assert estimator.observe(state, state, DT)
-        if tick % OUTER == 0:
-            found.append(estimator.estimate())
-    assert {estimate.contacts for estimate in found[30:]} == {1}
 
 
 @pytest.mark.slow
 def test_vibration_after_a_contact_is_no_new_one() -> None:
     """At 60 Hz, which passes the faster filter: after a contact it is that of the cables, later a contact."""
+    smooth = dataclasses.replace(MOTORS, observer=dataclasses.replace(MOTORS.observer, shape_uncertainty=0.0))
     transmission, body = TransmissionMap.of(ARM), RigidBody(ARM, MOTORS.observer.mass_scale)
     pose, speed, rest = np.array(TILTED), [1.0, -1.2, 2.0, 1.5], np.zeros(4)
     lever = body.cover_jacobian(pose, "outer_link").T @ (0.0, 0.0, 1.0, 0.0, -0.28, 0.0)
@@ -306,16 +193,16 @@ def test_vibration_after_a_contact_is_no_new_one() -> None:
                 found.append(estimator.estimate())
         return found
 
-    rest = np.array(play(ContactEstimator(ARM, TIMING, MOTORS), 0.2, 0.0, 0.0)[-1].external_torques)
-    estimator = ContactEstimator(ARM, TIMING, MOTORS)
+    rest = np.array(play(ContactEstimator(ARM, TIMING, smooth), 0.2, 0.0, 0.0)[-1].external_torques)
+    estimator = ContactEstimator(ARM, TIMING, smooth)
     assert not any(estimate.in_contact for estimate in play(estimator, 0.2, 0.0, 0.0))
     assert play(estimator, 0.3, 20.0, 0.0)[-1].in_contact
     assert not play(estimator, 0.1, 0.0, 0.0)[-1].in_contact
-    assert not any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 30.0))
+    assert not any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 40.0))
     assert not any(estimate.in_contact for estimate in play(estimator, 0.2, 0.0, 0.0))
-    estimator = ContactEstimator(ARM, TIMING, MOTORS)  # the other has learned that the torques are noisy
+    estimator = ContactEstimator(ARM, TIMING, smooth)  # the other has learned that the torques are noisy
     assert not any(estimate.in_contact for estimate in play(estimator, 0.3, 0.0, 0.0))
-    assert any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 30.0))
+    assert any(estimate.in_contact for estimate in play(estimator, 0.18, 0.0, 40.0))
 
 
 class Move(NamedTuple):
@@ -376,7 +263,6 @@ def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fas
     estimators = [ContactEstimator(ARM, TIMING, parameters) for parameters in (MOTORS, SENSORS)]
     for results in moving(estimators, Move(3, fastest), 5.0, friction):
         assert not any(felt.estimate.in_contact for felt in results)
-        assert all(felt.estimate.reason for felt in results)
 
 
 @pytest.mark.slow
@@ -451,7 +337,7 @@ def test_nothing_is_felt_before_anything_is_observed_or_after_reset() -> None:
         assert not found.in_contact
         assert found.link == ""
         assert math.isnan(found.position)
-        assert found.reason == "too few samples yet"
+        assert found.reasons == Reason.TOO_EARLY
         estimator.observe(State(ZERO, ZERO, ZERO), State(ZERO, ZERO, [9.0] * 4), DT)
         estimator.reset()
 
@@ -530,7 +416,7 @@ def test_held_motors_feel_nothing_and_joint_sensors_feel_on() -> None:
             sense(estimator, arm, [0.05] * 4)  # a current that is read though none flows
         found = estimator.estimate()
         assert found.in_contact is is_felt
-        assert found.reason == ("" if is_felt else "brakes hold the motors")
+        assert found.reasons == (NO_REASON if is_felt else Reason.BRAKED)
 
 
 @pytest.mark.slow

@@ -366,19 +366,16 @@ def test_finite_values_whose_sum_overflows_are_refused_and_do_not_end_the_node()
 
 
 @pytest.mark.slow
-def test_errors_that_are_larger_than_stated_widen_what_is_published_detected_and_compared() -> None:
+def test_errors_that_are_larger_than_stated_widen_what_is_published_and_detected() -> None:
     """The same signals with errors in free motion of three times the variance: so has every covariance of torques."""
     covariances = []
     for size in (1.0, 3.0):
         observer = MomentumObserver(ARM, dataclasses.replace(EXACT, detection_time=0.008), use_joint_sensors=False)
         swing(observer, RigidArm(ARM, POSE, friction=1.0), 0.1)
-        before = observer.seen
-        swing(observer, RigidArm(ARM, POSE, friction=1.0), 0.05)
         observer._errors.size = size
         fast = observer.fast_torques()
-        assert before is not None
         assert fast is not None
-        covariances.append((observer.torques()[1], fast[1], observer.change(before)[1]))
+        covariances.append((observer.torques()[1], fast[1]))
     for stated, widened in zip(*covariances, strict=True):
         assert widened == pytest.approx(3.0 * stated)
         assert stated.diagonal().min() > 0.0

@@ -16,7 +16,7 @@ from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
-from wam_theory.velocity_servo import is_stable, largest_scale, locked_rotors, servo_period
+from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
 GUARD = ServoGuardParameters("refuse", 1.0, 1, False)
@@ -202,3 +202,13 @@ def test_a_large_integral_gain_on_gains_that_hardly_brake_is_refused(proportiona
 def test_gains_are_taken_where_the_guard_is_off() -> None:
     off = WAM.with_values({"velocity_loop:guard.mode": "off"})
     guard_of(off).require_stable(scaled(off.shared.servo, 100.0))
+
+
+def test_what_is_constant_is_no_slow_oscillation_however_it_is_rounded() -> None:
+    """The angles of free links are constant: their eigenvalues are 1, with an imaginary part of rounding."""
+    slow = 0.1 * np.array([[-0.3, -1.0], [1.0, -0.3]])  # damping ratio 0.287
+    for error in (1e-16, 1e-15, 1e-12):
+        period_map = np.eye(4)
+        period_map[:2, :2] += error * np.array([[1.0, -1.0], [1.0, 1.0]])
+        period_map[2:, 2:] += slow
+        assert least_damping(period_map, 0.6) == pytest.approx(0.238, abs=0.01)

@@ -40,7 +40,7 @@ class Rig:
         self.shared, self.plant = loaded(name)
         self.plant.reset()
         arm = self.shared.arm
-        self.bus = SimulatedBus(arm, self.shared.timing, self.plant, version, is_homed)
+        self.bus = SimulatedBus(arm, self.plant, self.shared.timing.substep, version, is_homed)
         home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
         self.arm = ArmBus(self.bus, arm.motors.torque_constant, home, PERIOD)
         self.currents = [0.1 + 0.05 * at for at in range(len(home))]

@@ -13,7 +13,7 @@ import pytest
 from conftest import LONG
 from sensor_msgs.msg import JointState
 
-from wam_cli.commands.conform import driver_alone
+from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_description.signals import Answer, State
@@ -117,13 +117,22 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
 
 
 @pytest.mark.slow
-def test_the_skeleton_keeps_the_contract_in_150_lines(
-    ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("firmware", [60, 200])
+@pytest.mark.parametrize("joints", [4, 7])
+def test_the_driver_of_a_real_arm_keeps_the_contract_on_a_simulated_bus(
+    ros: Network, tmp_path: Path, joints: int, firmware: int
 ) -> None:
+    loaded = on_bus(Configuration.load(packaged(f"barrett-wam{joints}-bus")), f"simulated:{firmware}")
+    configuration = driver_alone(loaded)
+    entry = configuration.shared.nodes[0]
+    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node(entry, **given))) == []
+
+
+@pytest.mark.slow
+def test_the_skeleton_keeps_the_contract(ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     configuration = skeleton(monkeypatch)
     entry = configuration.shared.nodes[0]
     assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node(entry, **given))) == []
-    assert len((EXAMPLES / "bus_driver.py").read_text().splitlines()) <= 150
 
 
 def test_commanded_torques_are_currents_of_an_arm_with_a_torque_constant_of_one() -> None:
@@ -155,8 +164,8 @@ class Broken:
         super().__init__(**ros)
         self.create_subscription(JointState, "motor_current_command", self._take_anything, 10)
         ports = self._ports
-        self._whole_publish, self._whole_write, self._whole_status = ports.publish, self.bus.write, ports.publish_status
-        ports.publish, self.bus.write, ports.publish_status = self._send, self._write, self._send_status
+        self._whole_publish, self._whole_status = ports.publish, ports.publish_status
+        ports.publish, ports.publish_status = self._send, self._send_status
         ports.takes_problem = lambda reason: None if self.defect in ("claims", "agreement") else self._trip(reason)
 
     def _send(self, topic: str, stamp: int, value: Any) -> None:
@@ -168,9 +177,6 @@ class Broken:
         if (self.defect, topic) != ("outer", "/clock"):
             self._whole_publish(topic, stamp, change(value))
 
-    def _write(self, currents: list[float], brakes_on: bool, dt: float) -> None:
-        self._whole_write(self._command if self.defect == "braked" else currents, brakes_on, dt)
-
     def _send_status(self, status: Any) -> None:
         self._whole_status(status._replace(session=0) if self.defect == "status" else status)
 
@@ -180,16 +186,18 @@ class Broken:
 
     def _take_anything(self, message: Any) -> None:
         if self.defect in ("names", "refusals", "answers", "repetition"):
-            self._command = [*message.effort, *self._zero][:4]
+            self.hardware.command([*message.effort, *[0.0] * 4][:4])
             self._command_stamp, self._came = self.stamp, time.perf_counter()
+        if self.defect == "braked":
+            self.hardware.current = list(message.effort)
 
     def _take_currents(self, stamp: int, command: State) -> None:
         if self.defect not in ("names", "answers"):
             super()._take_currents(stamp, command)
 
-    def _publish(self) -> None:
+    def _publish(self, due: int) -> None:
         if self.defect != "rate" or self._tick % 40 == 0:
-            super()._publish()
+            super()._publish(due)
 
     def _run(self) -> None:
         # a busy machine trips the short one; half a second by arrival alone is the defect of repetition
@@ -201,10 +209,9 @@ class Broken:
             self.safety.reset_fault()
         if self.defect == "silence":
             return self.safety.enable("")
-        before = self._command
         answer = super()._enable()
         if self.defect == "discard":
-            self._command = before
+            self.hardware.command([1.0] * 4)
         return answer
 
     def _disable(self) -> Answer:
@@ -220,9 +227,9 @@ class Broken:
 
 
 def broken_driver(**ros: Any) -> Any:
-    from bus_driver import BusDriver
+    from bus_driver import OwnDriver
 
-    return type("BrokenDriver", (Broken, BusDriver), {})(**ros)
+    return type("BrokenDriver", (Broken, OwnDriver), {})(**ros)
 
 
 @pytest.mark.slow
@@ -243,6 +250,5 @@ def test_a_broken_driver_fails_row_by_row(ros: Network, tmp_path: Path, monkeypa
             if verdicts[key] != NOT_TESTED:  # on a busy machine
                 break
         driver.defect = ""
-        driver.bus.__init__(driver._constant)  # a NaN stays in it
-        driver.bus.write = driver._write
+        driver.hardware = driver.make_hardware(driver.shared, None)  # a NaN stays in it
     assert verdicts == dict.fromkeys(verdicts, WRONG)

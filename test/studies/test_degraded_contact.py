@@ -8,6 +8,8 @@ from arms import CONFIGURATION, WAM
 
 from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_control.contact.contact_inference import Hypothesis
+from wam_description.event import Code, warning
+from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
@@ -16,7 +18,6 @@ from wam_studies.contact.recording import Drive, _identified, record
 from wam_studies.contact.replay import (
     FalseAlarm,
     ReplayScore,
-    SecondOutcome,
     SignalFaults,
     TouchOutcome,
     names_payload,
@@ -29,7 +30,7 @@ from wam_studies.contact.trial import ContactCase, play_case
 from wam_studies.identification.plants import MeasuredSignals
 from wam_studies.scores import Row, ScoreTable, share
 
-TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
+TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, 0.0)
 OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
 ALARM = FalseAlarm(0.2, 0.1, 1.5)
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
@@ -75,7 +76,7 @@ def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to
 
 
 def scored(*outcomes: TouchOutcome, **parts: Any) -> ReplayScore:
-    return ReplayScore(STATED, list(outcomes), 100.0, [], 0.0, 0.0, [], 60.0, 0, [], [], [], "")._replace(**parts)
+    return ReplayScore(STATED, list(outcomes), 100.0, [], 0.0, 0.0, [], 60.0, [], [], "")._replace(**parts)
 
 
 def driven(*scores: ReplayScore, contacts: str = "wide", is_identified: bool = False) -> list[DriveScore]:
@@ -95,10 +96,9 @@ def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
     late = TOUCH._replace(latency=0.1, error=0.2)
     inner = TOUCH._replace(kind="inner", force=10.0, latency=np.inf)
     rough = TOUCH._replace(force=20.0, friction=0.8, in_set=False)
-    second = [SecondOutcome("second on the same link", np.inf)]
     drives = [
         *driven(scored(inner, inner._replace(latency=0.01), rough, degradation="delay 2 ms")),
-        *driven(scored(second=second, changes=5), contacts="second"),
+        *driven(scored(TOUCH._replace(sure_and_wrong=0.5)), contacts="lasting"),
         *driven(scored(TOUCH, late, started=[(False, False), (True, False)]), contacts="level", is_identified=True),
     ]
     rows = rows_of(drives)
@@ -107,8 +107,8 @@ def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
     assert rows[f"position on the outer link at 5 N, 95 % quantile of the error, {mix}"].found.value > 0.1
     assert rows["10 N on the inner link detected within 200 ms, every arm"].found[::3] == (0.5, 2)
     assert rows["90 % set contains the truth at 20 N, mu 0.8, every arm, masses included"].found[::3] == (0.0, 1)
-    assert rows["second contact detected within 250 ms"].found.value == 0.0
-    assert rows["false second contacts while there is one"].found.value == pytest.approx(5 / 60)
+    assert rows["90 % set contains the truth, contacts of 0.2 to 10 s"].found[::3] == (1.0, 1)
+    assert rows["sure of a wrong link, of the time in contact, every arm"].found.value == pytest.approx(0.5 / 180.0)
     assert [rows[f"start in contact, {how}, {mix}"].found.value for how in ("warm", "cold")] == [0.5, 0.0]
     assert rows_of([]) == {}
 
@@ -183,14 +183,14 @@ def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_re
 def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_reason_or_warning() -> None:
     estimator = ContactEstimator(WAM, CONFIGURATION.shared.timing, OWN, CONFIGURATION.shared.model)
     nothing = estimator.estimate()
-    link = Hypothesis("outer_link", 0.3, *[0.0] * 4, (0.0,) * 3, 0.0, False, 0.0, 0.0, (0.0,) * 3, 0.0, "", 0)
+    link = Hypothesis("outer_link", 0.3, *[0.0] * 4, (0.0,) * 3, 0.0, False, 0.0, 0.0, (0.0,) * 3, 0.0, NO_REASON)
     assert payload_probability(nothing) == 0.0
     assert not names_payload(nothing)
     assert payload_probability(nothing._replace(hypotheses=(link,))) == pytest.approx(0.7)
     assert payload_probability(nothing._replace(hypotheses=(link._replace(cover="payload"),))) == 1.0
     assert not names_payload(nothing._replace(hypotheses=(link,)))
-    assert names_payload(nothing._replace(hypotheses=(link._replace(reason="a payload may explain it"),)))
-    assert names_payload(nothing._replace(warning="the model is off: payload 0.3 kg"))
+    assert names_payload(nothing._replace(hypotheses=(link._replace(reasons=Reason.PAYLOAD),)))
+    assert names_payload(nothing._replace(warning=warning(Code.MODEL_OFF, "model_off", part="payload")))
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_en
 from wam_analysis.foreign.sections import foreign_sections
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.thresholds import LAYOUT
-from wam_bag.bag import Bag, JointColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
@@ -119,9 +119,14 @@ def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
 
 def _is_own(path: Path) -> bool:
     """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
-    if path.suffix == ".csv" or needs_rosbags(path) or of_other_encoding(path):
+    if path.suffix == ".csv" or needs_rosbags(path):
         return False
-    found = contents(path)
+    try:
+        found = contents(path)
+    except BagError:
+        if of_other_encoding(path):
+            return False
+        raise
     require_messages(path, (topic.messages for topic in found.topics.values()))
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True
@@ -173,7 +178,7 @@ def _line(title: str, sentences: list[str], silent: str) -> str:
     if not sentences:
         return f"{title}: {silent}"
     kept = sentences[: LAYOUT.stated]
-    more = f" And {len(sentences) - len(kept)} more below." * (len(sentences) > len(kept))
+    more = f" +{len(sentences) - len(kept)} below." * (len(sentences) > len(kept))
     return f"{title}: {' '.join(kept)}{more}"
 
 

@@ -62,14 +62,14 @@ def contact_section(recording: AnalysedRun) -> Section:
                 note="of the vector: the norm of its three components; where the force is not the least one",
             ),
         ]
-        shows.append(f"Contact: right link {right:.0f} % of the time{_errors(away, off)}.")
+        shows.append(f"Contact: right link {right:.0f} %{_errors(away, off)}.")
     if np.any(known):
         false = known & sensed.acts & ~true.acts
         count = len(runs(false))
         seconds = float(np.sum(false)) * summary.period
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
-            sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
+            sentences.append(f"False detections: {count}, {shown(seconds, 's')}.")
             wrong.insert(0, sentences[-1])
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
@@ -110,7 +110,6 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
     least = "the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
     yield Finding(f"{name}: standard deviation of the force", "N", one.force_sd)
-    yield Finding(f"{name}: second contact suspected", "%", 100.0 * one.second, note="of the time")
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be only the least one" * (not one.is_placed)
     yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
@@ -146,4 +145,4 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
 
 def _errors(away: float, off: float) -> str:
     known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
-    return f", median error {' and '.join(known)}" if known else ""
+    return f", {', '.join(known)} off" if known else ""

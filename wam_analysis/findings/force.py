@@ -94,15 +94,10 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     if not known:
         return ()
     worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
-    whose = "true" if len(worst.true) else "measured"
-    what = "controlled" if any(one.hold.is_refused for one in held) else "recorded"
-    off = f"{100.0 * bias / worst.hold.commanded:+.1f} %"
-    text = f"{len(known)} of {_forces(len(held))} {what}, the worst {whose} one {off} off ({worst.hold.name})."
-    return (text,)
-
-
-def _forces(number: int) -> str:
-    return f"{number} force{'s' * (number != 1)}"
+    whose = "" if len(worst.true) else "measured "
+    what = " controlled" if any(one.hold.is_refused for one in held) else ""
+    error = 100.0 * bias / worst.hold.commanded
+    return (f"Forces: {len(known)} of {len(held)}{what}, worst {whose}{error:+.1f} %.",)
 
 
 def _dynamic_range(held: Sequence[HeldForce]) -> tuple[list[str], list[Finding]]:
@@ -237,9 +232,9 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in held if one.guarded is not None]
-    margin = f"; the guard predicts stability up to {shown(min(margins))} times the gain" if margins else ""
+    margin = f", guard margin {shown(min(margins))}" if margins else ""
     if settled and not verdict:
-        verdict.append(f"{settled} of {_forces(len(held))} settled{margin}.")
+        verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
     return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings), (), tuple(verdict))
 
 

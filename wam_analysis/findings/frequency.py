@@ -15,6 +15,7 @@ from wam_description.arm import Arm
 def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
     """Up to which frequency the motors follow their velocity commands."""
     sentences, findings = [], []
+    shows: list[str] = []
     commands, states = recording.run.joints("motor_velocity_command"), recording.run.joints("motor_states")
     lacking = recording.lacking("motor_velocity_command")
     commanded = None if commands is None else by_names(commands, "velocity", arm.motors.names)
@@ -44,12 +45,14 @@ def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
                 ),
             ]
             sentences.append(_bandwidth_sentence(name, width, top))
+            shows += [sentences[-1]] * (not math.isnan(width))
     if not sentences:
         least = 0.5 * (CYCLE.segments + 1) * CYCLE.segment
         sentences.append(
             f"The velocity commands are too short for a frequency response, which takes {least:g} s without a gap."
         )
-    return Section("frequency", "Frequency response of the velocity loops", tuple(sentences), tuple(findings), lacking)
+    title = "Frequency response of the velocity loops"
+    return Section("frequency", title, tuple(sentences), tuple(findings), lacking, tuple(shows))
 
 
 def _bandwidth_sentence(name: str, width: float, top: float) -> str:

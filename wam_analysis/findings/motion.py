@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, deviations, shown, times
+from wam_analysis.findings.finding import Finding, Section, deviations, rest_words, shown
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.power import power_section
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
@@ -114,17 +114,9 @@ def _stick_section(recording: AnalysedRun) -> Section:
                     note=f"{phases.reversals} of them reverse the direction",
                 ),
             ]
-            sentences.append(_stick_sentence(name, phases))
+            sentences.append(f"{name}: {rest_words(phases.stuck, len(phases.slips))}.")
     text = tuple(sentences) or ("No velocity was recorded.",)
     return Section("stick_slip", "Stick and slip", text, tuple(findings), recording.lacking("motor_states"))
-
-
-def _stick_sentence(name: str, phases: Phases) -> str:
-    if not len(phases.slips):
-        return f"{name}: never moved."
-    if not len(phases.sticks):
-        return f"{name}: always in motion."
-    return f"{name}: at rest for {100.0 * phases.stuck:.0f} % of the time, slipped {times(len(phases.slips))}."
 
 
 # friction

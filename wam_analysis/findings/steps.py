@@ -63,7 +63,8 @@ def step_findings(summary: DemoSummary) -> Iterator[Finding]:
     compared = [touch for touch in summary.touches if touch.link_true != NOT_RECORDED]
     for touch in compared:
         is_only = sum(other.step == touch.step for other in compared) == 1
-        yield from _touch_findings(touch.step if is_only else f"{touch.step}, {touch.link_true}", touch, summary.period)
+        link = "" if is_only else f" of {touch.link_true}"
+        yield from _touch_findings(f"contact{link} in {touch.step}", touch, summary.period)
 
 
 def _press_findings(press: SteadyPress) -> Iterator[Finding]:

@@ -27,7 +27,7 @@ class Tabulated(NamedTuple):
 
 
 def tabulated(findings: tuple[Finding, ...]) -> tuple[Tabulated, ...]:
-    """Tables of some numbers: at most one of those with a subject, and one of those without.
+    """Tables of some numbers: one of those whose subjects share quantities, and one of those without a subject.
 
     What was neither measured nor predicted for any subject is left out; a column of predictions is there only if there
     is one.  The longer axis runs down.
@@ -35,7 +35,21 @@ def tabulated(findings: tuple[Finding, ...]) -> tuple[Tabulated, ...]:
     known = [one for one in findings if np.isfinite(one.measured) or not np.isnan(one.predicted)]
     having = [one for one in known if one.subject]
     alone = [one for one in known if not one.subject]
-    return tuple(_table(part) for part in (having, alone) if part)
+    return tuple(_table(part) for part in (*_alike(having), alone) if part)
+
+
+def _alike(findings: list[Finding]) -> list[list[Finding]]:
+    """The numbers of subjects that share a quantity together."""
+    groups: list[list[Finding]] = []
+    for subject in dict.fromkeys(one.subject for one in findings):
+        own = [one for one in findings if one.subject == subject]
+        names = {one.quantity for one in own}
+        group = next((group for group in groups if names & {one.quantity for one in group}), None)
+        if group is None:
+            groups.append(own)
+        else:
+            group += own
+    return groups
 
 
 def _table(findings: list[Finding]) -> Tabulated:

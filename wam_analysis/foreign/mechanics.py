@@ -153,6 +153,8 @@ def friction(source: Source) -> FoundFriction | None:
     and weight are the same, and the inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
     needed = [q for q in ("position", "velocity", "effort") if q in source.values]
+    if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
+        source, needed = loaded, ["velocity", "effort"]
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
     if not some or math.isfinite(velocity_factor(source)):
         return None

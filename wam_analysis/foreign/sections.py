@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.finding import Finding, Section, rest_words, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -98,7 +98,7 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
         if given.is_given
         else "This is not a recording of this stack."
     )
-    sentences = [what, *(line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns, given))]
+    sentences = [what, *(line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns))]
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
     wrong = [*_treated(found), *clocks]
     wrong += [
@@ -109,6 +109,10 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {_counted(n, what)}." for what, n in columns.irregular.items()]
+            largest = float(np.nanmax(np.abs(columns.position), initial=0.0))
+            if largest > TURNS and not given.units.get("position"):
+                far = f"positions up to {shown(largest, 'rad')}, taken as radians"
+                wrong.append(f"{name}: {far}; if they are degrees, give --unit position=deg.")
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     sentences += [*wrong, *_alike(found), *_unread(bag)]
@@ -117,14 +121,10 @@ def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given:
     return Section("happened", "What happened", tuple(sentences), _treated_findings(found), (), (), tuple(wrong))
 
 
-def _topic(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+def _topic(name: str, columns: Columns) -> Iterator[str]:
     """What a topic holds."""
     if isinstance(columns, JointColumns) and len(columns.stamp_ns):
         yield f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}."
-        angles = columns.position[np.isfinite(columns.position)]
-        if len(angles) and not given.units.get("position") and float(np.max(np.abs(angles))) > TURNS:
-            largest = shown(float(np.max(np.abs(angles))), "rad")
-            yield f"{name}: positions up to {largest}, taken as radians; if they are degrees, give --unit position=deg."
         numbers = np.hstack([columns.position, columns.velocity, columns.effort])
         known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
         if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
@@ -142,9 +142,10 @@ def _counted(number: int, what: str) -> str:
 
 DONE_TO = {
     Treatment.COARSE: "{number} of {of} stamps repeat the one before; times of reception are used",
+    Treatment.ROUNDED: "the stamps are rounded to {size}; times of reception are used",
     Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are spread evenly between them",
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
-    Treatment.WRAPPED: "the {quantity} jumps {number} times by {size}; it is unwrapped",
+    Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}, which is taken off",
     Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
 }
@@ -166,7 +167,7 @@ def _treated(found: Sequence[Source]) -> list[str]:
             quantity=" and ".join(quantities),
             number=treated.number,
             of=treated.of,
-            size=shown(abs(treated.size), those[0].units.get(quantities[0], "")),
+            size=shown(abs(treated.size), those[0].units.get(quantities[0], "s")),
             times=times(treated.number),
             share=100.0 * (1.0 - treated.number / treated.of),
         )
@@ -355,11 +356,7 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
             Finding(f"{one.label}: slips", "", float(found.slips), note=f"{found.reversals} reverse the direction"),
         ]
-        if not found.slips:
-            sentences.append(f"{one.label}: never moved.")
-            continue
-        at_rest = f"at rest for {100.0 * found.stuck:.0f} % of the time, moved {times(found.slips)}"
-        sentence = f"{one.label}: {at_rest if found.stuck or found.slips > 1 else 'moved all the time'}"
+        sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")

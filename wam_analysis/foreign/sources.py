@@ -25,6 +25,7 @@ class Treatment(StrEnum):
     """What was found in raw values, and done to them before the analysis."""
 
     COARSE = "coarse stamps"  # times of reception were used
+    ROUNDED = "rounded stamps"  # likewise
     SPREAD = "coarse stamps, spread"  # as are the times of reception: the messages were spread evenly
     TWICE = "messages that came twice"  # the second was left out
     WRAPPED = "wraps of the angle"  # were unwrapped
@@ -40,7 +41,7 @@ class Treated(NamedTuple):
     what : the kind.
     quantity : of which, '' for the messages.
     number, of : how many, of all.
-    size : of a wrap, or the largest of the jumps, in the unit of the quantity.
+    size : of a wrap, or the largest of the jumps, in the unit of the quantity; s, to which stamps are rounded.
     """
 
     what: Treatment
@@ -177,18 +178,18 @@ def _timed(clock: Times, received: Times, columns: JointColumns | WrenchColumns,
     rows = np.flatnonzero(sent)
     rows = rows[np.argsort(clock[rows], kind="stable")]
     stamps = clock[rows]
-    same = np.diff(stamps) == 0
+    steps, waits = np.diff(stamps), np.diff(received[rows])
+    same = steps == 0
     number, of = int(np.sum(same)), len(rows)
-    if not number:
-        return _Timed(rows, stamps / 1e9, ())
-    waits = np.diff(received[rows])
     is_seldom = number <= STREAM.repeated * of
     if not (is_seldom or np.all(same)) and np.median(waits[same]) >= STREAM.paced * np.median(waits[~same]):
-        late = int(np.min(received[rows] - stamps))
-        order = np.argsort(received[rows], kind="stable")
-        times = np.maximum.accumulate(received[rows][order] - late)
-        kept = np.concatenate([[True], np.diff(times) > 0])
-        return _Timed(rows[order][kept], times[kept] / 1e9, (Treated(Treatment.COARSE, "", number, of),))
+        return _received(rows, stamps, received, Treated(Treatment.COARSE, "", number, of))
+    if is_seldom and of > SHAFT.fewest_samples and np.std(waits) < STREAM.paced * np.std(steps):
+        quantum = int(np.gcd.reduce(steps))
+        if quantum > STREAM.irregular * np.median(steps):
+            return _received(rows, stamps, received, Treated(Treatment.ROUNDED, "", of, of, quantum / 1e9))
+    if not number:
+        return _Timed(rows, stamps / 1e9, ())
     numbers = np.nan_to_num(np.hstack([v for v in columns if isinstance(v, np.ndarray) and v.ndim > 1]))[rows]
     twice = same & np.all(numbers[1:] == numbers[:-1], axis=1)
     if is_seldom or 2 * np.sum(twice) >= number:
@@ -276,6 +277,15 @@ def _parts(
     ]
 
 
+def _received(rows: NDArray[np.intp], stamps: Times, received: Times, treated: Treated) -> _Timed:
+    """Messages at their times of reception, less what these are later than the stamps at least."""
+    arrived = received[rows]
+    order = np.argsort(arrived, kind="stable")
+    times = arrived[order] - np.min(arrived - stamps)
+    kept = np.concatenate([[True], np.diff(times) > 0])
+    return _Timed(rows[order][kept], times[kept] / 1e9, (treated,))
+
+
 def _treated(one: Source) -> Source:
     """The source without wraps and jumps of the zero, and with what is known of its gaps."""
     values, treated = dict(one.values), list(one.treated)
@@ -304,7 +314,10 @@ def _unwrapped(time: Numbers, position: Numbers) -> tuple[Numbers, int, float]:
     steps = np.diff(position)
     for turn in STREAM.turns:
         jumps = (np.abs(steps) > STREAM.wraps * turn) & ~after_gaps(time)[1:]
-        if np.any(jumps) and np.ptp(position) <= STREAM.within * turn:
+        if not np.any(jumps) or np.ptp(position) > STREAM.within * turn:
+            continue
+        moved = turn - np.abs(steps[jumps])  # in a wrap as much as elsewhere
+        if np.median(np.abs(moved)) <= STREAM.alike * np.max(np.abs(steps[~jumps]), initial=0.0):
             return np.unwrap(position, period=turn), int(np.sum(jumps)), turn
     return position, 0, math.nan
 
@@ -317,8 +330,9 @@ def _jumps(both: Source) -> Numbers:
         return result
     steps, moved = np.diff(position), 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(both.time)
     rest = steps - moved
-    usual = np.quantile(np.maximum(np.abs(steps), np.abs(moved)), 1.0 - STREAM.repeated)
-    jumps = (np.abs(rest) > max(STREAM.zero * float(usual), SHAFT.joint_rest)) & ~after_gaps(both.time)[1:]
+    usual = STREAM.zero * float(np.quantile(np.abs(rest), 1.0 - STREAM.repeated))
+    least = max(usual, STREAM.beyond * float(np.max(np.abs(moved))), SHAFT.joint_rest)
+    jumps = (np.abs(rest) > least) & ~after_gaps(both.time)[1:]
     if np.sum(jumps) <= STREAM.repeated * len(steps):
         result[1:][jumps] = rest[jumps]
     return result

@@ -32,6 +32,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "disable": ("put on the brakes", (Call("driver", "enable", False),)),
     "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
     "reset_fault": ("forget the latched fault", (Call("driver", "reset_fault"),)),
+    "confirm_home": ("state that a real arm is at its home pose", (Call("driver", "confirm_home"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
     "tare": ("let the force loop count the present external torques as zero", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),

@@ -21,6 +21,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_configuration(parser)
     take_stack(parser)
     parser.add_argument(
+        "--bus",
+        default="",
+        metavar="CHANNEL",
+        help="bus of a configuration for a real arm: can0, or INTERFACE:CHANNEL of python-can; simulated:200 is a "
+        "simulated one with firmware 200",
+    )
+    parser.add_argument(
         "--running",
         action="store_true",
         help="test a driver that runs already, with nodes [driver, velocity_loop] and timing.mode realtime",
@@ -54,7 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Print the rows as they are found; 1 where one is wrong."""
-    configuration = driver_alone(configuration_of(given))
+    configuration = driver_alone(on_bus(configuration_of(given), given.bus))
     print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
@@ -81,6 +88,14 @@ def driver_alone(configuration: Configuration) -> Configuration:
         raise ValueError("no entry of the parameter 'nodes' is a driver; list one, as 'driver' or 'my_module:MyDriver'")
     bold = {"driver:late_periods": 1.0} if "late_periods" in configuration.sections.get("driver", {}) else {}
     return configuration.with_values({"nodes": [drivers[0], "velocity_loop"], "timing.mode": "realtime", **bold})
+
+
+def on_bus(configuration: Configuration, bus: str) -> Configuration:
+    """A configuration with another bus, 'CHANNEL' of socketcan or 'INTERFACE:CHANNEL'; the same for ''."""
+    if not bus:
+        return configuration
+    interface, _, channel = bus.rpartition(":")
+    return configuration.with_values({"driver:interface": interface or "socketcan", "driver:channel": channel})
 
 
 @contextmanager

@@ -51,7 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     own.add_argument(
         "--bag", type=Path, help="take from this recording what is not given: wam identify for a force loop"
     )
-    own.add_argument("--picture", type=PICTURE, help="write the stability map with the loop on it, PNG, PDF or SVG")
+    own.add_argument("--picture", type=PICTURE, help="write the stability bound with the loop on it, PNG, PDF or SVG")
     take_topic_map(parser)
 
 

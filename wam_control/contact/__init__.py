@@ -13,7 +13,6 @@
 ``model_prior``             what is known of them before: stated, or identified
 ``momentum_observer``       external joint torques and their covariance
 ``observer_parameters``     its parameters
-``second_contact``          whether a second contact has joined a steady first one
 ``shaft_friction``          nominal friction of motors and joints, and where it is uncertain
 ``thresholds``              what no parameter sets: when a contact is detected, how it may move
 ``tool_load``               torques of a mass at the tool

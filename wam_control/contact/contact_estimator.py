@@ -8,24 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import ContactFusion
-from wam_control.contact.contact_inference import (
-    CERTAIN_SECOND,
-    SECOND,
-    ContactInference,
-    Hypothesis,
-    detection_statistic,
-    with_second,
-)
+from wam_control.contact.contact_inference import ContactInference, Hypothesis, detection_statistic
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.observer_parameters import ObserverParameters
-from wam_control.contact.second_contact import SecondContact
 from wam_control.contact.thresholds import CONTACT
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Timing
+from wam_description.event import Event
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
+from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO, State
 from wam_description.small_matrices import inverse
@@ -46,12 +40,6 @@ class ContactEstimatorParameters:
         high=1e6,
     )
     release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
-    second: float = parameter(
-        "chi^2 of a change of the torques that the contact does not explain, above which a second one is suspected; "
-        "0: never",
-        low=0.0,
-        high=1e6,
-    )
 
     def __post_init__(self) -> None:
         require(
@@ -69,7 +57,6 @@ class ContactEstimate(NamedTuple):
     torque_sd : (n,), their standard deviations, N m.
     statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
     in_contact : whether a contact is detected.
-    contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
     link : name of the cover in contact, '' without contact.
     position : contact position, m along the cover's x axis, NaN where it cannot be observed.
     position_sd : m, NaN where the position is.
@@ -79,15 +66,14 @@ class ContactEstimate(NamedTuple):
         smallest possible force where the position is NaN.
     moment : (3,), N m, of that force about the origin of the cover's frame.
     hypotheses : every explanation, the most probable first, empty without contact.
-    reason : why the position is NaN or the estimate not reliable, '' where neither.
-    warning : which part of the model is off, '' for none.
+    reasons : why the position is NaN, the estimate not reliable, or why there is none.
+    warning : `Code.MODEL_OFF` with the part of the model that is off; None for none.
     """
 
     external_torques: tuple[float, ...]
     torque_sd: tuple[float, ...]
     statistic: float
     in_contact: bool
-    contacts: int
     link: str
     position: float
     position_sd: float
@@ -96,11 +82,8 @@ class ContactEstimate(NamedTuple):
     force: tuple[float, float, float]
     moment: tuple[float, float, float]
     hypotheses: tuple[Hypothesis, ...]
-    reason: str
-    warning: str = ""
-
-
-TOO_EARLY = "too few samples yet"
+    reasons: Reason
+    warning: Event | None = None
 
 
 class ContactEstimator:
@@ -140,7 +123,6 @@ class ContactEstimator:
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._fusion = ContactFusion(parameters.inference.fusion_time)
-        self._second = SecondContact(parameters.second)
         self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
         # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
@@ -160,7 +142,7 @@ class ContactEstimator:
         """Forget all samples."""
         self._observer.reset()
         self._before = 0.0, [], 0.0
-        self._end_contact()
+        self._fusion.reset()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
 
@@ -169,10 +151,6 @@ class ContactEstimator:
         other = ContactEstimator(*self._made_of)
         other._observer.learn(self._observer)
         return other
-
-    def _end_contact(self) -> None:
-        self._fusion.reset()
-        self._second.reset()
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -213,8 +191,8 @@ class ContactEstimator:
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
-            self._end_contact()
-            return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
+            self._fusion.reset()
+            return _nothing(torques, sd, 0.0, Reason.BRAKED if self._is_blind else Reason.TOO_EARLY)
         precision = inverse(covariance)
         late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
@@ -229,16 +207,11 @@ class ContactEstimator:
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             if was_in_contact:
-                self._end_contact()
-            return _nothing(torques, sd, statistic, "no contact", observer.warning)
+                self._fusion.reset()
+            return _nothing(torques, sd, statistic, NO_REASON, observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None
         hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
-        self._second.step(observer.age, hypotheses, observer, self._inference)
-        if self._second.is_suspected:
-            self._fusion.reset()
-            why = CERTAIN_SECOND if self._second.is_certain else SECOND
-            hypotheses = tuple(with_second(hypothesis, why) for hypothesis in hypotheses)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
         best = hypotheses[0]
         return ContactEstimate(
@@ -246,7 +219,6 @@ class ContactEstimator:
             torque_sd=sd,
             statistic=statistic,
             in_contact=True,
-            contacts=1 + self._second.is_suspected,
             link=best.cover,
             position=best.position,
             position_sd=best.position_sd,
@@ -255,7 +227,7 @@ class ContactEstimator:
             force=best.force,
             moment=best.moment,
             hypotheses=hypotheses,
-            reason=best.reason,
+            reasons=best.reasons,
             warning=observer.warning,
         )
 
@@ -301,14 +273,13 @@ def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
 
 
 def _nothing(
-    torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reason: str, warning: str = ""
+    torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reasons: Reason, warning: Event | None = None
 ) -> ContactEstimate:
     return ContactEstimate(
         external_torques=torques,
         torque_sd=sd,
         statistic=statistic,
         in_contact=False,
-        contacts=0,
         link="",
         position=math.nan,
         position_sd=math.nan,
@@ -317,6 +288,6 @@ def _nothing(
         force=ZERO,
         moment=ZERO,
         hypotheses=(),
-        reason=reason,
+        reasons=reasons,
         warning=warning,
     )

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact.contact_inference import SECOND
 from wam_control.contact.contact_table import friction_table, hypothesis_table
-from wam_control.contact.thresholds import CONTACT
 from wam_control.force.task import is_pressing
 from wam_description.arm import Shared, seconds
-from wam_description.event import Level
+from wam_description.event import Event, Level
+from wam_description.event_text import sentences
 from wam_description.signals import (
     BASE,
     NO_CONTACT,
@@ -39,8 +38,8 @@ class ContactEstimatorNode:
         self._covers, self._timing = shared.arm.covers.names, shared.timing
         self._samples: list[tuple[State, State | None, float]] = []
         self._in_contact: bool | None = None
-        self._warned = ""
-        self._doubted, self._second = 0.0, -1
+        self._warned: Event | None = None
+        self._second = -1
         commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
         zero = "external_torque_zero"  # of joint sensors, which show the weight of the arm
         self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors", zero})
@@ -89,12 +88,11 @@ class ContactEstimatorNode:
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact
-        self._doubted += (estimate.contacts > 1) * seconds(self._timing.outer_period_ns)
-        self._doubted *= estimate.in_contact
-        warning = SECOND if self._doubted > CONTACT.second_contact_after else estimate.warning
-        if warning != self._warned:
+        if (warning := estimate.warning) != self._warned:
             self._warned = warning
-            outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)
+            events = (warning,) if warning else ()
+            level = Level.WARN if warning else Level.OK
+            outputs["status"] = NodeStatus(level, sentences(events), stamp=inputs.stamp, events=events)
         return outputs
 
     def _follow_zero(self, zero: State | None) -> None:

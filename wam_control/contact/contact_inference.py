@@ -18,6 +18,7 @@ from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, require
+from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.units import STANDARD_GRAVITY
 
@@ -25,28 +26,6 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
-
-
-MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
-BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
-STRAIGHT = "elbow straight and force out of plane: contact position and force cannot be separated"
-SHOULDER = "the axes of the shoulder leave one of its moments unmeasured in this pose"
-WEAK = "the torques are too small, compared with their uncertainty, to identify the contact position"
-ELBOW = "torque of the elbow near 0: a contact at the elbow and one on the inner link cannot be distinguished"
-STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be distinguished"
-LINKS = "the torques do not identify the link"
-MORE = "one contact does not explain the torques"
-ALONG = "the force may act along the link: then its torques are the same at every position, and on the link before"
-SECOND = (
-    "a second contact is suspected, or friction of this one has turned: if there is a second one, position and force "
-    "are those of both together"
-)
-CERTAIN_SECOND = "a second contact is nearly certain: position and force are those of both together"
-PAYLOAD = "a payload that was picked up may explain the torques; its probability is what those of the links lack to 1"
-REASONS = (  # as bits
-    MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND, CERTAIN_SECOND,
-    PAYLOAD,
-)  # fmt: skip
 
 
 class Hypothesis(NamedTuple):
@@ -68,8 +47,7 @@ class Hypothesis(NamedTuple):
     direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
     residual : chi^2 that the contact does not explain, per moment that counts.
-    reason : why the position is unknown or the estimate not reliable, in words, '' where neither.
-    reasons : the same as bits, in the order of `REASONS`.
+    reasons : why the position is unknown or the estimate not reliable.
     """
 
     cover: str
@@ -85,8 +63,7 @@ class Hypothesis(NamedTuple):
     direction_sd: float
     moment: Triple
     residual: float
-    reason: str
-    reasons: int
+    reasons: Reason
 
 
 class _Cover(NamedTuple):
@@ -115,12 +92,6 @@ def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
         if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1:
             return _Elbow(i - 1, i)
     return None
-
-
-def with_second(hypothesis: Hypothesis, why: str) -> Hypothesis:
-    """The same where a second contact is suspected, or nearly certain."""
-    reason = f"{hypothesis.reason}; {why}" if hypothesis.reason else why
-    return hypothesis._replace(reason=reason, reasons=hypothesis.reasons | 2 ** REASONS.index(why))
 
 
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
@@ -158,7 +129,6 @@ class ContactInference:
             along_weight=parameters.along_weight,
         )
         self._elbow = _elbow(covers)
-        self._index = {cover.name: i for i, cover in enumerate(covers)}
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
@@ -218,51 +188,25 @@ class ContactInference:
         ambiguity = (
             self._ambiguity(q, fits)
             if max(fit.probability for fit in fits) < self._parameters.identification_threshold
-            else ""
+            else NO_REASON
         )
         each = zip(self._covers, fits, strict=True)
         found = [self._hypothesis(q, cover, fit, ambiguity, is_payload, moments) for cover, fit in each]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
-    def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
-        """Joint torques, (n,), N m per m, of a force, (3,), N, that moves along the link of a hypothesis."""
-        jacobian, (_, y, z) = self.jacobians[self._index[hypothesis.cover]], force
-        return y * jacobian[5] - z * jacobian[4]
-
-    def sides(self, hypotheses: Sequence[Hypothesis], poses: Sequence[Array]) -> list[Array]:
-        """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in each pose.
-
-        Parameters
-        ----------
-        poses : the `jacobians` of each.
-        """
-        index = [self._index[h.cover] for h in hypotheses]
-        ends = [self._covers[i].end[0] for i in index]
-        places = [end if math.isnan(h.position) else h.position for end, h in zip(ends, hypotheses, strict=True)]
-        place, found = np.array(places)[:, None], []
-        for jacobians in poses:
-            chosen = jacobians.take(index, axis=0)
-            sides = chosen[:, :3]
-            sides[:, 1] += place * chosen[:, 5]
-            sides[:, 2] -= place * chosen[:, 4]
-            found.append(sides)
-        return found
-
     def _hypothesis(
-        self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool, moments: int
+        self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: Reason, is_payload: bool, moments: int
     ) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > length
-        reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
-        if ambiguity:
-            reasons.append(ambiguity)
+        reasons = ambiguity | (self._why_unknown(q, cover, fit) if is_unknown else NO_REASON)
         if fit.along > (CONTACT.noted_probability if ambiguity else 0.5):
-            reasons.append(ALONG)
+            reasons |= Reason.ALONG
         if fit.residual > moments * self._parameters.largest_residual:
-            reasons.append(MORE)
+            reasons |= Reason.MORE
         if is_payload:
-            reasons.append(PAYLOAD)
+            reasons |= Reason.PAYLOAD
         place = end[0] if is_unknown else fit.position
         f1, f2 = fit.force_at_end if is_unknown else fit.force
         force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.directions])
@@ -282,42 +226,36 @@ class ContactInference:
             direction_sd=fit.direction_sd,
             moment=_cross(point, force),
             residual=fit.residual / moments,
-            reason="; ".join(self._in_words(reason, cover) for reason in reasons),
-            reasons=sum(2 ** REASONS.index(reason) for reason in reasons),
+            reasons=reasons,
         )
 
-    def _in_words(self, reason: str, cover: _Cover) -> str:
-        if reason != MOMENT_ONLY:
-            return reason
-        return f"{'the only joint' if cover.joints == 1 else 'the shoulder'} {reason}"
-
-    def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> str:
+    def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> Reason:
         if cover.is_moment_only:
-            return MOMENT_ONLY
+            return Reason.MOMENT_ONLY
         if self._elbow is None or cover is not self._covers[self._elbow.outer]:
-            return WEAK
+            return Reason.WEAK
         in_plane, straight, bent = self._at_elbow(q, self._elbow, fit)
         if in_plane > NEAR and bent > NEAR:
-            return BENT
+            return Reason.BENT
         if in_plane < math.sqrt(1.0 - NEAR**2) and straight > NEAR:
-            return STRAIGHT
+            return Reason.STRAIGHT
         axes = self.jacobians[self._elbow.inner][3:, : self._covers[self._elbow.inner].joints]
         if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:  # of three axes 1 - cos of the angle of two, as theta2
-            return SHOULDER
-        return WEAK
+            return Reason.SHOULDER
+        return Reason.WEAK
 
-    def _ambiguity(self, q: Sequence[float], fits: list[Fit]) -> str:
+    def _ambiguity(self, q: Sequence[float], fits: list[Fit]) -> Reason:
         """Why the link is not identified."""
         likely = sorted(range(len(fits)), key=lambda i: -fits[i].probability)[:2]
         if self._elbow is None or set(likely) != set(self._elbow):
-            return LINKS
+            return Reason.LINKS
         outer, fit = self._covers[self._elbow.outer], fits[self._elbow.outer]
         in_plane, straight, _ = self._at_elbow(q, self._elbow, fit)
         if straight > NEAR and in_plane < math.sqrt(1.0 - NEAR**2):
-            return STRAIGHT_LINK
+            return Reason.STRAIGHT_LINK
         if fit.position - outer.start[0] < 2.0 * fit.position_sd:
-            return ELBOW
-        return LINKS
+            return Reason.ELBOW
+        return Reason.LINKS
 
     def _at_elbow(self, q: Sequence[float], elbow: _Elbow, fit: Fit) -> tuple[float, float, float]:
         """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""

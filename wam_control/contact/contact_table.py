@@ -2,18 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 
-from wam_control.contact.contact_inference import CERTAIN_SECOND, REASONS, Hypothesis
+from wam_control.contact.contact_inference import Hypothesis
 from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.model_prior import WAYS, friction_error, load_error
 from wam_description.arm import Arm
+from wam_description.reasons import Reason
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
 _COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
 _LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
-_FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
+_FORCE, _DIRECTION_SD = (_COLUMN[name] for name in ("force_x", "direction_sd"))
 _LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
-CERTAINLY_TWO = 2 ** REASONS.index(CERTAIN_SECOND)
 
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
@@ -46,9 +46,8 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
         return NO_CONTACT
     row = table.rows[0]
     x, y, z = row[_FORCE : _FORCE + 3]
-    is_single = not int(row[_REASONS]) & CERTAINLY_TWO
     cover = covers[int(row[_LINK])]
-    return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD], is_single)
+    return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD])
 
 
 def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, ...]:
@@ -56,11 +55,6 @@ def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, 
     rows = () if table is None else table.rows
     parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
     return tuple(part for part in parts if part.low < part.high)
-
-
-def reasons_of(row: Sequence[float]) -> tuple[str, ...]:
-    """Why the position of a hypothesis is unknown or the estimate is not to be trusted."""
-    return tuple(reason for i, reason in enumerate(REASONS) if int(row[_REASONS]) >> i & 1)
 
 
 def hypotheses_of(table: Table, covers: Sequence[str]) -> tuple[Hypothesis, ...]:
@@ -88,8 +82,7 @@ def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
         direction_sd=value["direction_sd"],
         moment=vector("moment"),
         residual=value["residual"],
-        reason="; ".join(reasons_of(row)),
-        reasons=int(value["reasons"]),
+        reasons=Reason(int(value["reasons"])),
     )
 
 

@@ -133,17 +133,6 @@ class ModelErrors:
         covariance[:k, :k] = self.covariance
         return effects, self.size * covariance, self.size * (seen.rest + self._noise_of(seen))
 
-    def change(self, now: Observation, then: Observation) -> tuple[Array, Array]:
-        """Change of the external torques, (n,), N m, and its covariance, (n, n): errors that stay drop out.
-
-        `then` is a mean, of which the noise of the motors is left out.
-        """
-        effects = now.effects - then.effects
-        covariance = (
-            effects.dot(self.covariance).dot(effects.T) + CONTACT.alike * (now.rest + then.rest) + self._noise_of(now)
-        )
-        return now.residual - then.residual - effects.dot(self.errors), covariance
-
     def _noise_of(self, seen: Observation) -> Array:
         """Covariance, (n, n), N^2 m^2, of the torques by the noise of the motors."""
         # dot: of small arrays faster than @, the same bits

@@ -21,6 +21,7 @@ from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.tool_load import ToolLoad
 from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
+from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
 from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
@@ -87,8 +88,15 @@ class MomentumObserver:
         self._carried: Array = np.zeros((n, n))
         if not use_joint_sensors:
             self._carried = inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
-        self._motors = ShaftFriction(arm.motors, parameters, parameters.motor_rest_velocity)
-        self._joints = ShaftFriction(arm.joints, parameters, parameters.joint_rest_velocity)
+        is_identified = model is not None and model.is_identified
+        at_motors, at_joints = (model.motors, model.joints) if model else (None, None)
+        self._motors, self._joints = (
+            ShaftFriction(shafts, parameters, rest, at.stribeck_velocity if at else (), is_identified)
+            for shafts, rest, at in (
+                (arm.motors, parameters.motor_rest_velocity, at_motors),
+                (arm.joints, parameters.joint_rest_velocity, at_joints),
+            )
+        )
         self._velocity = VelocityFit(n, parameters.motor_rest_velocity)
         self._cycle = 0 if use_joint_sensors else dither_cycle
         fast, times = parameters.detection_time, [parameters.time_constant]
@@ -254,18 +262,8 @@ class MomentumObserver:
         seen = self.seen
         if seen is None:
             raise RuntimeError("nothing has been observed")
-        return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
-
-    def change(self, then: Observation) -> tuple[Array, Array]:
-        """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""
-        if self.seen is None:
-            raise RuntimeError("nothing has been observed")
-        torques, covariance = self._errors.change(self.seen, then)
-        return torques, self._errors.size * covariance
-
-    def corrected(self, then: Observation) -> Array:
-        """External torques, (n,), N m, of a mean of what was `seen`, with the present errors of the model."""
-        return then.residual - then.effects.dot(self._errors.errors)
+        torques = seen.residual - seen.effects.dot(self._errors.errors)
+        return Torques(self.age, torques, *self._errors.parts(seen), seen.pose)
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
@@ -296,10 +294,10 @@ class MomentumObserver:
         return {} if self._link_side else self._errors.by_name
 
     @property
-    def warning(self) -> str:
-        """Which part of the model is off, '' for none."""
+    def warning(self) -> Event | None:
+        """`Code.MODEL_OFF` with the part of the model that is off the most; None for none."""
         beyond = self._errors.beyond
-        return f"the model is off: {beyond[0]}; see /diagnostics, run 'wam identify'" if beyond else ""
+        return warning(Code.MODEL_OFF, "model_off", part=beyond[0]) if beyond else None
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""

@@ -31,21 +31,40 @@ class ShaftMotion(NamedTuple):
 class ShaftFriction:
     """Friction of shafts by their velocities.
 
-    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
+    f = k (F (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
     the friction on a shaft that has just stopped still acts as it did, that on a shaft long at rest is unknown.  k is
-    the friction scale.
+    the friction scale.  F = F_d + (F_s - F_d) exp(-(v / v_s)^2) of an identified arm; of others F_d, as friction that
+    rises at rest alone is as usual, and the difference is uncertain up to some v_s.
+
+    Parameters
+    ----------
+    shafts : with their friction as modelled.
+    parameters : the uncertainty of the model.
+    rest_velocity : rad/s, above which Coulomb friction is full.
+    stribeck : (n,), Stribeck velocity v_s of each, rad/s; empty where it is not known.
+    is_identified : whether the friction towards zero speed was identified.
 
     Attributes
     ----------
     dynamic, static : (n,), N m, nominal F_d and F_s.
     """
 
-    def __init__(self, shafts: Motors | Joints, parameters: ObserverParameters, rest_velocity: float) -> None:
+    def __init__(
+        self,
+        shafts: Motors | Joints,
+        parameters: ObserverParameters,
+        rest_velocity: float,
+        stribeck: Sequence[float] = (),
+        is_identified: bool = False,
+    ) -> None:
         scale = parameters.friction_scale
         self.dynamic = [scale * f for f in shafts.dynamic_friction]
         self.static = [scale * f for f in shafts.static_friction]
         self._viscous = [scale * b for b in shafts.viscous_friction]
         self._rest_velocity = rest_velocity
+        self._stribeck = stribeck or [CONTACT.usual_stribeck * rest_velocity] * len(self.dynamic)
+        self._slow = CONTACT.slow if is_identified else CONTACT.slow * CONTACT.assumed_stribeck
+        self._rise = [is_identified * (s - d) for s, d in zip(self.static, self.dynamic, strict=True)]
         self._rest = [rest_velocity] * len(self.dynamic)
         self.reset()
 
@@ -79,10 +98,13 @@ class ShaftFriction:
                 held[i] *= keep
                 fraction = abs(share)
                 acting, rests = share + (1.0 - fraction) * held[i], 1.0 - share * share
-            friction.append(self.dynamic[i] * acting + self._viscous[i] * v)
+            level, turned = self.dynamic[i], abs(v) / self._stribeck[i]
+            if self._rise[i] and turned < LONGEST:
+                level += self._rise[i] * math.exp(-turned * turned)
+            friction.append(level * acting + self._viscous[i] * v)
             sliding.append(share)
             resting.append(rests)
-            slow, since = abs(v) / (CONTACT.slow * slowest), abs(travel[i]) / slowest
+            slow, since = turned / self._slow, abs(travel[i]) / slowest
             if travel[i] * v < 0.0 < keep:
                 since = 0.0  # it turns back; a dither ends each of its swings in that way
             uncertain = math.exp(-slow) if slow < LONGEST else 0.0

@@ -14,8 +14,6 @@ class ContactThresholds:
     # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
     alone: float = 2.0
     smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division
-    # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
-    second_contact_after: float = 0.5
     settled: float = 2.0  # time constants of the observer, from the first sample until the estimate is ready
     load_divisor: int = 4  # samples per update of the payload's torque, which changes slowly
     smallest_mass: float = 1e-6  # kg, the smallest mass that a link may have
@@ -57,23 +55,6 @@ class ContactThresholds:
     freedom: float = 10.0  # degrees of freedom
     unknowns: int = 3  # of a contact: its position and the force across the link
     different: float = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
-    # a second contact
-    change_interval: float = 0.0099  # s, between moments that are compared
-    settling: float = 0.05  # s, of the filters of the observer, from the start of a contact
-    oldest: float = 0.141  # s, largest age of the moments that are the steady contact
-    youngest: float = 0.059  # s, least age of them
-    least_moments: int = 3  # of the steady contact
-    changes: int = 2  # in succession, above the threshold
-    # change of the friction of the first contact, per its force, that stays below the threshold: a friction
-    # coefficient of 0.8 may turn back. What even that does not explain is nearly certain to be a second contact, if
-    # it is noticed before the steady contact is older than `oldest`: later, it has changed itself
-    friction_turn: float = 1.6
-    growth: float = 3.0  # sd of the change of the first contact's force, per force
-    friction: float = 0.1  # sd of its other components, per change
-    slide: float = 0.02  # m, sd of its displacement
-    # sd of the torques that change because the arm turns, per such change: the force may stay in the world
-    torque_turn: float = 0.5
-    least_probability: float = 0.1  # of a hypothesis
     # errors of the model
     learn_interval: float = 0.01  # s, between samples that are learned from
     hindsight: float = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
@@ -86,7 +67,6 @@ class ContactThresholds:
     trust_time: float = 5.0  # s of motion, in which the size of the errors is followed
     margin: float = 2.0  # of that size: errors in contact are larger, and some come rarely
     largest_size: float = 4.0  # of that size
-    alike: float = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
     least_variance: float = 1e-30  # variance: avoids a division by zero for errors that are none
     sure: float = 2.0  # sd of an error that it must have beyond what is tolerable
     # friction, masses, load friction and torque constants per torque; centres, m; delay, s; payload, kg: beyond, a
@@ -96,7 +76,9 @@ class ContactThresholds:
     identified_friction_sd: float = 0.02
     at_rest: float = 0.02  # rad/s, of every joint, below which torques show the weights of the arm
     # friction of shafts
-    slow: float = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
+    slow: float = 1.2  # Stribeck velocities: speed over which what the law of friction leaves out decays
+    assumed_stribeck: float = 3.0  # by which a Stribeck velocity that was not identified may be too small
+    usual_stribeck: float = 10.0  # rest velocities: Stribeck velocity of a shaft of which no model is known
     steep_shape: float = 2.0  # of `shape_uncertainty`, just after a reversal (presliding): the part that decays slowly
     steep_angle: float = 0.6  # its angle after the reversal, in seconds at the rest velocity
     shallow_shape: float = 3.2  # the same: the part that decays fast

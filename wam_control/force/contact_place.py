@@ -132,8 +132,6 @@ def torque_of_position(force: Triple, position: float) -> Triple:
 
 def _rejection(contact: Contact, lean: float) -> str:
     """Why an estimated position is not used, '' if it is."""
-    if not contact.is_single:
-        return f"a second contact is nearly certain besides that on {contact.cover}; the last position is used"
     if lean > STEEPEST:
         return (
             f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "

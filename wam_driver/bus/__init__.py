@@ -7,5 +7,6 @@
 - start_up: finds, wakes, checks and zeroes the controllers
 - bus_fault: what is wrong, as data
 - arm_bus: the driver, one call per period
+- interface, bus_driver: the node, also for a bus of your own
 - simulator: controllers, safety module and a person, in bus time
 """

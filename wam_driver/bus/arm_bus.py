@@ -34,7 +34,6 @@ class ArmBus:
 
     def __init__(self, line: Line, torque_constant: Sequence[float], home: Sequence[float], period: float) -> None:
         self._line, self._constant, self._home, self._period = line, torque_constant, home, period
-        self._fraction = 1.0 - math.exp(-BUS.velocity_bandwidth * period)  # of a new velocity in the filtered one
         self.position, self.velocity, self.current = ([0.0] * len(home) for _ in range(3))
         self.counts: Counter[str] = Counter()
         self.begin()
@@ -102,12 +101,27 @@ class ArmBus:
         sent = cycle.command([i * k * gain for i, k, gain in zip(currents, self._constant, gains, strict=True)])
         self.current = [count / gain / k for count, gain, k in zip(sent, gains, self._constant, strict=True)]
 
-    def exchange(self) -> None:
-        """One period: ask for the positions and take them."""
+    @property
+    def advice(self) -> str:
+        """What a person has to do, in words; '' where nothing."""
+        return self.wait.value
+
+    @property
+    def fault(self) -> str:
+        """The trouble, in words; '' where there is none."""
+        return self.trouble.text if self.trouble else ""
+
+    def close(self) -> None:
+        """Brake, and end the connection."""
+        self.brake()
+        self._line.close()
+
+    def exchange(self, periods: int = 1) -> None:
+        """Ask for the positions, some periods after the last time, and take them."""
         cycle = self._cycle
         if cycle is None:
             return
-        self._line.let_pass(self._period)
+        self._line.let_pass(periods * self._period, (periods - 1) * self._period)
         if self.trouble is not None and self.trouble.fault.loses_controllers:
             cycle.brake()  # until the start is repeated
             return
@@ -124,7 +138,7 @@ class ArmBus:
             step = math.tau / cycle.settings.counts[at]
             self.position[at] = count * step
             if dt > 0.0:
-                self.velocity[at] += self._fraction * (steps * step / dt - self.velocity[at])
+                self.velocity[at] = steps * step / dt
 
 
 class BusCycle:

@@ -19,8 +19,8 @@ class Line(Protocol):
     def sleep(self, seconds: float) -> None:
         """Wait."""
 
-    def let_pass(self, seconds: float) -> None:
-        """A period of the host has passed, s: a simulated bus goes on to its end."""
+    def let_pass(self, seconds: float, late: float) -> None:
+        """A period of the host has passed, s: a simulated bus goes on to its end, and forgives the late part."""
 
     def send(self, frame: Frame) -> None:
         """Send a frame; LineError where it was not."""
@@ -47,7 +47,7 @@ class CanLine:
         self._bus, self._message, self._error = bus, can.Message, can.CanError
         self.now, self.sleep = now, sleep
 
-    def let_pass(self, seconds: float) -> None:
+    def let_pass(self, seconds: float, late: float) -> None:
         """Nothing: real time passes by itself."""
 
     def send(self, frame: Frame) -> None:

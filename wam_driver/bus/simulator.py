@@ -5,32 +5,17 @@ Bus time passes with the bits of each frame, with waiting, and to the next perio
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
 
-from wam_description.arm import Arm, Timing
+from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.bus import frames, properties
 from wam_driver.bus.frames import Bit, Frame, Group, Node
 from wam_driver.bus.safety_module import Button, Pendant, SafetyMode
+from wam_driver.plant import Plant
 from wam_driver.thresholds import BUS
 
 SAFETY_VALUES = {"ROLE": 2, "STAT": 2, "ZERO": 0, "VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204, "IFAULT": 0}
-
-
-class Rotors(Protocol):
-    """The plant behind the controllers: `wam_driver.plant.Plant`."""
-
-    theta: Any
-    thetad: Any
-    q: Any
-    qd: Any
-
-    def brake(self, on: bool) -> None:
-        """Put on or release brakes, which this arm does not have."""
-
-    def step(self, torque: Sequence[float], count: int = 1) -> None:
-        """Advance by steps with a torque of each motor, N m."""
 
 
 class SimulatedController:
@@ -80,8 +65,9 @@ class SimulatedBus:
 
     Parameters
     ----------
-    arm, timing : of the plant.
+    arm : in the plant.
     plant : behind the controllers.
+    substep : of the plant, s.
     version : of all firmware.
     is_homed : whether the zero is known at the start.
     is_attended : whether a person presses Idle and Activate where that is wanted.
@@ -96,8 +82,8 @@ class SimulatedBus:
     def __init__(
         self,
         arm: Arm,
-        timing: Timing,
-        plant: Rotors,
+        plant: Plant,
+        substep: float,
         version: int = 200,
         is_homed: bool = True,
         is_attended: bool = True,
@@ -105,7 +91,7 @@ class SimulatedBus:
         self._plant, self._body = plant, RigidBody(arm)
         plant.brake(False)
         self._constant = arm.motors.torque_constant
-        self._step = round(timing.substep * BUS.second)
+        self._step = round(substep * BUS.second)
         self.is_attended = is_attended
         motors = range(1, len(arm.motors.names) + 1)
         self.controllers = {node: SimulatedController(node, version, _motor(node)) for node in motors}
@@ -133,8 +119,9 @@ class SimulatedBus:
         """Let bus time pass."""
         self._advance(self.time + round(seconds * BUS.second))
 
-    def let_pass(self, seconds: float) -> None:
-        """A period of the host has passed, in which there may have been frames."""
+    def let_pass(self, seconds: float, late: float) -> None:
+        """A period of the host has passed, in which there may have been frames; the late part is no silence."""
+        self._asked += round(late * BUS.second)
         self._passed += round(seconds * BUS.second)
         if self._passed < self.time:
             self._passed = self.time

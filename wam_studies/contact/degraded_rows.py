@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_studies.contact.replay import REPLAY, MassOutcome, ReplayScore, TouchOutcome
+from wam_studies.contact.replay import MassOutcome, ReplayScore, TouchOutcome
 from wam_studies.contact.rows import (
     COLUMNS,
     EVERY_ARM,
@@ -25,7 +25,8 @@ from wam_studies.contact.rows import (
     position_rows,
     share_of,
 )
-from wam_studies.scores import ANY, Interval, Row, ScoreTable, events, share
+from wam_studies.contact.touches import PICKING_UP
+from wam_studies.scores import NONE, Interval, Row, ScoreTable, events, exact, share
 
 STATED_ARM, MIX = "as stated", "realistic mix"
 ALONE = "any degradation alone"
@@ -41,8 +42,7 @@ class DegradedLimits:
     usual: float = 0.91  # the middle of it
     inner: Allowed = ((0.95, 1.0), (0.99, 1.0))
     inner_within: float = 0.2  # s
-    second: Allowed = ((0.5, 1.0), (0.8, 1.0))
-    false_second: Allowed = ((0.0, 1.0 / 60.0), ANY)
+    sure_and_wrong: Allowed = ((0.0, 0.005), (0.0, 0.002))  # of the time in contact
     warm: Allowed = ((0.97, 1.0), (0.99, 1.0))
     cold: Allowed = ((0.85, 1.0), (0.95, 1.0))
     forces: tuple[float, ...] = (0.0, 7.5, 15.0, 30.0, 80.0)  # N, between the rows by force
@@ -85,9 +85,11 @@ def false_alarms(scores: Scores) -> Interval:
     return _per_second(sum(len(score.alarms) for score in scores), sum(score.free_seconds for score in scores))
 
 
-def false_changes(scores: Scores) -> Interval:
-    """Second contacts that are reported while there is one, per second of it; observed: these seconds."""
-    return _per_second(sum(score.changes for score in scores), sum(score.steady_seconds for score in scores))
+def sure_and_wrong(scores: Scores) -> Interval:
+    """Part of the time in contact in which another link is reported with certainty; observed: contacts."""
+    every = [one for score in scores for one in score.outcomes if one.kind != PICKING_UP]
+    seconds = sum(score.contact_seconds for score in scores)
+    return exact(sum(one.sure_and_wrong for one in every) / seconds, len(every)) if seconds else NONE
 
 
 def _per_second(count: int, seconds: float) -> Interval:
@@ -106,7 +108,7 @@ def degraded_rows(drives: Sequence[DriveScore]) -> Iterator[Row]:
     wide, identified = groups_of(drives, "wide"), _all(groups_of(drives, "level", True))
     if not wide:
         return
-    seconds, both = _all(groups_of(drives, "second")), [*_all(wide), *identified]
+    lasting, both = _all(groups_of(drives, "lasting")), [*_all(wide), *identified]
     moving, masses = outcomes(both), outcomes(_all(groups_of(drives, "masses")))
     alone = {name: own for name, own in wide.items() if name not in (STATED_ARM, MIX)}
     if alone:
@@ -124,20 +126,16 @@ def degraded_rows(drives: Sequence[DriveScore]) -> Iterator[Row]:
     inner = near(outcomes(both, "inner"), 10.0)
     in_time = detected_within(inner, DEGRADED.inner_within, or_before=True)
     yield percent("10 N on the inner link detected within 200 ms, every arm", in_time, DEGRADED.inner)
-    yield percent("second contact detected within 250 ms", _second(seconds), DEGRADED.second)
-    name = "false second contacts while there is one"
-    yield _per_minute(name, false_changes(seconds), DEGRADED.false_second)
+    held = covered([one for score in lasting for one in score.outcomes])
+    yield percent("90 % set contains the truth, contacts of 0.2 to 10 s", held, DEGRADED.covered)
+    wrong = sure_and_wrong([*both, *lasting])
+    yield percent("sure of a wrong link, of the time in contact, every arm", wrong, DEGRADED.sure_and_wrong)
     for k, (start, allowed) in enumerate((("warm", DEGRADED.warm), ("cold", DEGRADED.cold))):
         yield percent(f"start in contact, {start}, {MIX}, identified", _started(identified, k), allowed)
 
 
 def _covered_in_motion(scores: Scores) -> Interval:
     return covered(outcomes(scores))
-
-
-def _second(scores: Scores, *kinds: str) -> Interval:
-    found = [one.latency for score in scores for one in score.second if not kinds or one.kind in kinds]
-    return share_of([time <= REPLAY.second_within for time in found])
 
 
 def _started(scores: Scores, which: int) -> Interval:
@@ -166,7 +164,7 @@ def contacts_needed() -> int:
 
 def degraded_tables(drives: Sequence[DriveScore]) -> Iterator[ScoreTable]:
     """Tables by degradation, by kind of contact and force, by mass; none without drives."""
-    wide, second = groups_of(drives, "wide"), groups_of(drives, "second")
+    wide = groups_of(drives, "wide")
     if not wide:
         return
     named = {f"{name}, as configured": own for name, own in groups_of(drives, "level").items()}
@@ -182,7 +180,6 @@ def degraded_tables(drives: Sequence[DriveScore]) -> Iterator[ScoreTable]:
     masses = _all(groups_of(drives, "masses"))
     yield _kinds([*_all(wide), *masses])
     yield _masses([one for score in masses for one in score.masses])
-    yield ScoreTable("Second contact", *_seconds({**second, "all": _all(second)}))
 
 
 def _text(found: Interval) -> str:
@@ -243,14 +240,3 @@ def _masses(every: Sequence[MassOutcome]) -> ScoreTable:
         for name, own in [*groups, ("all", list(every))]
     ]
     return ScoreTable("Picking up", ["picked up", *(head for head, _ in columns)], rows)
-
-
-def _seconds(groups: Mapping[str, Scores]) -> tuple[list[str], list[list[str]]]:
-    head = ["degradation", "reported within 250 ms, %", "on the same link", "on the other link"]
-    rows = []
-    for name, own in groups.items():
-        kinds: tuple[tuple[str, ...], ...] = ((), ("second on the same link",), ("second on the other link",))
-        false = false_changes(own)
-        minutes = f"{60.0 * false.value:.1f} ({sum(score.changes for score in own)})" if false.observed else "none"
-        rows.append([name, *(_text(_second(own, *which)) for which in kinds), minutes])
-    return [*head, "false per minute of one contact"], rows

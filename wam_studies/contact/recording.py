@@ -19,9 +19,9 @@ from wam_studies.contact.moves import MoveGenerator
 from wam_studies.contact.scenarios import RANGES, base_values
 from wam_studies.contact.touches import (
     KINDS,
+    LASTING_KINDS,
     LEVEL_KINDS,
     MASS_KINDS,
-    SECOND_KINDS,
     Touch,
     axis_of,
     touches,
@@ -38,12 +38,13 @@ class RecordingTimes:
     warm_up: float = 6.0  # s of free motion before the first contact
     spacing: float = 1.9  # s from one contact to the next
     spacing_of_masses: float = 6.0  # s
+    spacing_of_lasting: float = 11.0  # s
     excitation: float = 20.0  # s of motion for an identification
     drift_steps: int = 20  # of friction, over a recording
 
 
 TIMES = RecordingTimes()
-CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
+CONTACTS = {"wide": KINDS, "lasting": LASTING_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
 
 
 class Drive(NamedTuple):
@@ -105,7 +106,8 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
             steps.append(ScenarioStep("stop", stop))
         left -= move.seconds + stop
         here = move.posture
-    spacing = TIMES.spacing_of_masses if drive.contacts == "masses" else TIMES.spacing
+    longer = {"masses": TIMES.spacing_of_masses, "lasting": TIMES.spacing_of_lasting}
+    spacing = longer.get(drive.contacts, TIMES.spacing)
     times = np.arange(TIMES.warm_up, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
     return (
         degradation,

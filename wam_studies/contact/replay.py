@@ -11,6 +11,7 @@ import numpy as np
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
+from wam_description.reasons import Reason
 from wam_description.signals import State
 from wam_description.units import STANDARD_GRAVITY
 from wam_studies.contact.contacts import EVALUATION
@@ -26,8 +27,6 @@ class ReplayLimits:
     """When an estimate of a recording is evaluated, and what counts."""
 
     late: float = 0.45  # s after the start of a contact, until which it is detected
-    second_within: float = 0.25  # s
-    hit: float = 0.1  # s after the start of a contact in which a change is its own
     start_after: float = 0.1  # s, of an estimator that starts in contact
     start_within: float = 0.3  # s
     start_force: float = 9.0  # N
@@ -53,7 +52,7 @@ class TouchOutcome(NamedTuple):
     detected, probability, right_link : when evaluated, 0.2 s after the start.
     error, position_sd : m; inf on the wrong link or without an estimate; NaN sd without a position.
     in_set, set_length : whether the 90 % set holds the truth, and its length, m.
-    reason : as reported.
+    sure_and_wrong : s of the contact in which another link is reported with more than `REPLAY.sure`.
     """
 
     kind: str
@@ -71,14 +70,7 @@ class TouchOutcome(NamedTuple):
     position_sd: float
     in_set: bool
     set_length: float
-    reason: str
-
-
-class SecondOutcome(NamedTuple):
-    """A second contact: kind of both, and s until it is reported, inf if it is not within `REPLAY.second_within`."""
-
-    kind: str
-    latency: float
+    sure_and_wrong: float
 
 
 class MassOutcome(NamedTuple):
@@ -126,8 +118,7 @@ class ReplayScore(NamedTuple):
     warnings : share of that time with a warning that the model is off.
     torque_z : rms of error over stated sd of the external torques in free motion.
     torque_errors : (2, n), rms errors of the external torques in free motion, N m: with all motors sliding, and of all.
-    steady_seconds, changes : time with one contact; second contacts that are reported in it.
-    second : of each second contact.
+    contact_seconds : time with a contact.
     masses : of each mass that was picked up.
     started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
     failure : of the recording.
@@ -140,9 +131,7 @@ class ReplayScore(NamedTuple):
     warnings: float
     torque_z: float
     torque_errors: list[list[float]]
-    steady_seconds: float
-    changes: int
-    second: list[SecondOutcome]
+    contact_seconds: float
     masses: list[MassOutcome]
     started: list[tuple[bool, bool]]
     failure: str
@@ -236,31 +225,16 @@ def _scored(
     z = (found / np.array([row.estimate.torque_sd for row in rows]))[free]
     slowest = np.abs(recording.thetad[[row.sample for row in rows]]).min(axis=1)
     sliding = free & (slowest > REPLAY.sliding)
-    warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
-    reported = np.array([row.estimate.contacts > 1 for row in rows])
-    reported[1:] &= ~reported[:-1]
-    steady, changes, second = 0.0, 0, []
-    for i, touch in enumerate(touches):
-        if touch.kind == "second":
-            within = _during(rows, touch.begin, touch.begin + REPLAY.second_within) & reported
-            latency = rows[int(within.argmax())].time - touch.begin if within.any() else math.inf
-            second.append(SecondOutcome(touches[i - 1].kind, latency))
-            continue
-        followed = i + 1 < len(touches) and touches[i + 1].kind == "second"
-        during = _during(rows, touch.begin + REPLAY.hit, touches[i + 1].begin if followed else touch.end)
-        steady += step * int(during.sum())
-        changes += int(reported[during].sum())
+    warned = [row.estimate.warning is not None for row, take in zip(rows, ~busy, strict=True) if take]
     return ReplayScore(
         degradation=name,
-        outcomes=[_outcome(touch, rows, moving, slowest, lengths) for touch in touches if touch.kind != "second"],
+        outcomes=[_outcome(touch, rows, moving, slowest, lengths) for touch in touches],
         free_seconds=step * int((~busy).sum()),
         alarms=[_alarm(rows, i, touches, float(slowest[i]), threshold) for i in alarms.tolist()],
         warnings=sum(warned) / max(1, len(warned)),
         torque_z=float(np.sqrt(np.mean(np.square(z)))) if len(z) else math.nan,
         torque_errors=[np.sqrt(np.mean(np.square(found[which]), axis=0)).tolist() for which in (sliding, free)],
-        steady_seconds=steady,
-        changes=changes,
-        second=second,
+        contact_seconds=sum(touch.end - touch.begin for touch in touches if not touch.mass),
         masses=[_mass_outcome(touch, rows) for touch in touches if touch.mass],
         started=started,
         failure=recording.failure,
@@ -282,7 +256,8 @@ def payload_probability(estimate: ContactEstimate) -> float:
 def names_payload(estimate: ContactEstimate) -> bool:
     """Whether a mass at the tool is reported: as the most probable hypothesis, in its reason, or as a warning."""
     best = estimate.hypotheses[:1]
-    return any(PAYLOAD in text for text in (estimate.warning, *(h.cover for h in best), *(h.reason for h in best)))
+    warned = estimate.warning is not None and estimate.warning.values["part"] == PAYLOAD
+    return warned or any(Reason.PAYLOAD in h.reasons or h.cover == PAYLOAD for h in best)
 
 
 def _mass_outcome(touch: Touch, rows: Sequence[_Row]) -> MassOutcome:
@@ -340,8 +315,15 @@ def _outcome(
         in_set=carries > REPLAY.outside
         or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
         set_length=sum(sizes),
-        reason=now.reason,
+        sure_and_wrong=_sure_and_wrong(touch, rows),
     )
+
+
+def _sure_and_wrong(touch: Touch, rows: Sequence[_Row]) -> float:
+    """Time, s, in which a link is reported with certainty that is not the touched one."""
+    during = [row.estimate for row, acts in zip(rows, _during(rows, touch.begin, touch.end), strict=True) if acts]
+    wrong = sum(one.in_contact and one.probability > REPLAY.sure and one.link != touch.cover for one in during)
+    return wrong * (rows[1].time - rows[0].time)
 
 
 def _error(estimate: ContactEstimate, cover: str, true: float) -> float:

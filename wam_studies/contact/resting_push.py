@@ -18,6 +18,7 @@ from wam_control.contact.contact_estimator import ContactEstimate
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_description.event_text import reasons_in_words
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 from wam_description.world import Obstacles
@@ -113,7 +114,7 @@ def _arrow(
 
 def _numbers(estimate: ContactEstimate) -> str:
     if not estimate.in_contact:
-        return f"estimated: {estimate.reason}"
+        return f"estimated: {reasons_in_words(estimate.reasons) or 'no contact'}"
     force = math.hypot(*estimate.force)
     if math.isnan(estimate.position):
         return f"estimated: {estimate.link}, position unknown, at least {force:.1f} N"

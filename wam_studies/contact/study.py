@@ -25,7 +25,7 @@ class DriveExtent(NamedTuple):
     """How drives of one kind of contacts follow from the length of a recording."""
 
     shortest: float = 10.0  # s, with one contact
-    second: float = 0.4  # of the length of a recording, with second contacts or with masses
+    other: float = 0.4  # of the length of a recording, with contacts that last or with masses
     arms: int = 3  # of each seed, that are identified
 
 
@@ -78,13 +78,13 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
     def drives(self, seed: int) -> Iterator[Drive]:
         """Drives of each degradation.
 
-        One with contacts of every kind; the same arm with many second contacts; the same arm picking up masses; arms
+        One with contacts of every kind; the same arm with contacts that last; the same arm picking up masses; arms
         of some degradations with contacts of three forces, whose models are not identified; the same, identified.
         """
         for name in NAMES if ALL in self.degradations else self.degradations:
             wide = Drive(self.configuration, name, seed, self.seconds)
-            second = wide._replace(contacts="second", seconds=max(EXTENT.shortest, EXTENT.second * self.seconds))
-            yield from (wide, second, second._replace(contacts="masses"))
+            lasting = wide._replace(contacts="lasting", seconds=max(EXTENT.shortest, EXTENT.other * self.seconds))
+            yield from (wide, lasting, lasting._replace(contacts="masses"))
             for arm in range(EXTENT.arms) if name in IDENTIFIED else ():
                 level = wide._replace(contacts="level", seed=EXTENT.arms * seed + arm)
                 yield from (level, level._replace(is_identified=True))

@@ -24,22 +24,21 @@ class TouchRanges:
     slide: float = 0.2  # m/s
     lightest: float = 0.1  # kg
     heaviest: float = 1.0  # kg
-    hold_of_mass: float = 3.0  # s
+    holds_of_mass: tuple[float, float] = (3.0, 6.0)  # s; one that is held to the end is exchanged for the next
     hold: float = 0.5  # s
-    hold_of_first: float = 1.0  # s
     impact: float = 0.03  # s
     harder: tuple[float, float] = (1.5, 3.0)  # times the force
     harder_after: float = 0.4  # s after the start
     harder_within: tuple[float, float] = (0.05, 0.4)  # s
-    second_after: float = 0.5  # s, of the second contact after the first
-    second_hold: float = 0.4  # s
+    lasting: tuple[float, float] = (0.2, 10.0)  # s, of contacts of any length
+    slow: float = 2.0  # s, of a rise
 
 
 TOUCHES = TouchRanges()
 # how often each kind is drawn
 KINDS = {
-    "outer": 0.38,
-    "inner": 0.17,
+    "outer": 0.44,
+    "inner": 0.21,
     "tip along the tube": 0.07,
     "end cap, oblique": 0.06,
     "elbow": 0.06,
@@ -47,21 +46,17 @@ KINDS = {
     "twist": 0.03,
     "sliding": 0.05,
     "impact": 0.03,
-    "second on the same link": 0.05,
-    "second on the other link": 0.05,
 }
-# how often in the recordings for second contacts; a force that grows is no second contact
-SECOND_KINDS = {
-    "outer": 0.15,
-    "inner": 0.1,
+# how often in the recordings of contacts that last up to 10 s, some of which rise slowly
+LASTING_KINDS = {
+    "outer": 0.35,
+    "inner": 0.2,
     "harder": 0.15,
-    "sliding": 0.08,
-    "elbow": 0.03,
-    "drag along the tube": 0.03,
-    "tip along the tube": 0.03,
-    "twist": 0.03,
-    "second on the same link": 0.2,
-    "second on the other link": 0.2,
+    "sliding": 0.1,
+    "elbow": 0.05,
+    "drag along the tube": 0.05,
+    "tip along the tube": 0.05,
+    "twist": 0.05,
 }
 # how often in the recordings of an arm that was identified, whose forces are all of the levels
 LEVEL_KINDS = {"outer": 0.75, "inner": 0.25}
@@ -74,14 +69,14 @@ class Touch(NamedTuple):
 
     Attributes
     ----------
-    kind : of `KINDS`; 'second' for the second of two.
+    kind : of `KINDS`.
     cover : name of the cover.
     position : m along the cover at the start.
     force : (3,), N, of the world on the cover, in its frame.
     arm : (3,), m, from the axis at `position` to the point of the force.
     twist : N m about the cover's x axis.
     speed : m/s, of the position.
-    begin, end : s.
+    begin, end, rise : s.
     friction : coefficient; tangential over normal force.
     harder, within : factor by which the force grows, `TOUCHES.harder_after` the start, and s that this takes.
     mass : kg, picked up by the tool; its force is 0.
@@ -100,10 +95,11 @@ class Touch(NamedTuple):
     harder: float = 1.0
     within: float = 0.1
     mass: float = 0.0
+    rise: float = TOUCHES.rise
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
-        rise = min(TOUCHES.rise, 0.5 * (self.end - self.begin))
+        rise = min(self.rise, 0.5 * (self.end - self.begin))
         grown = min(max((time - self.begin - TOUCHES.harder_after) / self.within, 0.0), 1.0)
         share = max(0.0, min(1.0, (time - self.begin) / rise, (self.end - time) / rise))
         return share * (1.0 + (self.harder - 1.0) * grown)
@@ -130,13 +126,16 @@ def axis_of(arm: Arm, cover: str, place: float) -> tuple[float, float, float]:
 def touches(
     arm: Arm, random: np.random.Generator, times: Sequence[float], kinds: Mapping[str, float] = KINDS
 ) -> list[Touch]:
-    """A contact at each time, s; two where a second one is drawn."""
+    """A contact at each time, s."""
     found: list[Touch] = []
     for begin in times:
         kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
         drawn = _drawn(arm, random, kind, begin, 1.0 if kinds is LEVEL_KINDS else 0.5)
-        lasting = kinds is SECOND_KINDS and len(drawn) == 1
-        found += [drawn[0]._replace(end=begin + TOUCHES.hold_of_first)] if lasting else drawn
+        if kinds is LASTING_KINDS:
+            hold = float(np.exp(random.uniform(*np.log(TOUCHES.lasting))))
+            rise = TOUCHES.slow if random.random() < 0.3 else TOUCHES.rise
+            drawn = drawn._replace(end=begin + hold, rise=min(rise, 0.5 * hold))
+        found.append(drawn)
     return found
 
 
@@ -147,27 +146,13 @@ def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
     return names[i], names[i + 1]
 
 
-def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> list[Touch]:
+def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> Touch:
     inner, outer = _neighbours(arm, random)
     size = _size(random, of_levels)
     if kind == PICKING_UP:
         mass = float(np.exp(random.uniform(math.log(TOUCHES.lightest), math.log(TOUCHES.heaviest))))
-        none, end = (0.0, 0.0, 0.0), begin + TOUCHES.hold_of_mass
-        return [Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)]
-    if kind.startswith("second"):
-        first_cover = str(random.choice((inner, outer)))
-        same = kind.endswith("same link")
-        second_cover = first_cover if same else outer if first_cover == inner else inner
-        first = _side(arm, random, first_cover, max(size, 4.0), begin, TOUCHES.hold_of_first)._replace(kind=kind)
-        second = _side(
-            arm,
-            random,
-            second_cover,
-            max(_size(random, of_levels), 4.0),
-            begin + TOUCHES.second_after,
-            TOUCHES.second_hold,
-        )
-        return [first, second._replace(kind="second")]
+        none, end = (0.0, 0.0, 0.0), begin + float(random.choice(TOUCHES.holds_of_mass))
+        return Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)
     if kind in ("tip along the tube", "end cap, oblique"):
         lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
         angle = float(random.uniform(-math.pi, math.pi))
@@ -177,16 +162,16 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
             size * math.sin(lean) * math.cos(angle),
             size * math.sin(lean) * math.sin(angle),
         )
-        return [Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + TOUCHES.hold, 0.0)]
+        return Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + TOUCHES.hold, 0.0)
     if kind == "elbow":
         cover = str(random.choice((inner, outer)))
         touch = _side(arm, random, cover, size, begin, TOUCHES.hold)
         place = float(random.uniform(0.0, TOUCHES.near_elbow))
-        return [touch._replace(kind=kind, position=place if cover == outer else _length(arm, inner) - place)]
+        return touch._replace(kind=kind, position=place if cover == outer else _length(arm, inner) - place)
     if kind == "drag along the tube":
         touch = _side(arm, random, outer, size, begin, TOUCHES.hold)
         along = float(random.choice((-1.0, 1.0))) * size
-        return [touch._replace(kind=kind, force=(along, 0.0, 0.0), friction=math.inf)]
+        return touch._replace(kind=kind, force=(along, 0.0, 0.0), friction=math.inf)
     touch = _side(arm, random, inner if kind == "inner" else outer, size, begin, TOUCHES.hold)
     if kind == "twist":
         touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
@@ -200,7 +185,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
         touch = touch._replace(force=(x / factor, y / factor, z / factor), harder=factor, within=within)
     if kind == "impact":
         touch = touch._replace(end=begin + TOUCHES.impact)
-    return [touch._replace(kind=kind)]
+    return touch._replace(kind=kind)
 
 
 def _length(arm: Arm, cover: str) -> float:

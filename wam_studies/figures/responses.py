@@ -134,24 +134,34 @@ def trajectory() -> Panels:
 
 
 def lost_contact() -> Panels:
-    """Figure 5.10: one period of the settled cycle of an unstable loop whose environment cannot pull."""
-    zeta = 0.25
+    """Figure 5.10: one period of the settled cycle of an unstable loop whose environment cannot pull.
+
+    The same loop on a contact of a quarter of the stiffness comes to rest: its first second.
+    """
+    zeta, (inertia, ktr, natural) = 0.25, _stiffness()
     gamma = 1.15 * float(gamma_3(zeta))
-    inertia, ktr, natural = _stiffness()
     damping = 2.0 * zeta * inertia * natural
     gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
-    seconds, step = 6.0, 1e-4
-    found = force_step(CASE.desired, CASE.contact, gain, damping, (6.0, 6.0), seconds, unilateral=True, step=step)
-    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
-    contacts = [event.time for event in exact.events if event.kind is Kind.SWITCH and event.sign > 0]
-    motion = exact.at(np.linspace(contacts[-2], contacts[-1], 3000))
-    late = slice(-round((contacts[-1] - contacts[-2]) / step), None)
-    cycle = Series(
-        CASE.contact * motion.x,
-        motion.v,
-        _points(CASE.contact * found.position[late], 60),
-        _points(found.velocity[late], 60),
-    )
+    hard, soft = _last_motion(CASE.contact, gain, damping), _last_motion(0.25 * CASE.contact, gain, damping)
     axes = "k_c x, above 0 the contact force [N m]", "velocity of the link [rad/s]"
     marks = Mark("contact begins", 0.0), Mark("F_des", CASE.desired, 0.0)
-    return (Panel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, (("exact", cycle),), marks=marks),)
+    lines = (("exact", hard), ("a quarter of k_c", soft))
+    return (Panel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, lines, marks=marks),)
+
+
+def _last_motion(contact: float, gain: float, damping: float) -> Series:
+    """Velocity over k_c x between the last two contacts, of a motion that keeps contact in its first second."""
+    seconds, step = 6.0, 1e-4
+    found = force_step(CASE.desired, contact, gain, damping, (6.0, 6.0), seconds, unilateral=True, step=step)
+    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
+    contacts = [event.time for event in exact.events if event.kind is Kind.SWITCH and event.sign > 0]
+    begin, end = contacts[-2:] if len(contacts) > 1 else (0.0, 1.0)
+    motion = exact.at(np.linspace(begin, end, 3000))
+    count = round((end - begin) / step)
+    shown = slice(-count, None) if begin else slice(count)
+    return Series(
+        contact * motion.x,
+        motion.v,
+        _points(contact * found.position[shown], 60),
+        _points(found.velocity[shown], 60),
+    )

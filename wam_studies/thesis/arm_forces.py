@@ -93,17 +93,21 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
             rows += [
                 near(f"{label}, true", force, true.mean(), "N", "7.3", BOUNDS.force_along_link),
                 below(f"{label}, peak to peak", np.ptp(true), "N", BOUNDS.force_along_link * force),
-                Comparison(
-                    f"{label}, estimated",
-                    float(true.mean()),
-                    float(found.estimated[late].mean()),
-                    "N",
-                    math.nan,
-                    "true",
-                ),
+                _outside(run, step, label, place),
             ]
         panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
     return Result(rows, panels)
+
+
+def _outside(run: Recording, step: Step, label: str, position: float) -> Comparison:
+    """How far the true position of a contact is outside the set that the estimator states: none where it is in it."""
+    time, columns = run.table("contact/hypotheses")
+    cover = run.shared.arm.covers.names.index("outer_link")
+    here = (time > step.end - BOUNDS.steady_press) & (time < step.end) & (columns["link"] == cover)
+    low, high = columns["low"][here], columns["high"][here]
+    beyond = np.maximum(np.maximum(low - position, position - high), 0.0)
+    outside = float(np.median(np.nan_to_num(beyond, nan=np.inf))) if len(low) else math.inf
+    return below(f"{label}, outside the stated set", outside, "m", BOUNDS.outside_set, "90 % set")
 
 
 def along(run: Recording) -> Along:

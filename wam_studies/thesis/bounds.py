@@ -68,6 +68,7 @@ class ThesisBounds:
     estimate: float = 0.05  # of the true force
     smallest_estimate_error: float = 0.4  # N; a third of the standard deviation that is stated at 5 N
     position: float = 0.04  # m
+    outside_set: float = 0.002  # m, by which a position may be outside the part that is stated to hold it
     latency: float = 0.1  # s until a push is detected
     wrong_link: float = 0.05  # of the time of a push, with another link or no detection
     push_in_motion: float = 0.15  # of the force of a push while the arm moves

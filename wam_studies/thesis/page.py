@@ -20,13 +20,13 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
     folder = page.with_suffix("")
     folder.mkdir(exist_ok=True)
     for experiment, result, picture in results:
-        parts = [markdown(result.rows), *(f"- {remark}" for remark in result.remarks)]
+        parts = [markdown(result.rows), "\n".join(f"- {remark}" for remark in result.remarks)]
         if result.panels:
             parts.append(f"![{experiment.title}]({folder.name}/{experiment.name}.png)")
             shutil.copyfile(picture, folder / f"{experiment.name}.png")
         if not section_of(page, experiment.name):
             _append(page, experiment)
-        text = with_section(page, experiment.name, "\n" + "\n\n".join(map(str.strip, parts)))
+        text = with_section(page, experiment.name, "\n" + "\n\n".join(filter(None, map(str.strip, parts))))
         page.write_text(text, encoding="utf-8")
 
 

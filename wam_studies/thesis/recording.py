@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns, read
 from wam_bag.cut import CUT
 from wam_description.arm import Shared
 from wam_sim.recorded_parameters import RecordedParameters
@@ -86,6 +86,11 @@ class Recording(NamedTuple):
         """A WrenchStamped topic."""
         columns = self._columns(topic, WrenchColumns)
         return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, tuple(columns.frames))
+
+    def table(self, topic: str) -> tuple[Numbers, Mapping[str, Numbers]]:
+        """Times (p,) s and columns (p,) of the rows of a table."""
+        found = self._columns(topic, TableColumns)
+        return found.stamp_ns[found.message] / 1e9, found.columns
 
     def step(self, name: str) -> Step:
         """The first step of this name that was played."""
