@@ -40,7 +40,6 @@ COMPILED = (
     "wam_control/contact/model_errors.py",
     "wam_control/contact/momentum_observer.py",
     "wam_control/task/motion.py",
-    "wam_control/contact/second_contact.py",
     "wam_control/contact/shaft_friction.py",
     "wam_control/contact/tool_load.py",
     "wam_control/velocity/transform.py",

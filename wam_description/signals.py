@@ -79,7 +79,6 @@ class Contact(NamedTuple):
     position_sd: float = float("nan")  # m, standard deviation of the position, NaN where it is not known
     probability: float = float("nan")  # that this cover is touched and no other, NaN where it is not known
     direction_sd: float = float("nan")  # rad, of the angle of the force about the cover, NaN where it is not known
-    is_single: bool = True  # False where a second contact is nearly certain
 
 
 NO_CONTACT = Contact("", float("nan"), ZERO)

@@ -14,7 +14,7 @@ from wam_sim.simulation import Simulation
 def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     steps = [
         ScenarioStep("release", 0.05, request="enable"),
-        ScenarioStep("press", 1.0, force=ForceCommand(BASE, (0.2, 0.0, 0.0))),
+        ScenarioStep("press", 1.0, force=ForceCommand(BASE, (0.6, 0.0, 0.0))),
     ]
     run = Simulation(Configuration.load(packaged("wam")), steps)
     seen: list[Event] = []

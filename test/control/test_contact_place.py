@@ -48,7 +48,7 @@ def test_a_command_pins_its_place_by_its_torque() -> None:
         assert pinned_position(none) is None
 
 
-@pytest.mark.parametrize("contact", [NO_CONTACT, SURE, SURE._replace(cover=INNER), SURE._replace(is_single=False)])
+@pytest.mark.parametrize("contact", [NO_CONTACT, SURE, SURE._replace(cover=INNER)])
 def test_a_pinned_place_is_not_overridden_and_known_as_well_as_declared(contact: Contact) -> None:
     found = at(force(OUTER, 0.28), contact)
     assert found == Place(OUTER, 0.28, OWN.contact_position_sd, is_pinned=True, is_known=True)
@@ -67,7 +67,6 @@ def test_a_pinned_place_is_not_overridden_and_known_as_well_as_declared(contact:
         (force(OUTER), SURE._replace(cover=INNER), 0.0, (OUTER, 0.28, ANYWHERE), False, True),
         (force(), SURE, math.radians(25.0), (OUTER, 0.1, 0.001), True, False),
         (force(), SURE, math.radians(35.0), (OUTER, 0.28, ANYWHERE), False, False),
-        (force(), SURE._replace(is_single=False), 0.0, (OUTER, 0.28, ANYWHERE), False, False),
     ],
 )
 def test_an_estimated_place_is_used_where_it_is_good_enough(
@@ -77,15 +76,15 @@ def test_an_estimated_place_is_used_where_it_is_good_enough(
     assert found[:2] == (where[0], pytest.approx(where[1]))
     assert where[2] is ... or found.position_sd == pytest.approx(where[2])
     assert (found.is_pinned, found.is_known, found.is_in_doubt) == (False, is_known, is_in_doubt)
-    is_rejected = lean > math.radians(30.0) or not contact.is_single
+    is_rejected = lean > math.radians(30.0)
     assert bool(found.rejection) is is_rejected
 
 
 def test_the_last_certain_place_is_kept_while_something_is_touched_and_no_longer() -> None:
     place = ContactPlace(COVERS)
-    steps = (SURE, SURE._replace(position=0.3, probability=0.5), SURE._replace(is_single=False), NO_CONTACT)
+    steps = (SURE, SURE._replace(position=0.3, probability=0.5), NO_CONTACT)
     found = [place.step(force(), contact, 0.0, OWN).position for contact in steps]
-    assert found == [0.1, 0.1, 0.1, OWN.contact_position]
+    assert found == [0.1, 0.1, OWN.contact_position]
 
 
 @pytest.mark.parametrize(

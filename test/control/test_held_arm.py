@@ -142,7 +142,7 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
     def step(force: float, allowed: float = 20.0, periods: int = 1) -> list[float]:
         torques = Torques(none + force * UP @ jacobian, none, None, sd)
         for _ in range(periods):
-            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, allowed, 0.03, OWN, DT)
+            rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
         return [row.speed for row in rows]
 
     def direct(force: float) -> float:
@@ -170,5 +170,5 @@ def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> Non
         size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
         torques = Torques(-size * axis.along, none, None, np.full(4, 0.015))
         allowed = 1.5 * (40.0 if k < 100 else 5.0)
-        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, allowed, 0.03, OWN, DT)
+        pushed.step(q, [axis], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
         assert pushed.event is None

@@ -185,7 +185,7 @@ def test_numbers_have_homes_and_classes_are_small():
     assert sum(map(constants_in, trees)) <= MOST_CONSTANTS
     classes = [one for tree in trees for one in ast.walk(tree) if isinstance(one, ast.ClassDef)]
     large = {one.name for one in classes if attributes_of(one) > MOST_ATTRIBUTES}
-    assert large == {"ForceLoop", "ForceHold"}
+    assert not large
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ SAMPLES = Path(__file__).parents[2] / "bags" / "sample"
 STEPS = """
 - {name: release the brakes, seconds: 0.3, request: enable}
 - {name: nearly straight, seconds: 1.5, posture: [0.0, -1.2, 0.0, 0.05]}
-- {name: along the arm, seconds: 1.0, force: {frame: outer_link, newtons: [5.0, 0.0, 0.0]}}
+- {name: too small, seconds: 1.0, force: {frame: outer_link, newtons: [0.0, -0.2, 0.0]}}
 - {name: no force, seconds: 0.4}
 - {name: above the limit, seconds: 0.6, force: {frame: outer_link, newtons: [0.0, -80.0, 0.0]}}
 - name: one place twice
@@ -39,7 +39,7 @@ STEPS = """
 - {name: brake, seconds: 0.2, request: disable}
 """
 REFUSED = {
-    "along the arm": ("refused", "may be off by"),
+    "too small": ("refused", "may be off by"),
     "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
     "one place twice": ("refused", "may be off by"),
 }
@@ -149,7 +149,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
 def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSummary, Analysis]) -> None:
     told = text(found[0])
     assert "force within 10 %: NO (4 of 6 refused)" in told
-    assert "Refused: along the arm, above the limit, one place twice, axis 1" in " ".join(told.split())
+    assert "Refused: too small, above the limit, one place twice, axis 1" in " ".join(told.split())
     for name, (kind, _) in REFUSED.items():
         assert f"  {name}: {kind} from" in told
 

@@ -145,7 +145,20 @@ steps:
     table = tmp_path / "table.csv"
     vary = f"{GAIN}={configuration.sections['force_loop']['force_gain'][0]}"
     with pytest.raises(SystemExit, match="0"):
-        main(["sweep", str(table), "--scenario", str(file), "--vary", vary, "--results", str(tmp_path / "kept.jsonl")])
+        main(
+            [
+                "sweep",
+                str(table),
+                "--set",
+                "force_loop:limits.doubt=9.0",
+                "--scenario",
+                str(file),
+                "--vary",
+                vary,
+                "--results",
+                str(tmp_path / "kept.jsonl"),
+            ]
+        )
     with table.open() as stream:
         (row,) = csv.DictReader(stream)
     assert row["failure"] == ""
