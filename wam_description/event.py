@@ -5,6 +5,7 @@ from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 Value = float | str
+RAISED = "raised"  # cause of a fault: a callback raised an exception
 CAUSE = "cause"  # value that names the sentence of a code, where that has several
 SUBJECTS = (CAUSE, "axis", "cover", "joint", "topic", "reason")  # values that distinguish two events of a code
 
@@ -38,7 +39,7 @@ class Code(StrEnum):
     SECOND_CONTACT = "second_contact"  # holds: a second contact is nearly certain
     NOT_FOLLOWED = "not_followed"  # goes on: the commanded posture or position moves faster than the arm may
     REFUSED = "refused"  # a command is not taken: it is beyond a limit or has no effect
-    FAULT = "fault"  # of the driver, which has put the brakes on
+    FAULT = "fault"  # the driver has put the brakes on, or does so for a node that reports it
     MODEL_OFF = "model_off"  # the model of the contact estimator is off by more than is tolerable
     DONE = "done"  # the scenario was played to its end
 
@@ -99,6 +100,11 @@ def warning(code: Code, cause: str, **values: Value) -> Event:
 def refused(topic: str, reason: str) -> Event:
     """A message that is not taken; the reason is that of its check."""
     return Event(Code.REFUSED, Level.WARN, {"topic": topic, "reason": reason})
+
+
+def fault(cause: str, **values: Value) -> Event:
+    """What stops the arm: of the driver, or of a node for which the driver brakes."""
+    return Event(Code.FAULT, Level.ERROR, {CAUSE: cause, **values})
 
 
 OBEYED = Event(Code.NONE)

@@ -139,6 +139,23 @@ SENTENCES: Final = {  # by cause
     "torque_uncertain": "{axis}: the torque is known to +-{sd:b} N m, {fraction:.0%} of the commanded {desired:b} N m; "
     f"sensing.reported_fraction, {{allowed:.0%}}, is to be known: {SENSORS}, or command more torque",
     "model_off": "the model is off: {part}; see /diagnostics, run 'wam identify'",
+    # the driver has put the brakes on
+    "emergency_stop": "emergency stop",
+    "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
+    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {cure}",
+    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {step}: let its steps "
+    "compute less, or run it in a process of its own",
+    "unanswered": "lockstep: no {topics} for the state of {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
+    "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
+    "timing.period",
+    "limit": "{excess}; {cure}",
+    "broken": "{excess} under the brakes; check the cable",
+    "node": "{node}: {fault}{late}",
+    # a node reports it, and the driver brakes
+    "claimed": "{nodes} publish {topic}, which one node alone may; stop all others, then reset_fault",
+    "stopped": "{nodes} has stopped: {topics} too old; start {nodes} again, then reset_fault",
+    "long_step": "{step}: {topics} too old; let its steps compute less, then reset_fault",
+    "ended": "{node} has ended; start it again, then reset_fault",
     "cycle": "the measured force is in a limit cycle of {swing:b} N peak to peak and {period:b} s about {desired:.3g} "
     "N; allowed: limits.cycle_force, {allowed:g} of the commanded; friction or the surface keeps it up: lower "
     f"force_gain, or {SENSORS}",

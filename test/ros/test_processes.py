@@ -19,6 +19,7 @@ from rclpy.context import Context
 from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import fault
 from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
@@ -715,7 +716,7 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
         composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
         driver.time.pause(True)
         composition.spin(lambda: time.monotonic() - begin > 0.1)
-        driver._fault("two publishers send motor_current_command")
+        driver._fault(fault("test", reason="two publishers send motor_current_command"))
         ended = composition.wait(lambda ended: bool(ended) or time.monotonic() - begin > LONG)
         assert ended == {"scenario": 1}
         (failure,) = composition.failures
