@@ -839,3 +839,18 @@ def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: 
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.process.returncode == 1
     assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()
+
+
+def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Path, domain_id: int) -> None:
+    (tmp_path / "pinocchio.py").write_text("raise ModuleNotFoundError('gone', name='pinocchio')")
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "wam_ros.program", "driver"],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: the Python package 'pinocchio' is missing; ")
+    assert len(done.stderr.splitlines()) == 1
