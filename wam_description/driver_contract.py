@@ -105,10 +105,10 @@ REQUIREMENTS: Final = {
     ),
     "peers": Requirement(
         "a fault in the status of another node brakes the arm; enable is refused while there is one",
-        "listen to status: level ERROR with a fault trips the driver, which names the node",
+        "listen to status: level ERROR with a fault trips the driver, which names both in an event of its status",
     ),
     "claims": Requirement(
-        "two publishers of motor_current_command are a fault that names the topic",
+        "two publishers of motor_current_command are a fault, whose event names the topic",
         "count the publishers of the topic in every status period",
     ),
     "agreement": Requirement(

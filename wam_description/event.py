@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 Value = float | str
 HOLDS = "holds"  # value that is 1 where the force loop holds the arm instead of obeying
+RAISED = "raised"  # cause of a fault: a callback raised an exception
 CAUSE = "cause"  # value that names the sentence of a code, where that has several
 SUBJECTS = (CAUSE, "axis", "cover", "joint", "topic", "reason")  # values that distinguish two events of a code
 
@@ -29,7 +30,7 @@ class Code(StrEnum):
     PUSHED = "pushed"  # something pushes harder than allowed
     AT_LIMIT = "at_limit"  # a bound of the motion is reached
     OSCILLATING = "oscillating"  # the measured force turns back again and again
-    FAULT = "fault"  # of the driver, which has put the brakes on
+    FAULT = "fault"  # the driver has put the brakes on, or does so for a node that reports it
     MODEL_OFF = "model_off"  # the model of the contact estimator is off by more than is tolerable
     DONE = "done"  # the scenario was played to its end
 
@@ -87,6 +88,11 @@ def holding(code: Code, cause: str, **values: Value) -> Event:
 def refused(topic: str, reason: str) -> Event:
     """A message that is not taken; the reason is that of its check."""
     return Event(Code.REFUSED, Level.WARN, {"topic": topic, "reason": reason})
+
+
+def fault(cause: str, **values: Value) -> Event:
+    """What stops the arm: of the driver, or of a node for which the driver brakes."""
+    return Event(Code.FAULT, Level.ERROR, {CAUSE: cause, **values})
 
 
 OBEYED = Event(Code.NONE)

@@ -74,6 +74,24 @@ SENTENCES: Final = {  # by cause
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
     "{allowed:g} of the commanded (limits.cycle_force): lower force_gain, or use joint sensors",
+    "model_off": "the model is off: {part}; see /diagnostics, run 'wam identify'",
+    # the driver has put the brakes on
+    "emergency_stop": "emergency stop",
+    "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
+    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {cure}",
+    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {step}: let its steps "
+    "compute less, or run it in a process of its own",
+    "unanswered": "lockstep: no {topics} for the state of {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
+    "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
+    "timing.period",
+    "limit": "{excess}; {cure}",
+    "broken": "{excess} under the brakes; check the cable",
+    "node": "{node}: {fault}{late}",
+    # a node reports it, and the driver brakes
+    "claimed": "{nodes} publish {topic}, which one node alone may; stop all others, then reset_fault",
+    "stopped": "{nodes} has stopped: {topics} too old; start {nodes} again, then reset_fault",
+    "long_step": "{step}: {topics} too old; let its steps compute less, then reset_fault",
+    "ended": "{node} has ended; start it again, then reset_fault",
 }
 HOLDING: Final = "; the arm holds its position"
 SINCE: Final = ("and nothing was touched", "since the force last was right, or rose")
@@ -117,7 +135,7 @@ def sentences(events: Iterable[Event]) -> str:
 def _parts(values: Mapping[str, Any]) -> dict[str, str]:
     """What the placeholders of a sentence stand for that are no values."""
     found = {"since": SINCE[values.get("has_touched", 0.0) > 0.0]}
-    if "part" in values:
+    if values.get("part") in PARTS:
         part, helps = PARTS[values["part"]]
         is_joint = math.isnan(values["position"])
         where = values["cover"] if is_joint else f"{values['position']:.3g} m of {values['cover']}"

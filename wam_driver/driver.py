@@ -10,6 +10,7 @@ import numpy as np
 
 from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
+from wam_description.event import Event, fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require
@@ -183,10 +184,8 @@ class Driver:
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
-                self._trip(
-                    f"command stale: {age * 1e3:.0f} ms old, allowed {self._parameters.watchdog * 1e3:.0f} ms; "
-                    f"{self.stale_advice()}"
-                )
+                allowed_ms = self._parameters.watchdog * 1e3
+                self.fault(fault("command_stale", age_ms=age * 1e3, allowed_ms=allowed_ms, cure=self.stale_advice()))
                 enabled = False
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
@@ -194,10 +193,7 @@ class Driver:
         self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble():
             self.plant.recover()
-            self._trip(
-                f"the simulation of the arm failed: {trouble}; the arm is where it was before; "
-                f"{self._advice}, or lower timing.period"
-            )
+            self.fault(fault("simulation", trouble=trouble, cure=self._advice))
             enabled = False
         self._begin_period(self._tick + 1)
         self._measure()
@@ -224,9 +220,9 @@ class Driver:
             if heat > DRIVER.warning
         ]
         if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
-            self._trip(f"{excess}; {self._advice}")
+            self.fault(fault("limit", excess=excess, cure=self._advice))
         elif sunk := self.plant.sunk():
-            self._trip(sunk)
+            self.fault(fault("sunk", reason=sunk))
 
     @property
     def _advice(self) -> str:
@@ -245,7 +241,7 @@ class Driver:
         tensions = self._largest_tensions()
         broken = next(filter(None, (limit.excess for limit in self._watch.tensions(tensions))), "")
         if broken:
-            self.safety.damage(f"{broken} under the brakes; check the cable")
+            self.safety.damage(fault("broken", excess=broken))
 
     def _largest_tensions(self) -> list[float]:
         """Tension of the tight strand of each cable, N, (n,), the largest since the last check."""
@@ -253,13 +249,10 @@ class Driver:
         self._pulls.clear()
         return tensions
 
-    def _trip(self, reason: str) -> None:
-        self.safety.trip(reason)
+    def fault(self, event: Event) -> None:
+        """Stop, also for a reason that is known outside the driver; brakes on, latched."""
+        self.safety.trip(event)
         self._release()
-
-    def fault(self, reason: str) -> None:
-        """Stop for a reason that is known outside the driver; brakes on, latched."""
-        self._trip(reason)
 
     def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
         """Push on a cover until the next push on it, for `ages.command` of the arm's time at most; see `Plant.push`.
@@ -327,7 +320,7 @@ class Driver:
 
     def estop(self) -> Answer:
         """Stop at once and latch a fault."""
-        self._trip("emergency stop")
+        self.fault(fault("emergency_stop"))
         return Answer(True, "fault: emergency stop, brakes on; call reset_fault, then enable")
 
     def reset_fault(self) -> Answer:

@@ -9,7 +9,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.event import Level
+from wam_description.event import RAISED, Code, Event, Level, fault
 from wam_description.interface import Interface, declared
 from wam_description.signals import BASE, Answer, NodeStatus, Point, State, Wrench
 from wam_description.status import PAUSED
@@ -122,7 +122,7 @@ class DriverNode(TolerantNode):
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""
         if reason:
-            self._fault(reason)
+            self._fault(fault(RAISED, reason=reason))
 
     def _senders(self, nodes: Sequence[str]) -> dict[str, str]:
         """Who answers the state of a period in lockstep, by topic."""
@@ -146,15 +146,17 @@ class DriverNode(TolerantNode):
         """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
         if status.level is Level.ERROR and status.fault:
-            self._fault(self._with_lateness(f"{status.node}: {status.fault}"))
+            found = [one.values["topic"] for one in status.events if one.code is Code.FAULT and "topic" in one.values]
+            late = f"; {self.time.lateness}" if self.time.lateness else ""
+            self._fault(fault("node", node=status.node, fault=status.fault, late=late, topic=next(iter(found), "")))
 
     def _with_lateness(self, reason: str) -> str:
         """The reason, and that the computer may be the cause of it where many periods are late."""
         return "; ".join(filter(None, (reason, self.time.lateness)))
 
-    def _take_problem(self, reason: str) -> None:
-        if reason and self.driver.safety.mode is Mode.ENABLED:
-            self.driver.fault(reason)
+    def _take_problem(self, problem: Event | None) -> None:
+        if problem and self.driver.safety.mode is Mode.ENABLED:
+            self.driver.fault(problem)
         self._announce()
 
     def end(self) -> None:
@@ -254,6 +256,7 @@ class DriverNode(TolerantNode):
                 since=self._session.since,
                 stamp=self.driver.stamp,
                 facts={PAUSED: "paused"} if self.time.is_paused else {},
+                events=safety.events,
             )
         )
         if is_new_fault:
@@ -323,8 +326,8 @@ class DriverNode(TolerantNode):
         self.time.pause(bool(request.data))
         return Answer(True, "paused" if request.data else "running")
 
-    def _fault(self, reason: str) -> None:
-        self.driver.fault(reason)
+    def _fault(self, event: Event) -> None:
+        self.driver.fault(event)
         self._announce()
 
 

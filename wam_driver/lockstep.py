@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from wam_description.arm import Timing
+from wam_description.event import Event, fault
 from wam_description.signals import Answer
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 from wam_driver.driver import Driver
@@ -35,7 +36,7 @@ class Lockstep:
     session : that the nodes follow.
     publish : called after each period, to publish the new state.
     announce : called to publish the session.
-    fault : called with the reason, to stop the arm.
+    stop : called with the reason, to stop the arm.
     pacer : determines when a period is due; also measures.
     now : steady clock, s.
     """
@@ -49,14 +50,14 @@ class Lockstep:
         session: Session,
         publish: Callable[[], None],
         announce: Callable[[], None],
-        fault: Callable[[str], None],
+        stop: Callable[[Event], None],
         pacer: Pacer,
         now: Callable[[], float],
     ) -> None:
         self._driver, self._timing, self._senders = driver, timing, senders
         self._unanswered = unanswered
         self._session, self._announce = session, announce
-        self._publish, self._fault, self._now = publish, fault, now
+        self._publish, self._stop, self._now = publish, stop, now
         self.pacer = pacer
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
@@ -121,19 +122,16 @@ class Lockstep:
             self._session.begin()
             self._announce()
         if self._waited >= self._patience:
-            self._fault(self._overdue(missing))
+            self._stop(self._overdue(missing))
             self._patience = 0.5 * DRIVER.watch  # at the next look again
             self.pacer.restart()
             self._one_period()
 
-    def _overdue(self, missing: list[str]) -> str:
+    def _overdue(self, missing: list[str]) -> Event:
         """Why time does not go on, and what to do."""
-        stamp, limit = self._driver.stamp, self._timing.timeout
         self._advice = self._cause(missing)
-        return (
-            f"lockstep: no {' and '.join(missing)} for the state of {stamp} ns within {limit:.1f} s; "
-            f"{self._advice}, then reset_fault"
-        )
+        topics, allowed = " and ".join(missing), self._timing.timeout
+        return fault("unanswered", topics=topics, stamp=self._driver.stamp, allowed=allowed, cure=self._advice)
 
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 
 from wam_description.arm import Timing
+from wam_description.event import fault
 from wam_description.signals import Answer
 from wam_driver.driver import Driver
 from wam_driver.safety import Mode
@@ -86,19 +87,14 @@ class Realtime:
         age = now - self._progress
         most = max(1, round(self._watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
-            self._driver.fault(
-                f"the driver itself did not run for {due * self._timing.period:.2f} s, allowed "
-                f"{self._watchdog * 1e3:.0f} ms; {self._cause()}"
-            )
+            late = {"time": due * self._timing.period, "allowed_ms": self._watchdog * 1e3}
+            step = self._held_up()
+            cure = "give it a processor, or use lockstep"
+            self._driver.fault(fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late))
         for left in range(min(due, most) - 1, -1, -1):
             self._driver.advance(age)
             if left == 0 or self._driver.is_outer:
                 self._send()
-
-    def _cause(self) -> str:
-        if busy := self._held_up():
-            return f"{busy}: let its steps compute less, or run it in a process of its own"
-        return "give it a processor, or use lockstep"
 
     def _note(self, due: int) -> None:
         """Keep how many periods were due at the ticks in the window."""

@@ -2,6 +2,8 @@
 
 from enum import Enum
 
+from wam_description.event import CAUSE, Event
+from wam_description.event_text import sentence
 from wam_description.signals import Answer
 
 
@@ -19,13 +21,17 @@ class Safety:
     Attributes
     ----------
     mode : present state.
-    fault : the first fault since the last reset, and the first damage under the brakes; empty if there is none.
+    events : the first fault since the last reset, and the first damage under the brakes.
     """
 
     def __init__(self) -> None:
         self.mode = Mode.BRAKED
-        self.fault = ""
-        self._is_damaged = False
+        self.events: tuple[Event, ...] = ()
+
+    @property
+    def fault(self) -> str:
+        """The faults in words, '' where there is none."""
+        return "; then ".join(map(sentence, self.events))
 
     def enable(self, obstacle: str) -> Answer:
         """Release the brakes, unless `obstacle` names a reason against it."""
@@ -42,24 +48,20 @@ class Safety:
             self.mode = Mode.BRAKED
         return Answer(True, f"{self.mode.value}: brakes on, currents zero")
 
-    def trip(self, reason: str) -> None:
-        """Latch a fault; the first reason is kept."""
+    def trip(self, event: Event) -> None:
+        """Latch a fault; the first one is kept."""
         if self.mode is not Mode.FAULT:
-            self.mode, self.fault = Mode.FAULT, reason
+            self.mode, self.events = Mode.FAULT, (event,)
 
-    def damage(self, reason: str) -> None:
+    def damage(self, event: Event) -> None:
         """Latch the first damage done under the brakes, after the fault that has put them on."""
-        if self._is_damaged:
-            return
-        self._is_damaged = True
-        before = f"{self.fault}; then " if self.mode is Mode.FAULT else ""
-        self.mode, self.fault = Mode.FAULT, before + reason
+        if not any(one.values[CAUSE] == event.values[CAUSE] for one in self.events):
+            self.mode, self.events = Mode.FAULT, (*self.events, event)
 
     def reset_fault(self) -> Answer:
         """Clear the fault; the arm stays braked."""
         if self.mode is not Mode.FAULT:
             return Answer(True, f"{self.mode.value}: no fault was latched")
-        cleared, self.fault = self.fault, ""
-        self._is_damaged = False
+        cleared, self.events = self.fault, ()
         self.mode = Mode.BRAKED
         return Answer(True, f"braked: fault '{cleared}' cleared; call enable to move")

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
-from wam_description.event import Event, Level
+from wam_description.event import RAISED, Event, Level, fault
 from wam_description.event_text import sentence
 from wam_description.interface import Feed, Interface, declared, is_packaged
 from wam_description.parameters import ParameterError
@@ -33,7 +33,7 @@ from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import Follower, declare, follow_together
-from wam_ros.ports import Ports
+from wam_ros.ports import Ports, problem_of
 from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
@@ -82,7 +82,7 @@ class AdaptedNode(TolerantNode):
                 group,
                 getattr(shared, group),
                 self.node.retune,
-                lambda reason: ports.set_problem(f"parameters {group}", reason),
+                lambda reason: ports.set_problem(f"parameters {group}", problem_of("parameters", reason)),
                 self._report_change,
             )
             if followed.node in interface.declarations:  # it is not ready before it has those values
@@ -128,7 +128,7 @@ class AdaptedNode(TolerantNode):
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""
-        self._ports.set_problem("exception", reason)
+        self._ports.set_problem("exception", problem_of(RAISED, reason))
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""
@@ -174,17 +174,17 @@ class AdaptedNode(TolerantNode):
         needed = essential & getattr(self.node, "needs", essential)
         ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
-            self._ports.set_problem("inputs", "")
+            self._ports.set_problem("inputs", None)
         elif (
             not (known := self._ports.problems.get("inputs"))
             or self._ports.counts["steps"] % NODE_LIMITS.loss_repeated == 0
         ):
             lost, stopped = self._interface.silent(ages)  # on a busy machine another node may just have been late
-            silent = ", ".join(stopped)
-            reason = f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault"
+            topics = " and ".join(lost)
+            problem = fault("stopped", nodes=", ".join(stopped), topics=topics)
             if step := self._ports.held_up(stopped):
-                reason = f"{step}: {' and '.join(lost)} too old; let its steps compute less, then reset_fault"
-            self._ports.set_problem("inputs", reason)
+                problem = fault("long_step", step=step, topics=topics)
+            self._ports.set_problem("inputs", problem)
             if known:
                 self._ports.repeat_status()
 
@@ -213,7 +213,7 @@ class AdaptedNode(TolerantNode):
     def end(self) -> None:
         """Report at once that this node ends, so that an enabled arm is braked before its commands cease."""
         if self._is_enabled:
-            self._ports.set_problem("end", f"{self.get_name()} has ended; start it again, then reset_fault")
+            self._ports.set_problem("end", fault("ended", node=self.get_name()))
 
     def _step(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
         ports = self._ports

@@ -73,9 +73,9 @@ def descriptor(field: Field) -> ParameterDescriptor:
         read_only=not field.live,
     )
     low, high = max(field.low, -1e308), min(field.high, 1e308)
-    if field.kind is float and not field.is_array and (low, high) != (-1e308, 1e308):
+    if field.kind is float and (low, high) != (-1e308, 1e308):
         result.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
-    if field.kind is int and not field.is_array and abs(field.low) < 2**62 and abs(field.high) < 2**62:
+    if field.kind is int and abs(field.low) < 2**62 and abs(field.high) < 2**62:
         result.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
     return result
 

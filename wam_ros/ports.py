@@ -11,7 +11,8 @@ from rclpy.subscription import Subscription
 
 from wam_description.agreement import DIGESTS, digests, disagreement
 from wam_description.arm import Shared
-from wam_description.event import Level
+from wam_description.event import Event, Level, fault
+from wam_description.event_text import sentence
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
 from wam_description.parameters import listed
@@ -32,6 +33,11 @@ from wam_ros.wire import decoder, deserialized, stamp_of
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+
+
+def problem_of(cause: str, reason: str) -> Event | None:
+    """Why the driver has to brake, None where there is no reason."""
+    return fault(cause, reason=reason) if reason else None
 
 
 class Changes:
@@ -80,7 +86,7 @@ class Ports:
         self.refusals = Refusals(node)
         self.facts: dict[str, str] = {}
         self.faults: dict[str, str] = {}
-        self.problems: dict[str, str] = {}
+        self.problems: dict[str, Event] = {}
         self.session = 0
         self._name = declaration.name
         self._busy: dict[str, tuple[str, frozenset[str]]] = {}  # by node in a long step: what, and who waits for it
@@ -88,7 +94,7 @@ class Ports:
         self._status = self._plain = WAITING
         self._digests = digests(shared)
         self.live: dict[str, str] = {}
-        self.takes_problem: Callable[[str], None] | None = None
+        self.takes_problem: Callable[[Event | None], None] | None = None
         self.waits: Callable[[], bool] = lambda: False
         self._repeated = time.monotonic()  # when the status was, on that clock
         self._wanted: NodeStatus | None = None
@@ -133,10 +139,10 @@ class Ports:
         def receive(data: bytes) -> None:
             if is_local:  # what a second publisher sends does not come here
                 if rivals := self.problems.get(topic):
-                    raise Refused(rivals)
+                    raise Refused(sentence(rivals))
             elif subscription.get_publisher_count() > 1 and (rivals := self.claims.rivals(topic)):
                 self.set_problem(topic, rivals)
-                raise Refused(rivals)
+                raise Refused(sentence(rivals))
             stamp = stamp_of(data)
             if accepts is None or accepts(stamp):
                 take(stamp, decode(data))
@@ -208,22 +214,24 @@ class Ports:
             self._repeated = now
             self.repeat_status()
 
-    def set_problem(self, concerned: str, reason: str) -> None:
-        """State in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
-        if self.problems.get(concerned, "") == reason:
+    def set_problem(self, concerned: str, problem: Event | None) -> None:
+        """State in the status, with level ERROR, why the driver has to brake; None where nothing is wrong any more."""
+        if self.problems.get(concerned) == problem:
             return
-        self.problems[concerned] = reason
-        if reason:
-            self.node.get_logger().error(reason)
+        if problem is None:
+            del self.problems[concerned]
+        else:
+            self.problems[concerned] = problem
+            self.node.get_logger().error(sentence(problem))
         if self.takes_problem is not None:
-            self.takes_problem(reason)
+            self.takes_problem(problem)
         else:
             self.publish_status(self._plain._replace(connected=self.ready))
 
     @property
     def problem(self) -> str:
-        """The first problem that there is, '' where there is none."""
-        return next(filter(None, self.problems.values()), "")
+        """The first problem that there is in words, '' where there is none."""
+        return next(map(sentence, self.problems.values()), "")
 
     def report_change(self, stamp: int, values: Mapping[str, Any]) -> None:
         """Publish live parameters that the node has taken after its step of a stamp, ns: a replay needs both.
@@ -268,7 +276,8 @@ class Ports:
         status = with_refused(status, self.refusals.unusable)
         problem = self.problem if self.takes_problem is None else ""
         if problem:
-            status = status._replace(level=Level.ERROR, message=problem, fault=problem)
+            events = (*status.events, *self.problems.values())
+            status = status._replace(level=Level.ERROR, message=problem, fault=problem, events=events)
         status = self._with_shared(status._replace(session=status.session or self.session))
         if status != self._status:
             if self.shared.timing.mode == "lockstep" or status.session != self._status.session:
@@ -333,7 +342,7 @@ class Ports:
             # a node of the stack that this bring-up does not list answers all the same
             if self.takes_problem is not None and (is_peer or status.node in NODES.keys() - {self._name}):
                 reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
-                self.set_problem(f"parameters of {status.node}", reason)
+                self.set_problem(f"parameters of {status.node}", problem_of("parameters", reason))
             if status.connected:
                 self._absent.discard(status.node)
                 self._inform()

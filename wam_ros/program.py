@@ -10,6 +10,11 @@ def main() -> None:
         from wam_ros.node import main as run_node
 
         run_node()
+    except ModuleNotFoundError as error:
+        raise SystemExit(
+            f"error: the Python package '{error.name}' is missing; install it (pinocchio is 'pin' for pip), or put its "
+            "folder on PYTHONPATH: see docs/install.md"
+        ) from None
     finally:
         ignore_signals()
 

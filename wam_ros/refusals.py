@@ -7,6 +7,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from wam_bag.printable import printable
+from wam_description.event import Event, fault
 from wam_ros.limits import NODE_LIMITS
 
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
@@ -43,18 +44,18 @@ class Claims:
         if self.subscriptions[topic].get_publisher_count() > 1:
             self._strays[topic] += 1
 
-    def rivals(self, topic: str) -> str:
-        """Which nodes publish a topic that one alone may publish, and what to do; '' where it is one."""
+    def rivals(self, topic: str) -> Event | None:
+        """Which nodes publish a topic that one alone may publish; None where it is one."""
         count = self.subscriptions[topic].get_publisher_count()
         if count < 2:
             self._names.pop(topic, None)
             self._strays.pop(topic, None)
-            return ""
+            return None
         names = self._publishers(topic, count)
         if len(names) == 1 and self._strays[topic] < NODE_LIMITS.strays:
-            return ""
+            return None
         who = " and ".join(names) if len(names) > 1 else f"{count} nodes named {names[0]}"
-        return f"{who} publish {topic}, which one node alone may; stop all others, then reset_fault"
+        return fault("claimed", nodes=who, topic=topic)
 
     def _publishers(self, topic: str, count: int) -> list[str]:
         """Full names of the nodes that publish a topic, each once."""

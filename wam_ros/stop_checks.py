@@ -85,8 +85,9 @@ def _peers(bench: DriverBench) -> str:
     probe.report(fault)
     if wrong := bench.in_mode("fault"):
         return wrong
-    if not ("velocity_loop" in probe.status.fault and fault in probe.status.fault):
-        return f"the fault '{probe.status.fault}' does not name velocity_loop and its fault, '{fault}'"
+    named = [(event.values.get("node"), event.values.get("fault")) for event in probe.status.events]
+    if ("velocity_loop", fault) not in named:
+        return f"no event of its status names velocity_loop and its fault, '{fault}': {named}"
     probe.ask("reset_fault")
     probe.report(fault)
     probe.watch(CONFORMANCE_LIMITS.settle)
@@ -100,8 +101,8 @@ def _claims(bench: DriverBench) -> str:
     other = bench.probe.second_publisher()
     try:
         bench.probe.wait(lambda: bench.probe.status.mode == "fault", 4 * REPLY)
-        fault = bench.probe.status.fault
-        return "" if "motor_current_command" in fault else f"the fault is '{fault}'; it has to name the topic"
+        topics = [event.values.get("topic") for event in bench.probe.status.events]
+        return "" if "motor_current_command" in topics else f"no event of its status names the topic: {topics}"
     finally:
         other.destroy_node()
         bench.probe.wait(lambda: bench.probe.count_publishers("motor_current_command") == 1, CONFORMANCE_LIMITS.vanish)

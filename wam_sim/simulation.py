@@ -173,7 +173,7 @@ class Simulation:
         safety = self.driver.safety
         level = Level.ERROR if safety.fault else Level.OK
         message = f"{safety.mode.value}: {safety.fault}".removesuffix(": ")
-        return NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault)
+        return NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault, events=safety.events)
 
     def listen(self, topic: str, take: Callable[[int, Any], None], node: str = "") -> None:
         """Call a function with stamp, ns, and value of each message of a topic; of one that all publish, of a node."""

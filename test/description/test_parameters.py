@@ -213,6 +213,7 @@ def test_every_parameter_is_described_to_ros(ros: Any) -> None:
     by_name = {d.name: d for d in answer.descriptors}
     assert by_name["watchdog"].floating_point_range[0].to_value == 0.05
     assert "[s]" in by_name["watchdog"].description
+    assert by_name["arm.joints.viscous_friction"].floating_point_range, "of each value of a list"
     assert by_name["timing.outer_delay"].integer_range[0].to_value == 1
     assert by_name["timing.mode"].additional_constraints == "one of lockstep, realtime"
 

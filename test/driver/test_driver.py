@@ -13,6 +13,7 @@ from contact_truth import joint_torques
 
 from wam_description.arm import Shared
 from wam_description.effects import no_effects
+from wam_description.event import fault
 from wam_description.parameters import Field, ParameterError, fields
 from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, World
@@ -92,7 +93,7 @@ def test_brakes_released_without_currents_let_the_arm_fall() -> None:
 def test_commands_are_ignored_while_braked_and_in_a_fault() -> None:
     hardware = driver()
     assert answered(hardware, 5.0) == [0.0] * 4
-    hardware.fault("test")
+    hardware.fault(fault("test", reason="test"))
     assert answered(hardware, 5.0) == [0.0] * 4
 
 
@@ -291,7 +292,7 @@ def _braked(hardware: Driver) -> None:
 
 
 def _faulty(hardware: Driver) -> None:
-    hardware.fault("another")
+    hardware.fault(fault("test", reason="another"))
 
 
 def _running(hardware: Driver) -> None:

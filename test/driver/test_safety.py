@@ -2,6 +2,7 @@
 
 import pytest
 
+from wam_description.event import fault
 from wam_driver.safety import Mode, Safety
 
 
@@ -10,7 +11,7 @@ def in_mode(mode: Mode) -> Safety:
     if mode is Mode.ENABLED:
         assert safety.enable("").success
     elif mode is Mode.FAULT:
-        safety.trip("first")
+        safety.trip(fault("test", reason="first"))
     assert safety.mode is mode
     return safety
 
@@ -45,18 +46,18 @@ def test_request_leads_where_it_should(mode: Mode, request_name: str, after: Mod
 @pytest.mark.parametrize("mode", Mode)
 def test_trip_stops_in_every_state(mode: Mode) -> None:
     safety = in_mode(mode)
-    safety.trip("second")
+    safety.trip(fault("test", reason="second"))
     assert safety.mode is Mode.FAULT
 
 
 def test_first_fault_is_kept_until_reset() -> None:
     safety = in_mode(Mode.FAULT)
-    safety.trip("second")
+    safety.trip(fault("test", reason="second"))
     safety.disable()
     assert safety.fault == "first"
     safety.reset_fault()
     assert not safety.fault
-    safety.trip("third")
+    safety.trip(fault("test", reason="third"))
     assert safety.fault == "third"
 
 
@@ -77,6 +78,6 @@ def test_enable_is_refused_while_something_speaks_against_it() -> None:
 
 def test_reset_never_enables() -> None:
     safety = in_mode(Mode.ENABLED)
-    safety.trip("while enabled")
+    safety.trip(fault("test", reason="while enabled"))
     assert "call enable" in safety.reset_fault().message
     assert safety.mode is Mode.BRAKED

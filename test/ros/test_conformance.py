@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
+from wam_description.event import Event
 from wam_description.signals import Answer, State
 from wam_ros import conformance
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
@@ -166,7 +167,7 @@ class Broken:
         ports = self._ports
         self._whole_publish, self._whole_status = ports.publish, ports.publish_status
         ports.publish, ports.publish_status = self._send, self._send_status
-        ports.takes_problem = lambda reason: None if self.defect in ("claims", "agreement") else self._trip(reason)
+        ports.takes_problem = lambda event: None if self.defect in ("claims", "agreement") else self._trip(event)
 
     def _send(self, topic: str, stamp: int, value: Any) -> None:
         change = {
@@ -217,9 +218,9 @@ class Broken:
     def _disable(self) -> Answer:
         return Answer(True, "braked") if self.defect == "disable" else super()._disable()
 
-    def _trip(self, reason: str) -> None:
+    def _trip(self, event: Event | None) -> None:
         if self.defect != "estop":
-            super()._trip(reason)
+            super()._trip(event)
 
     def _take_peer(self, status: Any) -> None:
         if self.defect != "peers":

@@ -19,6 +19,7 @@ from rclpy.context import Context
 from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
 from wam_description.configuration import Configuration, packaged
+from wam_description.event import fault
 from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
@@ -715,7 +716,7 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
         composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
         driver.time.pause(True)
         composition.spin(lambda: time.monotonic() - begin > 0.1)
-        driver._fault("two publishers send motor_current_command")
+        driver._fault(fault("test", reason="two publishers send motor_current_command"))
         ended = composition.wait(lambda ended: bool(ended) or time.monotonic() - begin > LONG)
         assert ended == {"scenario": 1}
         (failure,) = composition.failures
@@ -838,3 +839,18 @@ def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: 
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.process.returncode == 1
     assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()
+
+
+def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Path, domain_id: int) -> None:
+    (tmp_path / "pinocchio.py").write_text("raise ModuleNotFoundError('gone', name='pinocchio')")
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "wam_ros.program", "driver"],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: the Python package 'pinocchio' is missing; ")
+    assert len(done.stderr.splitlines()) == 1

@@ -12,6 +12,7 @@
 ``model_errors``            the errors of the model, tracked in free motion
 ``model_prior``             what is known of them before: stated, or identified
 ``momentum_observer``       external joint torques and their covariance
+``motor_side``              samples of the motors as those of the joints, with their friction
 ``observer_parameters``     its parameters
 ``shaft_friction``          nominal friction of motors and joints, and where it is uncertain
 ``thresholds``              what no parameter sets: when a contact is detected, how it may move

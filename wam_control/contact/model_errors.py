@@ -50,6 +50,23 @@ class TrackedError(NamedTuple):
     sd: float
 
 
+class _Pose(NamedTuple):
+    """A pose in which the arm rests.
+
+    Attributes
+    ----------
+    at : (n,), rad.
+    samples : that were learned from there.
+    rested : s, since `elsewhere`.
+    elsewhere : errors and covariance as they are for other poses; None where they are the same there.
+    """
+
+    at: Array
+    samples: int = 0
+    rested: float = 0.0
+    elsewhere: tuple[Array, Array] | None = None
+
+
 class ModelErrors:
     """Kalman filter of the errors of the model.
 
@@ -75,8 +92,7 @@ class ModelErrors:
         self.noise, self.size = noise.copy(), 1.0
         self.beyond = self._beyond()
         self._waiting: deque[Observation] = deque()
-        self._at, self._of_pose, self._rested = np.full(len(through), np.inf), 0, 0.0
-        self._elsewhere: tuple[Array, Array] | None = None  # errors and covariance as they are for other poses
+        self._pose = _Pose(np.full(len(through), np.inf))
         self._since = self._contact = self._hold = 0.0
 
     @property
@@ -94,9 +110,8 @@ class ModelErrors:
         """Take over what another one has learned."""
         self.errors, self.covariance = other.errors.copy(), other.covariance.copy()
         self.noise, self.size, self.beyond = other.noise.copy(), other.size, other.beyond
-        self._at, self._of_pose, self._rested = other._at, other._of_pose, other._rested
-        elsewhere = other._elsewhere
-        self._elsewhere = None if elsewhere is None else (elsewhere[0].copy(), elsewhere[1].copy())
+        pose = other._pose
+        self._pose = pose._replace(elsewhere=pose.elsewhere and (pose.elsewhere[0].copy(), pose.elsewhere[1].copy()))
 
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
@@ -109,10 +124,11 @@ class ModelErrors:
 
         Another one in the same pose has the same errors of the gauges: it takes the place of the one before.
         """
-        if self._elsewhere is None or np.abs(seen.pose - self._at).max() > CONTACT.pose_change:
-            self._elsewhere = self.errors, self.covariance
-        self.errors, self.covariance = self._elsewhere
-        self._at = seen.pose
+        elsewhere = self._pose.elsewhere
+        if elsewhere is None or np.abs(seen.pose - self._pose.at).max() > CONTACT.pose_change:
+            elsewhere = self.errors, self.covariance
+        self.errors, self.covariance = elsewhere
+        self._pose = _Pose(seen.pose, elsewhere=elsewhere)
         innovation, covariance = self.corrected(seen)
         self._take(innovation, covariance, seen)
 
@@ -151,9 +167,9 @@ class ModelErrors:
         if self._since < CONTACT.learn_interval:
             return
         self._grow(self._since)
-        self._rested += self._since
-        if not in_contact and np.abs(seen.pose - self._at).max() > (
-            CONTACT.rest_left if self._elsewhere else CONTACT.pose_change
+        pose = self._pose = self._pose._replace(rested=self._pose.rested + self._since)
+        if not in_contact and np.abs(seen.pose - pose.at).max() > (
+            CONTACT.rest_left if pose.elsewhere else CONTACT.pose_change
         ):
             self._leave(seen.pose)
         if not in_contact and self._hold <= 0.0:
@@ -161,18 +177,18 @@ class ModelErrors:
             self._waiting.append(seen)
             if len(self._waiting) > CONTACT.hindsight / CONTACT.learn_interval and statistic < CONTACT.gate:
                 before = self._waiting.popleft()
-                self._of_pose += 1
-                if self._of_pose > CONTACT.correlated and self._elsewhere is None:
-                    self._elsewhere, self._rested = (self.errors.copy(), self.covariance.copy()), 0.0
+                pose = self._pose = self._pose._replace(samples=self._pose.samples + 1)
+                if pose.samples > CONTACT.correlated and pose.elsewhere is None:
+                    self._pose = pose._replace(elsewhere=(self.errors.copy(), self.covariance.copy()), rested=0.0)
                 self._learn(before, self._since)
         self._since = 0.0
 
     def _leave(self, pose: Array) -> None:
         """Forget what is true of one pose alone."""
-        self._at, self._of_pose = pose, 0
-        if self._elsewhere is not None:
-            (self.errors, self.covariance), self._elsewhere = self._elsewhere, None
-            self._grow(self._rested)
+        before, self._pose = self._pose, _Pose(pose, rested=self._pose.rested)
+        if before.elsewhere is not None:
+            self.errors, self.covariance = before.elsewhere
+            self._grow(before.rested)
             self.beyond = self._beyond()
             self._waiting.clear()
 

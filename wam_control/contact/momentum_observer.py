@@ -15,18 +15,16 @@ from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior, weight_prior
+from wam_control.contact.motor_side import JointSample, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
-from wam_control.contact.shaft_friction import ShaftFriction
 from wam_control.contact.thresholds import CONTACT
 from wam_control.contact.tool_load import ToolLoad
-from wam_control.contact.velocity_fit import VelocityFit
 from wam_description.arm import Arm
 from wam_description.event import Code, Event, warning
 from wam_description.model import ArmModel
 from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 
@@ -80,59 +78,42 @@ class MomentumObserver:
             len(parameters.mass_scale) == n,
             f"parameter 'observer.mass_scale' has {len(parameters.mass_scale)} values; {n} links need {n}",
         )
-        self._n, self._parameters, self._link_side = n, parameters, use_joint_sensors
+        self._n, self._parameters = n, parameters
         self._body = RigidBody(arm, parameters.mass_scale)
-        self._map = TransmissionMap.of(arm)
-        self._squared = np.square(self._map.joint_from_motor)
-        inverse = self._map.motor_from_joint
-        self._carried: Array = np.zeros((n, n))
-        if not use_joint_sensors:
-            self._carried = inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
-        is_identified = model is not None and model.is_identified
-        at_motors, at_joints = (model.motors, model.joints) if model else (None, None)
-        self._motors, self._joints = (
-            ShaftFriction(shafts, parameters, rest, at.stribeck_velocity if at else (), is_identified)
-            for shafts, rest, at in (
-                (arm.motors, parameters.motor_rest_velocity, at_motors),
-                (arm.joints, parameters.joint_rest_velocity, at_joints),
-            )
-        )
-        self._velocity = VelocityFit(n, parameters.motor_rest_velocity)
-        self._cycle = 0 if use_joint_sensors else dither_cycle
+        cycle = 0 if use_joint_sensors else dither_cycle
+        side = MotorSide(arm, parameters, cycle > 0, model)
+        self._side = None if use_joint_sensors else side
         fast, times = parameters.detection_time, [parameters.time_constant]
-        if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not self._cycle:
+        if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not cycle:
             times.append(fast)
-        self._load: ToolLoad | None = None
         low, high = parameters.payload
         # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
         payload_sd = (high - low) / math.sqrt(3.0)
         if not high and not use_joint_sensors:
             payload_sd = parameters.payload_uncertainty
-        if payload_sd > 0.0 or high > 0.0:
-            self._load = ToolLoad(arm)
+        self._load = ToolLoad(arm) if payload_sd > 0.0 or high > 0.0 else None
         centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
-        self._gauges = GaugeEffects(n, parameters.joint_torque_sd, centres)
-        self._effects = ErrorEffects(self._map, parameters, self._motors, self._joints, times, self._cycle > 0, centres)
+        self._effects: GaugeEffects | ErrorEffects
         if use_joint_sensors:
+            self._effects = GaugeEffects(n, parameters.joint_torque_sd, centres)
             prior = weight_prior(arm, parameters, payload_sd)
         else:
+            self._effects = ErrorEffects(side.map, parameters, side.motors, side.joints, times, cycle > 0, centres)
             prior = model_prior(arm, parameters, payload_sd, model)
-        noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
-        self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
-        self._filters = _Filters(n, times, self._cycle)
+        noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
+        self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
+        self._filters = _Filters(n, times, cycle)
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
         n = self._n
-        self._filters = _Filters(n, self._filters.times, self._cycle)
-        self._last = _Sample([0.0] * n, [], self._carried, [0.0] * n, [0.0] * n)
-        self._torque: Sequence[float] = ()
+        self._filters = _Filters(n, self._filters.times, self._filters.cycle)
+        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [0.0] * n, [0.0] * n)
         if self._load is not None:
             self._load.reset()
-        self._motors.reset()
-        self._joints.reset()
-        self._velocity.reset()
+        if self._side is not None:
+            self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
         self.seen: Observation | None = None
@@ -146,9 +127,8 @@ class MomentumObserver:
     def learn(self, other: "MomentumObserver") -> None:
         """Take over what another one of the same parameters has learned and keeps at a reset."""
         self._errors.learn(other._errors)
-        self._velocity.learn(other._velocity)
-        self._motors.learn(other._motors)
-        self._joints.learn(other._joints)
+        if self._side is not None and other._side is not None:
+            self._side.learn(other._side)
 
     def observe(self, state: State, dt: float) -> bool:
         """Take one sample.
@@ -173,47 +153,20 @@ class MomentumObserver:
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
-        if self._link_side:
-            return self._update(position, velocity, effort, [], [], dt)
-        if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
-            # at rest without current, brakes or stiction hold: motor torques carry no information
+        if self._side is None:
+            return self._update(JointSample(position, velocity, effort, [], [], dt))
+        if self._side.carries_nothing(state):
             self.reset()
             return True
-        fitted = self._velocity.take(state, dt + self._gap)
+        sample = self._side.take(state, dt + self._gap)
         self._gap = 0.0
-        return fitted is None or self._update_from_motors(fitted.state, fitted.dt)
+        return sample is None or self._update(sample)
 
-    def _update_from_motors(self, state: State, dt: float) -> bool:
-        theta, thetad, tau_motor = state
-        q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        # with dither a shaft stops at both ends of each swing, held there by the external torque
-        keep = 0.0 if self._cycle else math.exp(-dt / self._parameters.friction_memory)
-        motor, joint = self._motors.of(thetad, keep, dt), self._joints.of(qd, keep, dt)
-        through = self._map.joint_torques(motor.friction)
-        friction = [through[i] + joint.friction[i] for i in range(self._n)]
-        sliding = motor.sliding + joint.sliding
-        tau = self._map.joint_torques(tau_motor)
-        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*motor.friction, *through], strict=True)]
-        loaded = [abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)]
-        signals = [
-            *sliding,
-            *map(abs, sliding),
-            *motor.resting,
-            *joint.resting,
-            *motor.shape,
-            *joint.shape,
-            *loaded,
-            *((torque - before) / dt for torque, before in zip(tau_motor, self._torque or tau_motor, strict=True)),
-        ]
-        self._torque = tau_motor
-        return self._update(q, qd, tau, friction, signals, dt)
-
-    def _update(
-        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: list[float], dt: float
-    ) -> bool:
-        """Take a sample of the joints: state and torque, (n,); friction, (n,), and signals of the shafts, if any."""
+    def _update(self, sample: JointSample) -> bool:
+        """Take a sample of the joints."""
+        q, qd, tau, friction, signals, dt = sample
         body, at, speed = self._body, np.array(q), np.array(qd)
-        inertia = body.mass_matrix(at) if self._link_side else body.mass_matrix(at) + self._carried
+        inertia = body.mass_matrix(at) if self._side is None else body.mass_matrix(at) + self._side.inertia
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
         last, span, n = self._last, dt + self._gap, self._n
@@ -237,7 +190,10 @@ class MomentumObserver:
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
-        settled = self.age > CONTACT.settled * self._parameters.time_constant and self._filters.count >= 2 * self._cycle
+        settled = (
+            self.age > CONTACT.settled * self._parameters.time_constant
+            and self._filters.count >= 2 * self._filters.cycle
+        )
         self.is_ready = self.is_ready or (settled and not is_first)
         return True
 
@@ -246,16 +202,11 @@ class MomentumObserver:
 
         See `ModelErrors`; from joint sensors its errors are those of masses, centres of mass and payload.
         """
-        if not self._link_side:
-            sd = self._velocity.sd
-            self._motors.expect(sd)
-            self._joints.expect(np.sqrt(self._squared.dot(np.square(sd))).tolist())
-            self.seen = self._observation()
-            torques, covariance = self._errors.corrected(self.seen)
-            return torques.tolist(), self._errors.size * covariance
-        self.seen = self._gauges.observation(self._filters.of_links, self._load, self._parameters.payload[0])
+        if self._side is not None:
+            self._side.expect()
+        self.seen = self._observation()
         torques, covariance = self._errors.corrected(self.seen)
-        return torques.tolist(), covariance
+        return torques.tolist(), self._errors.size * covariance
 
     def moment(self) -> Torques:
         """The external torques last given, with what is known of their errors."""
@@ -274,7 +225,7 @@ class MomentumObserver:
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
-        if self.seen is not None and self.is_ready and not self._link_side:
+        if self.seen is not None and self.is_ready and self._side is not None:
             self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
 
@@ -291,7 +242,7 @@ class MomentumObserver:
     @property
     def model_errors(self) -> dict[str, TrackedError]:
         """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
-        return {} if self._link_side else self._errors.by_name
+        return {} if self._side is None else self._errors.by_name
 
     @property
     def warning(self) -> Event | None:
@@ -301,15 +252,18 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        means, load = self._filters.means(which), self._load
-        return self._effects.observation(means, load, self._last.inertia, self._velocity.sd, which)
+        effects, load = self._effects, self._load
+        if isinstance(effects, GaugeEffects):
+            return effects.observation(self._filters.of_links, load, self._parameters.payload[0])
+        velocity_sd = self._side.velocity_sd if self._side else ()
+        return effects.observation(self._filters.means(which), load, self._last.inertia, velocity_sd, which)
 
     def zero(self) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
 
         Masses, centres of mass and payload are known better then, in other poses, too.
         """
-        if not self._link_side:
+        if self._side is not None:
             error = self._errors.by_name["payload"]
             mass = self._parameters.payload[0] + error.value
             return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
@@ -365,7 +319,7 @@ class _Filters:
 
     def __init__(self, n: int, times: list[float], cycle: int) -> None:
         self.times, self.of_links, self.count = times, [0.0] * (3 * n), 0
-        self._n, self._cycle = n, cycle
+        self._n, self.cycle = n, cycle
         self._values = np.zeros((len(times), 14 * n))
         self._ring = np.zeros((max(1, cycle), 13 * n))
         self._decay = _Decay.over(math.inf, times, 14 * n)
@@ -400,8 +354,8 @@ class _Filters:
             values += self._decay.takes * present
             if before_gap is not None:  # continue from here
                 values[:, : 3 * n] = before_gap
-        if self._cycle:
-            kept = self._ring[self.count % self._cycle]
+        if self.cycle:
+            kept = self._ring[self.count % self.cycle]
             kept[:n], kept[n:] = values[0, :n], values[0, 2 * n :]
             self.count += 1
         return keep
@@ -410,7 +364,7 @@ class _Filters:
         """Residual and torque of the model, N m, pose, rad, each (n,), and signals, (11 n,), of one time constant."""
         n, filtered = self._n, self._values[which].copy()
         model: list[float] = filtered[n : 2 * n].tolist()
-        if not (self._cycle and self.count):
+        if not (self.cycle and self.count):
             return filtered[:n], model, filtered[2 * n : 3 * n], filtered[3 * n :]
         mean = self._ring[: self.count].mean(axis=0)
         return mean[:n], model, mean[n : 2 * n], mean[2 * n :]

@@ -219,14 +219,14 @@ class BusCycle:
             self._send(question)
 
     def _collect(self) -> None:
-        """Take the positions of this period, and all else that has come."""
-        asked = self._line.now()
-        end = asked + BUS.collect * self._period
+        """Take the positions of this period, and all else that has come before them."""
+        asked, patience = self._line.now(), BUS.collect * self._period
         self.moved = {}
-        while True:
-            left = end - self._line.now() if len(self.moved) < self._n else 0.0
+        for _ in range(BUS.most_frames):
+            if len(self.moved) == self._n:
+                break
             try:
-                frame = self._line.receive(max(left, 0.0))
+                frame = self._line.receive(patience)
             except LineError:
                 self._counts["bus errors"] += 1
                 break
@@ -276,10 +276,12 @@ class BusCycle:
 
     def _judge(self) -> None:
         """Look for positions that have not come for too long, and for frames that were not sent."""
+        if len(self.moved) == self._n:
+            self._missed, self._jumped = [0] * self._n, [0] * self._n
+            return
         self._missed = [0 if at in self.moved else missed + 1 for at, missed in enumerate(self._missed)]
         self._counts["lost replies"] += self._n - len(self.moved)
         silent = [at + 1 for at, missed in enumerate(self._missed) if missed * self._period >= BUS.silent]
-        self._jumped = [0 if at in self.moved else jumped for at, jumped in enumerate(self._jumped)]
         if not silent:
             return
         if self._refused:

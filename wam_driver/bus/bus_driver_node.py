@@ -8,7 +8,7 @@ from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.arm import Shared
-from wam_description.event import Level
+from wam_description.event import RAISED, Event, Level, fault
 from wam_description.interface import Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Answer, NodeStatus, State
@@ -24,7 +24,7 @@ from wam_driver.thresholds import DRIVER
 from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import declare
-from wam_ros.ports import Ports
+from wam_ros.ports import Ports, problem_of
 from wam_ros.tolerance import TolerantNode
 
 
@@ -141,14 +141,13 @@ class BusDriver(TolerantNode):
         if hardware.is_running:
             age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
             if self.safety.mode is Mode.ENABLED and age > self._watchdog:
-                self._trip(
-                    f"command stale: {age * 1e3:.0f} ms old, {due - 1} periods late; check that velocity_loop runs"
-                )
+                cure = f"{due - 1} periods late, check that velocity_loop runs"
+                self._trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
             hardware.exchange(due)
             self._publish(due)
         else:
             hardware.go_on()
-        self._trip(hardware.fault)
+        self._trip(problem_of("hardware", hardware.fault))
 
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
@@ -176,7 +175,7 @@ class BusDriver(TolerantNode):
     def _enable(self) -> Answer:
         if self.safety.mode is Mode.ENABLED:
             return Answer(True, "enabled already: nothing has changed")
-        faults = [f"{node}: {fault}" for node, fault in self._ports.faults.items() if fault]
+        faults = [f"{node}: {why}" for node, why in self._ports.faults.items() if why]
         silent = "" if time.perf_counter() - self._came < self._watchdog else "no motor_current_command comes in"
         answer = self.safety.enable(self._ports.problem or self.hardware.advice or "; ".join(faults) or silent)
         if answer.success:
@@ -188,24 +187,27 @@ class BusDriver(TolerantNode):
         self.hardware.brake()  # now, not in the next period
         return self.safety.disable()
 
-    def _trip(self, reason: str) -> None:
-        if reason and self.safety.mode is not Mode.FAULT:
-            self.safety.trip(reason)
-            self.get_logger().error(reason)
-        if reason:
+    def _trip(self, event: Event | None) -> None:
+        if event and self.safety.mode is not Mode.FAULT:
+            self.safety.trip(event)
+            self.get_logger().error(self.safety.fault)
+        if event:
             self.hardware.brake()
 
-    take_fault = _trip  # what a callback of ours raised
+    def take_fault(self, reason: str) -> None:
+        """Brake where a callback of ours raised."""
+        self._trip(problem_of(RAISED, reason))
 
     def _take_peer(self, status: NodeStatus) -> None:
-        self._trip(f"{status.node}: {status.fault}" if status.level is Level.ERROR and status.fault else "")
+        if status.level is Level.ERROR and status.fault:
+            self._trip(fault("node", node=status.node, fault=status.fault, late=""))
 
     def _serve_enable(self, request: SetBool.Request, response: Any) -> Any:
         return self._answered(self._enable() if request.data else self._disable(), response)
 
     def _serve_stop(self, _: Any, response: Any) -> Any:
         self.hardware.stop()
-        self._trip("emergency stop")
+        self._trip(fault("emergency_stop"))
         return self._answered(Answer(True, "fault: emergency stop"), response)
 
     def _serve_reset(self, _: Any, response: Any) -> Any:
@@ -232,6 +234,7 @@ class BusDriver(TolerantNode):
         waiting = f"{safety.mode.value}: {advice}" if advice else safety.mode.value
         level, text = (Level.ERROR, safety.fault) if safety.fault else (Level.OK, waiting)
         status = NodeStatus(level, text, "driver", self._ports.ready, safety.mode.value, safety.fault)
+        status = status._replace(events=safety.events)
         self._ports.publish_status(status._replace(session=self._session, since=self._since, stamp=self.stamp))
 
     def destroy_node(self) -> None:

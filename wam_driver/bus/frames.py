@@ -33,6 +33,10 @@ class Bit(IntEnum):
     WRITE = 0x80
 
 
+POSITION_REPLY, VALUE_REPLY = Bit.GROUP | Group.POSITIONS, Bit.GROUP | Group.VALUES
+RECEIVER = Bit.GROUP | 31
+
+
 class Frame(NamedTuple):
     """A classic CAN frame: 11 bits of identifier, up to 8 bytes."""
 
@@ -111,12 +115,12 @@ def position(node: int, motor: int, joint: int | None = None) -> Frame:
 def read(frame: Frame) -> Value | Position | None:
     """What a node has answered; None for any other frame."""
     data, size = frame.data, len(frame.data)
-    to = frame.identifier & (Bit.GROUP | 31)
-    if to == Bit.GROUP | Group.POSITIONS and size in (3, 6):
+    to = frame.identifier & RECEIVER
+    if to == POSITION_REPLY and size in (3, 6):
         counts = [_signed(int.from_bytes(data[at : at + 3], "big"), 22) for at in range(0, size, 3)]
         return Position(frame.sender, counts[0], counts[1] if size > 3 else None)
-    if to == Bit.GROUP | Group.VALUES and size in (4, 6) and data[0] & Bit.WRITE:
-        return Value(frame.sender, data[0] & ~Bit.WRITE, int.from_bytes(data[2:], "little", signed=True))
+    if to == VALUE_REPLY and size in (4, 6) and data[0] & 0x80:
+        return Value(frame.sender, data[0] & 0x7F, int.from_bytes(data[2:], "little", signed=True))
     return None
 
 

@@ -32,8 +32,7 @@ class SimulatedController:
         self.values: dict[str, int] = {"VERS": version, "MODE": 0, **values}
         self.woken: int | None = None
         table = properties.SAFETY if self.is_safety else properties.MOTOR
-        rows = (table | properties.STORED).items()
-        known = [*properties.ALWAYS, *(name for name, numbers in rows if numbers[0][0] <= version)]
+        known = [name for name, rows in table.items() if rows[0][0] <= version]
         self._names = {properties.number(name, version, self.is_safety): name for name in known}
 
     def is_addressed(self, frame: Frame) -> bool:

@@ -11,6 +11,7 @@ from typing import Final
 
 from wam_bag.bag import BagError, read
 from wam_description.configuration import Configuration
+from wam_description.event import CAUSE
 from wam_studies.faults.trials import FAULTS, FaultTrial
 from wam_studies.faults.watched_stack import NodeEndedError, WatchedStack
 
@@ -84,5 +85,5 @@ def _is_reported(stack: WatchedStack) -> None:
 def _fault(stack: WatchedStack, bag: Path, chance: Random) -> None:
     stack.ask("estop")
     stack.run(0.05)
-    if "emergency stop" not in stack.driver.safety.fault:
+    if not any(event.values[CAUSE] == "emergency_stop" for event in stack.driver.safety.events):
         stack.escapes.append("no emergency stop")

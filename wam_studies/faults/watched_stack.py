@@ -12,11 +12,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.configuration import Configuration
+from wam_description.event import CAUSE, RAISED
 from wam_description.interface import Interface
 from wam_description.signals import State, Wrench
 from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
-from wam_ros.messages import message_type
+from wam_ros.messages import message_type, read_status
 from wam_ros.requests import answer_of, switch_request
 from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import Encode, encoder, stamp_of
@@ -25,7 +26,6 @@ from wam_studies.faults.message_faults import leaves
 from wam_studies.faults.trials import FAULTS, FaultTrial
 
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
-UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
 SECOND: Final = 1_000_000_000
 
 
@@ -145,8 +145,9 @@ class WatchedStack:
 
     def _take_status(self, message: DiagnosticStatus) -> None:
         self.statuses[message.name] = message
-        if UNEXPECTED in message.message:
-            self._escape(f"{message.name}: {message.message[:200]}")
+        status = read_status(message)
+        if any(event.values.get(CAUSE) == RAISED for event in status.events):
+            self._escape(f"{status.node}: {status.message[:200]}")
 
     def _command(self, stamp: int) -> None:
         """Hold the arm where it is, press as commanded, push nothing."""
