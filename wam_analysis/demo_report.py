@@ -100,8 +100,8 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         "",
         *_titled("Estimated contacts, medians over each", tuple(contact_numbers(summary)), _no_contact(summary)),
     ]
-    said = (*_contact_steps(summary), *contact_doubts(summary), *_uncompared(summary))
-    for sentence in (*said, *(one.sentence for one in summary.missed), *summary.unplanned.sentences):
+    sentences = (*_contact_steps(summary), *contact_doubts(summary), *_uncompared(summary))
+    for sentence in (*sentences, *(one.sentence for one in summary.missed), *summary.unplanned.sentences):
         lines += _wrapped(f"  {sentence}", "    ")
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]

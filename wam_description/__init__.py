@@ -21,7 +21,7 @@
 - nodes, topics, interface: table of nodes, table of topics, who publishes and takes each topic
 - signals, status: the values that nodes exchange; the status of a node
 - thresholds: how exact the numbers of an arm are, and numbers of a model without effect
-- event, event_text: what happened, as a code with values; its sentence
+- event, event_text: what happened, as a code with values; its sentence; reasons: codes of an uncertain estimate
 - agreement: whether nodes that were started apart have the same shared parameters
 - defects: what makes such a value unusable, in a message and in what a node returns
 """

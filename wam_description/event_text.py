@@ -33,7 +33,7 @@ RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g}
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": ("the measured torques", "use joint sensors, tare in free space, or command more force"),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less, or bend the arm"),
-    "place": ("the place of the contact", PINNED),
+    "place": ("the contact position", PINNED),
     "resting": ("what the arm carries", "declare it (arm.payload), or end the command and tare in free space"),
     "moving_surface": ("a surface that moves", "let it move more slowly, or raise force_gain"),
     "slow_arm": ("an arm that gets there too slowly", "declare guard.contact_stiffness, or raise limits.settling_time"),

@@ -92,7 +92,7 @@ class AdaptedNode(TolerantNode):
         self._service_clients: dict[tuple[str, Any], Any] = {}  # by name and type
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
-        # what the stack does not stream comes from, or follows from, a program of the user, who is told
+        # what the stack does not stream comes from, or follows from, a program of the user, who is notified
         self._commands = {
             item.topic for item in declaration.taken if item.age == "command" or not interface.is_streamed(item.topic)
         }

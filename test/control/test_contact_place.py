@@ -8,7 +8,7 @@ from arms import CONFIGURATION, WAM
 
 from wam_control.force.contact_place import (
     ContactPlace,
-    Place,
+    ForcePlace,
     anywhere_sd,
     pinned_position,
     slid_position,
@@ -30,7 +30,7 @@ def force(cover: str = "", position: float | None = None) -> TaskAxis:
     return TaskAxis(AxisKind.FORCE, -1, cover, position, (0.0, 0.0, -1.0), 5.0)
 
 
-def at(axis: TaskAxis, contact: Contact, lean: float = 0.0) -> Place:
+def at(axis: TaskAxis, contact: Contact, lean: float = 0.0) -> ForcePlace:
     return ContactPlace(COVERS).step(axis, contact, lean, OWN)
 
 
@@ -51,7 +51,7 @@ def test_a_command_pins_its_place_by_its_torque() -> None:
 @pytest.mark.parametrize("contact", [NO_CONTACT, SURE, SURE._replace(cover=INNER)])
 def test_a_pinned_place_is_not_overridden_and_known_as_well_as_declared(contact: Contact) -> None:
     found = at(force(OUTER, 0.28), contact)
-    assert found == Place(OUTER, 0.28, OWN.contact_position_sd, is_pinned=True, is_known=True)
+    assert found == ForcePlace(OUTER, 0.28, OWN.contact_position_sd, is_pinned=True, is_known=True)
 
 
 @pytest.mark.parametrize(

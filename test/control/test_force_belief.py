@@ -11,9 +11,9 @@ import pytest
 from arms import CONFIGURATION, WAM
 from numpy.typing import NDArray
 
-from wam_control.force.axes import Axis, TaskAxes
-from wam_control.force.belief import Belief, Errors, Torques, belief, predicted, tolerance, yielding
-from wam_control.force.contact_place import Place
+from wam_control.force.axes import CommandedAxis, TaskAxes
+from wam_control.force.belief import Belief, Errors, WorldTorques, belief, predicted, tolerance, yielding
+from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import ForceAxes, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
@@ -29,10 +29,10 @@ SD = np.full(4, OWN.sensing.torque_sd)
 NONE = np.zeros(4)
 
 
-def axis_at(q: Sequence[float], force: float = 10.0, sd: float = 0.01) -> Axis:
+def axis_at(q: Sequence[float], force: float = 10.0, sd: float = 0.01) -> CommandedAxis:
     direction = BODY.cover_pose(q, OUTER).rotation[:, 2].tolist()
     of = TaskAxis(AxisKind.FORCE, -1, OUTER, 0.28, tuple(direction), force)
-    place = Place(OUTER, 0.28, sd, is_pinned=True, is_known=True)
+    place = ForcePlace(OUTER, 0.28, sd, is_pinned=True, is_known=True)
     return TaskAxes(WAM, BODY, FORCES).of(q, TaskCommand("base", (of,)), [place], [1.0])[0]
 
 
@@ -128,7 +128,7 @@ def test_the_tolerance_is_a_share_of_the_force_and_no_less_than_the_least(
 def test_the_arms_own_motion_is_no_force_until_something_is_touched(is_touching: bool) -> None:
     axis, acceleration = axis_at(POSES[0]), np.array([2.0, -3.0, 1.0, 4.0])
     inertial = -FORCES.inertia(POSES[0]) @ acceleration  # as sensors show it
-    torques = Torques(inertial, inertial, acceleration, SD)
+    torques = WorldTorques(inertial, inertial, acceleration, SD)
     known = belief(axis, 10.0, torques, PLAIN, is_touching, NONE, 0.0, 0.0)
     assert (abs(known.force) < 1e-9) is not is_touching
     at_rest = belief(axis, 10.0, torques._replace(acceleration=None), PLAIN, False, NONE, 0.0, 0.0)
@@ -138,7 +138,7 @@ def test_the_arms_own_motion_is_no_force_until_something_is_touched(is_touching:
 def test_torques_at_rest_count_as_the_force_that_they_look_like() -> None:
     axis = axis_at(POSES[0])
     assert axis.sensed is not None
-    none = Torques(NONE, NONE, None, SD)
+    none = WorldTorques(NONE, NONE, None, SD)
     known = belief(axis, 10.0, none, PLAIN, False, -2.0 * axis.sensed.press, 0.0, 0.0)
     assert known.errors.resting == pytest.approx(2.0)
     assert known.doubt > 1.0
@@ -147,8 +147,8 @@ def test_torques_at_rest_count_as_the_force_that_they_look_like() -> None:
 
 def test_a_joint_torque_is_known_as_its_joint_is() -> None:
     task = TaskCommand("base", joint_axes(AxisKind.FORCE, [1.0, 2.0, 0.0, -3.0]))
-    axes = TaskAxes(WAM, BODY, FORCES).of(POSES[0], task, [Place("", 0.0, 0.0)] * 4, [1.0] * 4)
-    torques = Torques(np.array([0.5, -2.0, 0.0, 3.0]), NONE, None, np.array([0.1, 0.2, 0.3, 0.4]))
+    axes = TaskAxes(WAM, BODY, FORCES).of(POSES[0], task, [ForcePlace("", 0.0, 0.0)] * 4, [1.0] * 4)
+    torques = WorldTorques(np.array([0.5, -2.0, 0.0, 3.0]), NONE, None, np.array([0.1, 0.2, 0.3, 0.4]))
     resting = np.array([0.0, 0.1, 0.0, 0.0])
     known = [belief(axis, 4.0, torques, PLAIN, False, resting, 0.0, 0.0) for axis in axes]
     assert [each.force for each in known] == [-0.5, 2.0, 0.0, -3.0]

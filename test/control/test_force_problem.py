@@ -7,7 +7,7 @@ import pytest
 import quadprog
 from numpy.typing import NDArray
 
-from wam_control.force.problem import RANK, Row, linear, solve
+from wam_control.force.problem import RANK, VelocityRow, linear, solve
 
 Array = NDArray[np.float64]
 N = 4
@@ -17,9 +17,9 @@ NEAR = 1e-4  # rad/s
 class Case(NamedTuple):
     """A random problem."""
 
-    rows: list[Row]
+    rows: list[VelocityRow]
     posture: Array
-    least: list[Row]
+    least: list[VelocityRow]
     low: Array
     high: Array
 
@@ -27,8 +27,10 @@ class Case(NamedTuple):
 def random_case(seed: int, rows: int | None = None, pushes: int | None = None) -> Case:
     random = np.random.default_rng(seed)
 
-    def some(count: int) -> list[Row]:
-        return [Row(random.normal(size=N) * 10.0 ** random.uniform(-2, 0), random.normal()) for _ in range(count)]
+    def some(count: int) -> list[VelocityRow]:
+        return [
+            VelocityRow(random.normal(size=N) * 10.0 ** random.uniform(-2, 0), random.normal()) for _ in range(count)
+        ]
 
     many, few = random.integers(0, 4) if rows is None else rows, random.integers(0, 3) if pushes is None else pushes
     low, high = np.sort(random.uniform(-1.5, 1.5, (2, N)), axis=0)
@@ -76,7 +78,7 @@ def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: in
 def test_limits_that_are_not_reached_change_no_bit(seed: int) -> None:
     case, far = random_case(seed, rows=1, pushes=0), np.full(N, 1e9)
     free = solve(case.rows, case.posture, [], -far, far).velocity
-    slack = [Row(row.along, float(row.along @ free) - 0.1) for row in random_case(seed + 99, pushes=2).least]
+    slack = [VelocityRow(row.along, float(row.along @ free) - 0.1) for row in random_case(seed + 99, pushes=2).least]
     found = solve(case.rows, case.posture, slack, free - 0.1, free + 0.1)
     assert found.velocity is found.unlimited
     assert (found.velocity == free).all()
@@ -87,19 +89,19 @@ def test_limits_that_are_not_reached_change_no_bit(seed: int) -> None:
 def test_a_row_comes_before_the_posture_and_a_push_as_high_as_a_row() -> None:
     along, aside = np.array([0.3, 0.4, 0.0, 0.0]), np.array([0.4, -0.3, 0.0, 0.0])
     posture, far = np.array([1.0, 0.0, 0.5, 0.0]), np.full(N, 9.0)
-    found = solve([Row(along, 0.1)], posture, [], -far, far).velocity
+    found = solve([VelocityRow(along, 0.1)], posture, [], -far, far).velocity
     assert along @ found == pytest.approx(0.1)
     assert aside @ found == pytest.approx(aside @ posture), "what is left belongs to the posture"
-    pushed = solve([Row(along, 0.1)], posture, [Row(along, 0.3)], -far, far).velocity
+    pushed = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(along, 0.3)], -far, far).velocity
     assert along @ pushed == pytest.approx(0.2, abs=1e-4), "half of what contradicts each other"
-    apart = solve([Row(along, 0.1)], posture, [Row(aside, 0.7)], -far, far).velocity
+    apart = solve([VelocityRow(along, 0.1)], posture, [VelocityRow(aside, 0.7)], -far, far).velocity
     assert (along @ apart, aside @ apart) == (pytest.approx(0.1, abs=1e-4), pytest.approx(0.7, abs=1e-4))
 
 
 @pytest.mark.parametrize("along", [np.zeros(N), np.full(N, 1e-12)])
 def test_a_row_without_a_lever_moves_nothing(along: Array) -> None:
     posture, far = np.full(N, 0.2), np.full(N, 1.0)
-    found = solve([Row(along, 1.0)], posture, [Row(along, 1.0)], -far, far).velocity
+    found = solve([VelocityRow(along, 1.0)], posture, [VelocityRow(along, 1.0)], -far, far).velocity
     assert (found == posture).all()
     drive, _ = linear([along], N)
     assert not drive.any()

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from test_force_belief import OWN, POSES, axis_at
 
-from wam_control.force.axes import Axis
+from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief, Errors
-from wam_control.force.force_watch import ForceWatch, Lasting, MotionWatch, Oscillation, Seen, Touch, Turns
+from wam_control.force.force_watch import ForceWatch, Lasting, MotionWatch, Oscillation, Seen, TouchWatch, Turns
 from wam_control.task.motion import GoalMotion
 from wam_description.event import Code, Event
 
@@ -55,7 +55,7 @@ def test_turns_are_those_of_a_cycle_with_its_size_and_period_and_noise_and_a_dri
 
 
 def test_a_touch_is_remembered() -> None:
-    touch, found = Touch(), []
+    touch, found = TouchWatch(), []
     for force in (0.5, 1.5, 0.5):
         touch.step(force, FORCE, 0.06)
         found.append((touch.is_there, touch.has_been, touch.is_bouncing))
@@ -68,7 +68,7 @@ def test_a_touch_is_remembered() -> None:
 class Pressed:
     """A watched force, measured as it is said."""
 
-    def __init__(self, axis: Axis = AXIS, **limits: float) -> None:
+    def __init__(self, axis: CommandedAxis = AXIS, **limits: float) -> None:
         self.axis, self.watch = axis, ForceWatch()
         self.own = replace(OWN, limits=replace(OWN.limits, **limits))
 
@@ -177,7 +177,7 @@ def test_torques_that_change_after_the_force_has_settled_are_reported_with_as_mu
 
 @pytest.mark.parametrize(("axis", "chi2", "holds"), [(AXIS, 20.0, True), (AXIS, 1.0, False), (UNPINNED, 1.0, True)])
 def test_another_link_that_is_touched_ends_the_force_until_the_command_ends(
-    axis: Axis, chi2: float, holds: bool
+    axis: CommandedAxis, chi2: float, holds: bool
 ) -> None:
     """At a pinned place the torques decide."""
     other, pressed = [(Code.UNEXPLAINED, "other_link", True)], Pressed(axis)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from test_force_belief import POSES, axis_at
 from test_force_loop import ARM, BODY, CONFIGURATION, DRIVEN, DT, POSE, STILL, down, force_loop
 
-from wam_control.force.belief import Torques
+from wam_control.force.belief import WorldTorques
 from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.held_arm import HeldArm, PushedArm
@@ -140,7 +140,7 @@ def test_a_push_is_reported_while_it_lasts_and_for_some_time_after() -> None:
     jacobian, pushed = BODY.tool_jacobian(q), PushedArm(BODY)
 
     def step(force: float, allowed: float = 20.0, periods: int = 1) -> list[float]:
-        torques = Torques(none + force * UP @ jacobian, none, None, sd)
+        torques = WorldTorques(none + force * UP @ jacobian, none, None, sd)
         for _ in range(periods):
             rows = pushed.step(q, [], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
         return [row.speed for row in rows]
@@ -168,7 +168,7 @@ def test_a_force_that_was_allowed_and_falls_with_its_command_is_no_push() -> Non
     axis = axis_at(q, 40.0)
     for k in range(400):
         size = 40.0 if k < 100 else max(5.0, 40.0 - 0.2 * (k - 100))
-        torques = Torques(-size * axis.along, none, None, np.full(4, 0.015))
+        torques = WorldTorques(-size * axis.along, none, None, np.full(4, 0.015))
         allowed = 1.5 * (40.0 if k < 100 else 5.0)
         pushed.step(q, [axis], torques, NO_CONTACT, 0.0, allowed, True, 0.03, OWN, DT)
         assert pushed.event is None

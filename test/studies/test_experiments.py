@@ -37,7 +37,7 @@ from wam_studies.thesis.one_link import growth, one_link
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result, markdown, plain
-from wam_studies.thesis.sweeping import RecordedRun, record_run
+from wam_studies.thesis.sweeping import SweptRun, record_run
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 
@@ -534,7 +534,7 @@ def test_a_run_that_is_not_whole_is_not_judged(tmp_path: Path, capfd) -> None:
     file, whole = tmp_path / "short.yaml", yaml.safe_load(packaged("experiments/creep").read_text())
     file.write_text(yaml.safe_dump(whole))
     (run,) = load(str(file)).runs
-    record_run(RecordedRun(load(str(file)), run._replace(steps=run.steps[:1]), str(tmp_path / "mine")))
+    record_run(SweptRun(load(str(file)), run._replace(steps=run.steps[:1]), str(tmp_path / "mine")))
     assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 2
     said = capfd.readouterr().err
     assert f"run 'out_and_back' ended in step '{run.steps[0]['name']}', 0 of {len(run.steps)} steps finished; " in said

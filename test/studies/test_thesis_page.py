@@ -92,7 +92,7 @@ def test_a_reference_that_leads_nowhere_is_named(reference: str) -> None:
     [
         ("{section: 5.2, claim: text, status: plant}", "give it 'shown'"),
         ("{section: 5.2, claim: text, status: plant, shown: [docs/a.md]}", "give it 'shown'"),
-        ("{section: 5.2, claim: text, status: not shown}", "'open' must say why"),
+        ("{section: 5.2, claim: text, status: not shown}", "'open' must state why"),
         ("{section: 5.2, claim: text, status: perhaps}", "perhaps"),
         ("{section: 5.2, claim: text, status: plant, near: 1 %}", "near"),
         ("{section: 5.2, claim: text, status: plant, shown: docs/a.md}", "must be a list"),

@@ -143,7 +143,7 @@ def _counted(number: int, what: str) -> str:
 DONE_TO = {
     Treatment.COARSE: "{number} of {of} stamps repeat the one before; times of reception are used",
     Treatment.ROUNDED: "the stamps are rounded to {size}; times of reception are used",
-    Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are spread evenly between them",
+    Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
     Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}, which is taken off",
@@ -187,7 +187,7 @@ def _treated_findings(found: Sequence[Source]) -> tuple[Finding, ...]:
 
 
 def _alike(found: Sequence[Source]) -> list[str]:
-    """How to say which of several topics with the same joints is the command: their values do not tell."""
+    """How to name the command among several topics with the same joints: their values do not show it."""
     topics: dict[str, list[str]] = {}
     for one in found:
         if one.is_joint and not one.is_command:

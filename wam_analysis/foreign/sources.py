@@ -26,7 +26,7 @@ class Treatment(StrEnum):
 
     COARSE = "coarse stamps"  # times of reception were used
     ROUNDED = "rounded stamps"  # likewise
-    SPREAD = "coarse stamps, spread"  # as are the times of reception: the messages were spread evenly
+    SPREAD = "coarse stamps, placed evenly"  # as are the times of reception: the messages were placed evenly
     TWICE = "messages that came twice"  # the second was left out
     WRAPPED = "wraps of the angle"  # were unwrapped
     MOVED_ZERO = "jumps of the zero"  # were taken off

@@ -17,7 +17,7 @@ from wam_studies.thesis.definition import Experiment, configured, load, names, t
 from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.page import write
 from wam_studies.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
-from wam_studies.thesis.sweeping import RecordedRun, record_run
+from wam_studies.thesis.sweeping import SweptRun, record_run
 
 PICTURE = "result.png"
 RECORDED = "recorded"  # in the directory of the samples: what they are cut from, by a path that is the same everywhere
@@ -94,7 +94,7 @@ def _directory(given: argparse.Namespace, experiment: Experiment, is_one: bool) 
 def _record(chosen: list[Experiment], directories: list[Path], jobs: int) -> None:
     """Record every run of each experiment into its directory, in processes; progress goes to stderr."""
     cases = [
-        RecordedRun(experiment, run, str(directory))
+        SweptRun(experiment, run, str(directory))
         for experiment, directory in zip(chosen, directories, strict=True)
         for run in experiment.runs
     ]

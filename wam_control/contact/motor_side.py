@@ -39,7 +39,7 @@ class MotorSide:
     ----------
     arm : the arm as modelled.
     parameters : of the observer.
-    has_dither : whether the motors swing: then the friction of a shaft that has come to rest is not remembered.
+    has_dither : whether the motors swing: then the friction of a shaft that has come to rest is not kept.
     model : the identified model; None for none.
 
     Attributes

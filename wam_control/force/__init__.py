@@ -4,7 +4,7 @@
 ``advice``                 what to change so that a refused force would be obeyed
 ``axes``                   what is commanded, as the axes of one problem
 ``belief``                 what is known of a force; its predicted error and doubt
-``command_run``            what is remembered of one command
+``command_run``            the state of one command
 ``contact_place``          where a force acts: pinned or estimated
 ``feed_forward``           torques of the forces and dry friction, fed forward
 ``force_axis``             how a force along a direction is sensed, how the arm moves along it, how well

@@ -5,9 +5,9 @@ A search over the belief of other forces in other poses, a few in each period, s
 
 from collections.abc import Callable, Iterator, Sequence
 
-from wam_control.force.axes import Axis, TaskAxes
+from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
-from wam_control.force.contact_place import Place
+from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import TaskCommand
 from wam_control.force.thresholds import FORCE
@@ -48,10 +48,10 @@ class Advice:
 def tries(
     q: Sequence[float],
     task: TaskCommand,
-    place: Place,
+    place: ForcePlace,
     axes: TaskAxes,
     joints: Joints,
-    believe: Callable[[Sequence[float], Axis], Belief],
+    believe: Callable[[Sequence[float], CommandedAxis], Belief],
     own: ForceLoopParameters,
 ) -> Iterator[Ways]:
     """After each force that is tried, the way where it would be obeyed with a reserve, else nothing.
@@ -69,7 +69,7 @@ def tries(
     (force,) = task.axes
     pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True, is_in_doubt=False)
 
-    def is_obeyed(pose: Sequence[float], where: Place, size: float) -> bool:
+    def is_obeyed(pose: Sequence[float], where: ForcePlace, size: float) -> bool:
         (axis,) = axes.of(pose, task._replace(axes=(force._replace(value=size),)), [where], [1.0])
         return FORCE.reserve * believe(pose, axis).doubt <= own.limits.doubt
 

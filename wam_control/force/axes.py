@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.contact_place import Place
+from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
@@ -21,7 +21,7 @@ from wam_description.signals import BASE
 Array = NDArray[np.float64]
 
 
-class Axis(NamedTuple):
+class CommandedAxis(NamedTuple):
     """One axis in one pose.
 
     Attributes
@@ -41,7 +41,7 @@ class Axis(NamedTuple):
     desired: float
     at: float
     sensed: ForceAxis | None = None
-    place: Place | None = None
+    place: ForcePlace | None = None
 
     @property
     def is_force(self) -> bool:
@@ -76,7 +76,9 @@ class TaskAxes:
     def __init__(self, arm: Arm, body: RigidBody, forces: ForceAxes) -> None:
         self._arm, self._body, self.forces = arm, body, forces
 
-    def of(self, q: Sequence[float], task: TaskCommand, places: Sequence[Place], sides: Sequence[float]) -> list[Axis]:
+    def of(
+        self, q: Sequence[float], task: TaskCommand, places: Sequence[ForcePlace], sides: Sequence[float]
+    ) -> list[CommandedAxis]:
         """The axes of a task; the force along each is measured with those of the others as unknowns.
 
         Parameters
@@ -120,17 +122,17 @@ class TaskAxes:
         in_frame: Array,
         pressed: PressedForce,
         torques: Sequence[list[Array]],
-        place: Place,
-    ) -> Axis:
+        place: ForcePlace,
+    ) -> CommandedAxis:
         axis = axes[i]
         if axis.joint >= 0:
             desired = (axis.value or 0.0) if axis.kind is AxisKind.FORCE else 0.0
-            return Axis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, q[axis.joint])
+            return CommandedAxis(axis, np.eye(len(q))[axis.joint], direction, in_frame, desired, q[axis.joint])
         point = np.array([place.position, *self._arm.covers.aside(place.cover, place.position)])
         at = float(direction @ self._body.point(q, place.cover, point))
         if not axis.is_sensed:
             along: Array = direction @ self._body.point_jacobian(q, place.cover, point)
-            return Axis(axis, along, direction, in_frame, 0.0, at)
+            return CommandedAxis(axis, along, direction, in_frame, 0.0, at)
         others: list[Array] = []
         for k, each in enumerate(torques):
             # two axes at one position are parts of one force, whose friction is that of `sensed` already
@@ -138,7 +140,7 @@ class TaskAxes:
             others += [] if k == i else each[:1] if is_same else each
         sensed = self.forces.axis(q, pressed, others)
         desired = pressed.force if axis.kind is AxisKind.FORCE else 0.0
-        return Axis(axis, sensed.lever, direction, in_frame, desired, at, sensed, place)
+        return CommandedAxis(axis, sensed.lever, direction, in_frame, desired, at, sensed, place)
 
 
 def _size(axis: TaskAxis) -> float:

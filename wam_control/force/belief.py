@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.axes import Axis
+from wam_control.force.axes import CommandedAxis
 from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
@@ -66,7 +66,7 @@ class Belief(NamedTuple):
         return self.errors.size / self.tolerance if self.tolerance else math.inf
 
 
-class Torques(NamedTuple):
+class WorldTorques(NamedTuple):
     """Torques of the world on the joints, and what is known of them.
 
     Attributes
@@ -129,9 +129,9 @@ def predicted(
 
 
 def belief(
-    axis: Axis,
+    axis: CommandedAxis,
     size: float,
-    torques: Torques,
+    torques: WorldTorques,
     own: ForceLoopParameters,
     is_touching: bool,
     resting: Array,

@@ -1,4 +1,4 @@
-"""What is remembered of one command: a new object where something else is commanded."""
+"""The state of one command: a new object where something else is commanded."""
 
 import math
 from collections import deque
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.advice import Advice
-from wam_control.force.axes import Axis
-from wam_control.force.belief import Belief, Torques, belief, yielding
+from wam_control.force.axes import CommandedAxis
+from wam_control.force.belief import Belief, WorldTorques, belief, yielding
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes
@@ -48,7 +48,7 @@ class AxisRun:
         self.anchor, self.side, self.is_kept = math.nan, 1.0, False
         self.is_force, self.of = of.kind is AxisKind.FORCE, of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
 
-    def goal(self, axis: Axis, dt: float, lasting: float) -> float:
+    def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""
         if math.isnan(self.anchor):
             self.anchor = axis.at
@@ -77,7 +77,7 @@ class Shaking:
         self._poses.append(np.array(q))
         return True
 
-    def swing(self, axis: Axis, own: ForceLoopParameters) -> float:
+    def swing(self, axis: CommandedAxis, own: ForceLoopParameters) -> float:
         """Swing of the force on the stiffest surface, N peak to peak."""
         sensed = axis.sensed
         if len(self._poses) < 2 or sensed is None or sensed.force_sd == math.inf:
@@ -105,15 +105,20 @@ class Resting:
     """
 
     def __init__(self, torques: Array) -> None:
-        self.torques, self._is_judged = torques, not torques.any()
+        self.torques, self._is_decided = torques, not torques.any()
 
     def judge(
-        self, q: Sequence[float], axis: Axis, measurement: ForceMeasurement, forces: ForceAxes, torque_sd: float
+        self,
+        q: Sequence[float],
+        axis: CommandedAxis,
+        measurement: ForceMeasurement,
+        forces: ForceAxes,
+        torque_sd: float,
     ) -> None:
         """Decide once for the first axis of the command."""
-        if self._is_judged or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
+        if self._is_decided or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
             return
-        self._is_judged = True
+        self._is_decided = True
         sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(self.torques).max()))
         mass, left = measurement.payload(q, self.torques, sd)
         if mass > 0.0 and left <= FORCE.unexplained:
@@ -128,7 +133,7 @@ class Resting:
 
 
 class CommandRun:
-    """What is remembered while the same axes are commanded.
+    """The state of the axes that are commanded.
 
     Parameters
     ----------
@@ -179,12 +184,14 @@ class CommandRun:
         """Whether something is touched by one of its forces."""
         return any(one.watch.touch.is_there for one in self.axes)
 
-    def believe(self, axis: Axis, size: float, torques: Torques, own: ForceLoopParameters, wound: Array) -> Belief:
+    def believe(
+        self, axis: CommandedAxis, size: float, torques: WorldTorques, own: ForceLoopParameters, wound: Array
+    ) -> Belief:
         """What is known of the force along an axis, N; `size` is that of the command, `wound` as of `reach_time`."""
         swing, reach = self.shaking.swing(axis, own), reach_time(axis, wound, own)
         return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, reach)
 
-    def move(self, moved: Array, axes: Sequence[Axis], forces: ForceAxes, q: Sequence[float]) -> None:
+    def move(self, moved: Array, axes: Sequence[CommandedAxis], forces: ForceAxes, q: Sequence[float]) -> None:
         """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""
         is_approach = all(axis.is_force for axis in axes)  # another motion may lead to what is to be touched
         for axis, one in zip(axes, self.axes, strict=True):

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 STEEPEST = math.radians(30.0)  # lean of a force from the normal of a link, up to which its position is estimated well
 
 
-class Place(NamedTuple):
+class ForcePlace(NamedTuple):
     """Where a force acts.
 
     Attributes
@@ -42,7 +42,7 @@ class Place(NamedTuple):
 
 
 class ContactPlace:
-    """Where one force acts, and what is remembered of that while the contact lasts.
+    """Where one force acts, and what is kept of that while the contact lasts.
 
     A pinned point is one of the world: the link slides along it.  An estimate near its limits would step the measured
     force back and forth, so the last one that was certain is kept.  A position that is not known may be anywhere on
@@ -55,7 +55,7 @@ class ContactPlace:
 
     def __init__(self, covers: Covers) -> None:
         self._covers = covers
-        self._last: Place | None = None
+        self._last: ForcePlace | None = None
         self._pinned = ("", 0.0)
         self._slid = 0.0
 
@@ -63,7 +63,7 @@ class ContactPlace:
         """Count a way of the link along itself, m: what is touched, or is to be, is touched elsewhere on it."""
         self._slid += way
 
-    def step(self, axis: TaskAxis, contact: Contact, lean: float, parameters: ForceLoopParameters) -> Place:
+    def step(self, axis: TaskAxis, contact: Contact, lean: float, parameters: ForceLoopParameters) -> ForcePlace:
         """Place for the present estimate.
 
         Parameters
@@ -79,7 +79,7 @@ class ContactPlace:
             if at != self._pinned:
                 self._pinned, self._slid = at, 0.0
             position = slid_position(covers, *at, self._slid)
-            return Place(axis.cover, position, parameters.contact_position_sd, is_pinned=True, is_known=True)
+            return ForcePlace(axis.cover, position, parameters.contact_position_sd, is_pinned=True, is_known=True)
         is_likely = bool(contact.cover) and not contact.probability < parameters.link_probability_limit
         is_identified = is_likely and axis.cover in ("", contact.cover)
         rejection = _rejection(contact, lean) if is_identified else ""
@@ -93,11 +93,13 @@ class ContactPlace:
         where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)
         return where._replace(is_in_doubt=bool(contact.cover) and not is_identified, rejection=rejection)
 
-    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> Place:
+    def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> ForcePlace:
         """A position and its standard deviation, m; one that is not known is anywhere on the cover."""
         if math.isnan(position):
             position, is_known = self._covers.length_of(cover) / 2.0, False
-        return Place(cover, position, sd if is_known else anywhere_sd(self._covers, cover, position), is_known=is_known)
+        return ForcePlace(
+            cover, position, sd if is_known else anywhere_sd(self._covers, cover, position), is_known=is_known
+        )
 
 
 def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:

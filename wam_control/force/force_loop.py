@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.advice import Advice, tries
-from wam_control.force.axes import Axis, TaskAxes
+from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Belief
 from wam_control.force.command_run import CommandRun
-from wam_control.force.contact_place import STEEPEST, ContactPlace, Place, pinned_position
+from wam_control.force.contact_place import STEEPEST, ContactPlace, ForcePlace, pinned_position
 from wam_control.force.force_axis import ForceAxes
 from wam_control.force.force_command import CommandAdmission, Commands, beyond
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
@@ -27,7 +27,7 @@ from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time
-from wam_control.force.problem import Row, linear, solve
+from wam_control.force.problem import VelocityRow, linear, solve
 from wam_control.force.stability_guard import GuardAssessment, Guarded, GuardedContact, GuardedForces
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_control.force.thresholds import FORCE, GUARD
@@ -56,7 +56,7 @@ class ForceOutput(NamedTuple):
     error: Triple = (0.0, 0.0, 0.0)  # N
     limited: Triple = (0.0, 0.0, 0.0)  # N
     frame: str = BASE
-    axes: tuple[Axis, ...] = ()
+    axes: tuple[CommandedAxis, ...] = ()
     known: tuple[Belief, ...] = ()  # of each axis
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
 
@@ -265,7 +265,7 @@ class ForceLoop:
         before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
         self._run.go_on(before)
 
-    def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[Axis]:
+    def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[CommandedAxis]:
         """The axes of what is commanded, each at its place."""
         if task is None:
             return []
@@ -274,10 +274,10 @@ class ForceLoop:
         ]
         return self._axes.of(self._q, task, places, [one.side for one in self._run.axes])
 
-    def _place(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> Place:
+    def _place(self, task: TaskCommand, axis: TaskAxis, contact: Contact, memory: ContactPlace) -> ForcePlace:
         lean, own = 0.0, self.parameters
         if axis.joint >= 0:
-            return Place("", 0.0, 0.0)
+            return ForcePlace("", 0.0, 0.0)
         if contact.cover and axis.position is None:
             turn = np.eye(3) if task.frame == BASE else self._body.cover_pose(self._q, task.frame).rotation
             along = self._body.cover_pose(self._q, contact.cover).rotation[:, 0]
@@ -289,7 +289,7 @@ class ForceLoop:
         return place
 
     def _watch(
-        self, axes: Sequence[Axis], contact: Contact, is_led: bool, dt: float
+        self, axes: Sequence[CommandedAxis], contact: Contact, is_led: bool, dt: float
     ) -> tuple[list[Event], list[Belief]]:
         """What is known of each axis, and what its watch reports."""
         own, run, torques = self.parameters, self._run, self._measurement.torques
@@ -313,8 +313,8 @@ class ForceLoop:
             size, force = (abs(v) if axis.is_joint else v for v in (axis.desired, belief.force))
             one.watch.touch.step(force, size, dt)
             way = 0.0 if run.held.at is not None or axis.is_joint else float(axis.along @ moved)
-            is_felt = math.hypot(*contact.force) >= FORCE.touch * size
-            seen = Seen(belief, way, touched if covers and is_felt else "", is_led)
+            is_touched = math.hypot(*contact.force) >= FORCE.touch * size
+            seen = Seen(belief, way, touched if covers and is_touched else "", is_led)
             found += one.watch.step(axis, seen, torques.now, own, dt)
         if axes and run.is_touching and not any(event.holds for event in found):
             self._pressed_at = q
@@ -322,7 +322,7 @@ class ForceLoop:
             run.free_at = q
         return found, known
 
-    def _believe(self, q: Sequence[float], axis: Axis, axes: Sequence[Axis]) -> Belief:
+    def _believe(self, q: Sequence[float], axis: CommandedAxis, axes: Sequence[CommandedAxis]) -> Belief:
         """What is known in a pose of the force along an axis of those that are commanded."""
         size = abs(axis.desired)
         if axis.is_joint:  # the torques of the joints are one vector
@@ -342,7 +342,7 @@ class ForceLoop:
 
     def _move(
         self,
-        axes: Sequence[Axis],
+        axes: Sequence[CommandedAxis],
         known: Sequence[Belief],
         found: Sequence[Event],
         contact: Contact,
@@ -360,7 +360,7 @@ class ForceLoop:
             -own.joint_speed_limit,
             own.joint_speed_limit,
         )
-        rows, least = list[Row](), list[Row]()
+        rows, least = list[VelocityRow](), list[VelocityRow]()
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         if holds:
@@ -391,7 +391,7 @@ class ForceLoop:
             effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
         return velocity, effort, limits
 
-    def _hold_at(self, axes: Sequence[Axis], found: Sequence[Event]) -> Array:
+    def _hold_at(self, axes: Sequence[CommandedAxis], found: Sequence[Event]) -> Array:
         """Where the arm is to hold (n,), rad: here, or off another link, where it last was free."""
         q = np.array(self._q)
         is_elsewhere = any(event.holds and event.code is Code.UNEXPLAINED for event in found)
@@ -407,19 +407,19 @@ class ForceLoop:
         here, there = (self._body.tool_pose(q).position for q in (self._q, self._run.held.at))
         return float(np.linalg.norm(here - there)) <= self.parameters.limits.free_travel
 
-    def _no_harder(self, axis: Axis, known: Belief, factor: float) -> Row:
+    def _no_harder(self, axis: CommandedAxis, known: Belief, factor: float) -> VelocityRow:
         """An arm that holds presses no harder than commanded, as far as the force is known."""
         assert axis.sensed is not None
         gain = factor * max(self.parameters.force_gain) * axis.sensed.speed_fraction
-        return Row(-axis.along, min(gain * (known.force - axis.desired - known.sd), self._fastest(axis)))
+        return VelocityRow(-axis.along, min(gain * (known.force - axis.desired - known.sd), self._fastest(axis)))
 
-    def _fastest(self, axis: Axis) -> float:
+    def _fastest(self, axis: CommandedAxis) -> float:
         """Largest speed along an axis, m/s or rad/s."""
         return self.parameters.task.fastest(axis.is_joint)[0]
 
     def _rows(
-        self, axes: Sequence[Axis], known: Sequence[Belief], contact: Contact, factor: float, dt: float
-    ) -> list[Row]:
+        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], contact: Contact, factor: float, dt: float
+    ) -> list[VelocityRow]:
         """The commanded velocity along each axis."""
         run, own = self._run, self.parameters
         speeds = [self._speed(i, axis, known[i], factor, dt) for i, axis in enumerate(axes)]
@@ -432,9 +432,9 @@ class ForceLoop:
         while len(run.delayed) > own.delay_samples + 1:
             run.delayed.popleft()
         late = run.delayed[0] if len(run.delayed) > own.delay_samples else [0.0] * len(speeds)
-        return [Row(axis.along, speed) for axis, speed in zip(axes, late, strict=True)]
+        return [VelocityRow(axis.along, speed) for axis, speed in zip(axes, late, strict=True)]
 
-    def _speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
+    def _speed(self, i: int, axis: CommandedAxis, known: Belief, factor: float, dt: float) -> float:
         """Commanded speed along one axis, m/s or rad/s."""
         own, one, fastest = self.parameters, self._run.axes[i], self._fastest(axis)
         if axis.is_force:
@@ -454,7 +454,7 @@ class ForceLoop:
             speed = axis.side * axis.of.rate + yielding / own.task.damping(axis.of)
         return min(max(speed, -fastest), fastest)
 
-    def _force_speed(self, i: int, axis: Axis, known: Belief, factor: float, dt: float) -> float:
+    def _force_speed(self, i: int, axis: CommandedAxis, known: Belief, factor: float, dt: float) -> float:
         """The law of a force or a torque, as fast as the limits allow."""
         own, one = self.parameters, self._run.axes[i]
         error, before = axis.desired - known.force, axis.desired - known.before
@@ -474,7 +474,7 @@ class ForceLoop:
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
 
-    def _unidentified(self, axis: Axis, error: float) -> float:
+    def _unidentified(self, axis: CommandedAxis, error: float) -> float:
         """The error, N, while it is not known which link is touched: none may be pressed harder than commanded.
 
         The force is taken for that in the middle of another link, and, going on, for that near its base, where the same
@@ -483,14 +483,14 @@ class ForceLoop:
         parts = [(FORCE.middle, -math.inf)] + ([] if self.parameters.is_estimated else [(FORCE.near_base, 0.0)])
         for part, least in parts:
             for cover, length in zip(self._body.arm.covers.names, self._body.arm.covers.length, strict=True):
-                pressed = Place(cover, part * length, 0.0).pressed(axis.direction, axis.desired)
+                pressed = ForcePlace(cover, part * length, 0.0).pressed(axis.direction, axis.desired)
                 sensed = self._axes.forces.axis(self._q, pressed)
                 if sensed.force_sd <= FORCE.vague * axis.desired:
                     force = -float(sensed.sense @ self._measurement.torques.now)
                     error = min(error, max(axis.desired - force, least))
         return error
 
-    def _slowed(self, axes: Sequence[Axis], rows: Sequence[Row], wanted: Array) -> Array:
+    def _slowed(self, axes: Sequence[CommandedAxis], rows: Sequence[VelocityRow], wanted: Array) -> Array:
         """Velocities of the posture (n,), rad/s, at which the forces stay right."""
         run, own = self._run, self.parameters
         if any(one.is_kept for one in run.axes) and float(np.abs(wanted).max()) < FORCE.slow_posture:
@@ -504,14 +504,14 @@ class ForceLoop:
 
     def _pushes(
         self,
-        axes: Sequence[Axis],
-        forces: Sequence[Axis],
+        axes: Sequence[CommandedAxis],
+        forces: Sequence[CommandedAxis],
         known: Sequence[Belief],
         contact: Contact,
         holds: bool,
         allowed: float,
         dt: float,
-    ) -> list[Row]:
+    ) -> list[VelocityRow]:
         """What pushes harder than allowed."""
         own, torques = self.parameters, self._measurement.torques
         pressed = math.fsum(axis.desired for axis in forces) if self._run.is_touching else 0.0
@@ -539,7 +539,7 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _fed(self, axes: Sequence[Axis], dt: float) -> Array:
+    def _fed(self, axes: Sequence[CommandedAxis], dt: float) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
         The velocity loops need not wind up to it; it rises as the force may.
@@ -556,7 +556,7 @@ class ForceLoop:
 
     def _watch_motions(
         self,
-        axes: Sequence[Axis],
+        axes: Sequence[CommandedAxis],
         found: Sequence[Event],
         posture: Sequence[float] | None,
         rate: Sequence[float] | None,
@@ -583,7 +583,7 @@ class ForceLoop:
                 events.append(watch.step(name, "rad", goal, speed, at, *law, lasting, dt))
         return [event for event in events if event]
 
-    def _advised(self, found: list[Event], task: TaskCommand | None, axes: Sequence[Axis]) -> list[Event]:
+    def _advised(self, found: list[Event], task: TaskCommand | None, axes: Sequence[CommandedAxis]) -> list[Event]:
         """With what would help a refused force, which is looked for over several periods."""
         is_refused = any(event.holds and event.cause == "error" for event in found)
         if not is_refused or task is None or len(axes) > 1 or (place := axes[0].place) is None:
@@ -602,7 +602,7 @@ class ForceLoop:
         )
         return [event.with_values(**self._run.advice.ways) if event.cause == "error" else event for event in found]
 
-    def _gain_factor(self, axes: Sequence[Axis], contact: Contact, dt: float) -> float:
+    def _gain_factor(self, axes: Sequence[CommandedAxis], contact: Contact, dt: float) -> float:
         """The guard's factor of the gains."""
         if not axes:
             return 1.0
@@ -621,7 +621,7 @@ class ForceLoop:
             positions = [(part * covers.length_of(place.cover), 0.0) for part in GUARD.positions]
         return [each for position in positions for each in self._supervision.contacts(self._q, place.cover, *position)]
 
-    def _possible(self, axes: Sequence[Axis]) -> list[Sequence[Axis]]:
+    def _possible(self, axes: Sequence[CommandedAxis]) -> list[Sequence[CommandedAxis]]:
         """The axes, and where the gains follow the position, and it is not known, those of other positions."""
         place = axes[0].place
         if self.parameters.schedule != "position" or len(axes) > 1 or place is None or place.is_known:
@@ -634,7 +634,7 @@ class ForceLoop:
             for axis, each in zip(sensed, pressed, strict=True)
         ]
 
-    def _guarded(self, axes: Sequence[Axis]) -> list[GuardedForces]:
+    def _guarded(self, axes: Sequence[CommandedAxis]) -> list[GuardedForces]:
         """What is controlled, for the guard: all contacts at once; none where nothing is sensed at a point."""
         contacts = [
             GuardedContact(tuple(self._q), *axis.place[:3], _triple(axis.direction), axis.desired or FORCE.hand)
@@ -691,7 +691,7 @@ def _by_seriousness(found: Sequence[Event]) -> tuple[Event, ...]:
 def _output(
     velocity: Array,
     effort: list[float],
-    axes: Sequence[Axis],
+    axes: Sequence[CommandedAxis],
     known: Sequence[Belief],
     frame: str,
     supervision: Supervision,
@@ -720,7 +720,7 @@ def _output(
     )
 
 
-def _row(axis: Axis, known: Belief, anchor: float) -> AxisRow:
+def _row(axis: CommandedAxis, known: Belief, anchor: float) -> AxisRow:
     commanded = axis.desired if axis.is_force else anchor if axis.of.value is None else axis.of.value
     sign = 1.0 if axis.is_force else axis.side
     measured = sign * known.force if axis.of.is_sensed else axis.at

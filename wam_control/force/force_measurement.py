@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.belief import Torques
+from wam_control.force.belief import WorldTorques
 from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
@@ -56,7 +56,7 @@ class ForceMeasurement:
     def restart(self) -> None:
         """Forget the filtered torques."""
         self._filters["torque"] = LowPass()
-        self.torques = Torques(self._none, self._none, None, self._none)
+        self.torques = WorldTorques(self._none, self._none, None, self._none)
 
     def step(
         self,
@@ -91,7 +91,7 @@ class ForceMeasurement:
         lag = 0.0 if own.mode == "joint_torque" else own.force_filter
         now = self._filters["torque"].step(counted, lag, dt)
         sd = np.array(estimated_sd) if own.is_estimated and estimated_sd else self._none + sensing_of(own).torque_sd
-        self.torques = Torques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
+        self.torques = WorldTorques(now, now if before is None else before, self._acceleration(own, sensors, dt), sd)
 
     def _acceleration(self, own: ForceLoopParameters, sensors: State | None, dt: float) -> Array | None:
         velocity = self._none if sensors is None else np.array(sensors.velocity)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.axes import Axis
+from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.thresholds import FORCE
@@ -67,7 +67,7 @@ class Turns:
         return max(values) - min(values), 2.0 * (times[-1] - times[0]) / max(len(times) - 1, 1)
 
 
-class Touch:
+class TouchWatch:
     """Whether something is touched, and whether it was."""
 
     def __init__(self) -> None:
@@ -148,14 +148,14 @@ class ForceWatch:
     """
 
     def __init__(self) -> None:
-        self.touch, self.oscillation = Touch(), Oscillation()
+        self.touch, self.oscillation = TouchWatch(), Oscillation()
         self.ended: Event | None = None
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         self._is_refused, self._is_decided, self._has_settled = True, False, False
         self._desired, self._travel = math.nan, 0.0
         self._pattern: Array | None = None  # m, torques per force as it has settled
 
-    def step(self, axis: Axis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
+    def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
         """The events of one period.
 
         Parameters
@@ -193,8 +193,10 @@ class ForceWatch:
             self.oscillation.rest()
         return events
 
-    def _decide(self, axis: Axis, known: Belief, error: float, own: ForceLoopParameters, dt: float) -> list[Event]:
-        """Refused until the force is there, at a pinned place until the touch; then reported, where it lasts."""
+    def _decide(
+        self, axis: CommandedAxis, known: Belief, error: float, own: ForceLoopParameters, dt: float
+    ) -> list[Event]:
+        """Refused until the force is there, at a pinned position until the touch; then reported, where it lasts."""
         most, place = own.limits.doubt, axis.place
         if self._is_refused or not self._is_decided:
             self._is_refused = known.doubt > (most if self._is_refused else FORCE.hysteresis * most)
@@ -214,7 +216,7 @@ class ForceWatch:
         is_on = self._doubt.step(is_doubtful, lasting, lasting, dt)
         return [warning(Code.REFUSED, "uncertain", **values)] if is_on else []
 
-    def _contradicted(self, axis: Axis, seen: Seen, dt: float) -> Event | None:
+    def _contradicted(self, axis: CommandedAxis, seen: Seen, dt: float) -> Event | None:
         """Another link is touched."""
         place = axis.place
         is_strange = seen.known.chi2 > FORCE.unexplained
@@ -236,7 +238,7 @@ class ForceWatch:
         )
 
     def _unexplained(
-        self, axis: Axis, known: Belief, is_reached: bool, torques: Array, lasting: float, dt: float
+        self, axis: CommandedAxis, known: Belief, is_reached: bool, torques: Array, lasting: float, dt: float
     ) -> list[Event]:
         """The torques are not those of the force, or no longer those with which it has settled."""
         if axis.sensed is None or axis.place is None or known.sd == math.inf:
@@ -306,5 +308,5 @@ class MotionWatch:
         )
 
 
-def _unit(axis: Axis) -> str:
+def _unit(axis: CommandedAxis) -> str:
     return "N m" if axis.is_joint else "N"

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.axes import Axis
-from wam_control.force.belief import Torques
+from wam_control.force.axes import CommandedAxis
+from wam_control.force.belief import WorldTorques
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import Push, calm, likeliest_link
-from wam_control.force.problem import Row
+from wam_control.force.limits import WorldPush, calm, likeliest_link
+from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
 from wam_description.rigid_body import RigidBody
@@ -78,8 +78,8 @@ class PushedArm:
     def step(
         self,
         q: Sequence[float],
-        axes: Sequence[Axis],
-        torques: Torques,
+        axes: Sequence[CommandedAxis],
+        torques: WorldTorques,
         contact: Contact,
         chi2: float,
         allowed: float,
@@ -87,7 +87,7 @@ class PushedArm:
         gain: float,
         own: ForceLoopParameters,
         dt: float,
-    ) -> list[Row]:
+    ) -> list[VelocityRow]:
         """One-sided rows of one period.
 
         Parameters
@@ -107,10 +107,10 @@ class PushedArm:
         self._since += dt
         if self._since > own.limits.settling_time or self._from is None:
             self._from = tool
-        rows: list[Row] = []
-        pushes = [Push.at(torques.now, torques.sd, self._jacobian(q, axes, contact))]
+        rows: list[VelocityRow] = []
+        pushes = [WorldPush.at(torques.now, torques.sd, self._jacobian(q, axes, contact))]
         if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            pushes.append(Push.at(torques.now, torques.sd, likeliest_link(self._body, q, torques.now)))
+            pushes.append(WorldPush.at(torques.now, torques.sd, likeliest_link(self._body, q, torques.now)))
         hardest = max(pushes, key=lambda push: push.least)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
@@ -126,7 +126,7 @@ class PushedArm:
             rows = [push.row(allowed, gain, own.joint_speed_limit) for push in pushes if push.least]
         return rows
 
-    def _jacobian(self, q: Sequence[float], axes: Sequence[Axis], contact: Contact) -> Array:
+    def _jacobian(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Array:
         """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""
         places = {axis.place[:2] for axis in axes if axis.place and axis.place.is_known}
         if len(places) == 1:

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.axes import Axis
+from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import yielding
 from wam_control.force.force_axis import ForceAxis
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.problem import Row
+from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.parts import Joints
 from wam_description.rigid_body import RigidBody
@@ -45,7 +45,7 @@ def rise_time(own: ForceLoopParameters) -> float:
     return FORCE.rise * (own.force_filter + own.guard.feedback_lag * own.is_estimated)
 
 
-def approach_speed(axis: Axis, is_touching: bool, own: ForceLoopParameters) -> float:
+def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters) -> float:
     """Largest speed along a force, m/s.
 
     Until something is touched, the impact (3.1), v sqrt(m k), stays below `limits.impact` of the force.  At a place
@@ -67,7 +67,7 @@ def approach_speed(axis: Axis, is_touching: bool, own: ForceLoopParameters) -> f
     return fastest / sensed.speed_fraction
 
 
-def reach_time(axis: Axis, wound: Array, own: ForceLoopParameters) -> float:
+def reach_time(axis: CommandedAxis, wound: Array, own: ForceLoopParameters) -> float:
     """Time until the velocity loops reach a force on the stiffest surface, s; infinite where the arm cannot.
 
     A surface that is approached, or that moves, has to be reached at all.  What is not fed forward is wound up by the
@@ -97,7 +97,7 @@ def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> f
     return min(FORCE.kept * own.limits.tolerance * abs(desired), FORCE.finest_motion / yielding(sensed, own))
 
 
-class Push(NamedTuple):
+class WorldPush(NamedTuple):
     """What pushes the arm.
 
     Attributes
@@ -112,16 +112,16 @@ class Push(NamedTuple):
     lever: float
 
     @classmethod
-    def at(cls, torques: Array, torque_sd: Array, jacobian: Array) -> "Push":
+    def at(cls, torques: Array, torque_sd: Array, jacobian: Array) -> "WorldPush":
         """What pushes with these torques (n,), N m, at a point with this Jacobian (3, n)."""
         lever = max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), FORCE.least_lever)
         size = math.sqrt(torques.dot(torques)) - FORCE.certain * math.sqrt(torque_sd.dot(torque_sd))
         return cls(max(size, 0.0) / lever, torques, lever)
 
-    def row(self, allowed: float, gain: float, fastest: float) -> Row:
+    def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:
         """No faster against it than a force law, m/s/N, allows up to this force, N; above it away from it."""
         along = self.torques / math.sqrt(self.torques.dot(self.torques))
-        return Row(along, min(gain * (self.least - allowed) / self.lever, fastest))
+        return VelocityRow(along, min(gain * (self.least - allowed) / self.lever, fastest))
 
 
 def likeliest_link(body: RigidBody, q: Sequence[float], torques: Array) -> Array:
@@ -142,7 +142,9 @@ def calm(velocity: Array, inertia: Array, energy: float) -> Array:
     return velocity * math.sqrt(energy / moving) if moving > energy else velocity
 
 
-def followed(posture: Array, axis: Axis, body: RigidBody, q: Sequence[float], own: ForceLoopParameters) -> Array:
+def followed(
+    posture: Array, axis: CommandedAxis, body: RigidBody, q: Sequence[float], own: ForceLoopParameters
+) -> Array:
     """Velocities of a posture (n,), rad/s, at which the link slides no faster than the force law follows a slope."""
     assert axis.place is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))

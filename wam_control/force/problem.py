@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 RANK: Final = 1e6  # weight of a row per weight of the posture, which moves along it by a millionth
 
 
-class Row(NamedTuple):
+class VelocityRow(NamedTuple):
     """A velocity along a direction of the joint space.
 
     Attributes
@@ -47,7 +47,9 @@ class Solution(NamedTuple):
     unlimited: Array
 
 
-def solve(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Array, high: Array) -> Solution:
+def solve(
+    rows: Sequence[VelocityRow], posture: Array, least: Sequence[VelocityRow], low: Array, high: Array
+) -> Solution:
     """The joint velocities of one period.
 
     Parameters
@@ -72,7 +74,9 @@ def solve(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Array,
     return Solution(_limited(rows, posture, broken, low, high), unlimited)
 
 
-def _limited(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Array, high: Array) -> Array:
+def _limited(
+    rows: Sequence[VelocityRow], posture: Array, least: Sequence[VelocityRow], low: Array, high: Array
+) -> Array:
     """The same with limits: each one-sided row has a slack of its own."""
     n, m = len(posture), len(least)
     matrix, right = _normal(rows, posture)
@@ -89,7 +93,7 @@ def _limited(rows: Sequence[Row], posture: Array, least: Sequence[Row], low: Arr
     return result
 
 
-def _normal(rows: Sequence[Row], posture: Array) -> tuple[Array, Array]:
+def _normal(rows: Sequence[VelocityRow], posture: Array) -> tuple[Array, Array]:
     """Matrix (n, n) and right side (n,) of the problem without limits."""
     matrix, right = np.eye(len(posture)), posture
     for along, speed in rows:
@@ -101,7 +105,7 @@ def _normal(rows: Sequence[Row], posture: Array) -> tuple[Array, Array]:
 
 def linear(rows: Sequence[Array], n: int) -> tuple[Array, Array]:
     """The solution without limits, v = M s + N p, for the guard: M (n, p) and N (n, n) of rows (n,)."""
-    used = [Row(row, 0.0) for row in rows]
+    used = [VelocityRow(row, 0.0) for row in rows]
     kept = [row for row in used if row.size > FORCE.shortest_lever]
     hold = inverse(_normal(kept, np.zeros(n))[0])
     drive = [row.along * (RANK / row.size**2) if row.size > FORCE.shortest_lever else 0.0 * row.along for row in used]

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from wam_driver.bus import frames
 from wam_driver.bus.bus_fault import BusFault, StartError, Trouble
-from wam_driver.bus.frames import Bit, Frame, Group, Node, Position, Value
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Position, Value
 from wam_driver.bus.line import Line, LineError
 from wam_driver.bus.safety_module import Pendant, SafetyMode
 from wam_driver.bus.start_up import Nodes, Settings, StartUp, Wait
@@ -53,7 +53,7 @@ class ArmBus:
         self.trouble = None
 
     def confirm_home(self) -> bool:
-        """A person states that the arm is at its home pose; whether that was asked."""
+        """A person states that the arm is at its home pose; whether that was requested."""
         self._start.is_at_home = self.wait is Wait.HOME
         return self._start.is_at_home
 
@@ -167,12 +167,12 @@ class BusCycle:
         self.trouble: Trouble | None = None
         numbers = {name: settings.number(1, name) for name in ("P", "T", "MODE")}
         self._torque, self._mode = numbers["T"], numbers["MODE"]
-        self._ask = frames.get(Group.MOTORS, numbers["P"], Bit.GROUP)
-        self._pendant_number = settings.number(Node.SAFETY_MODULE, "PEN")
+        self._ask = frames.get(BusGroup.MOTORS, numbers["P"], Bit.GROUP)
+        self._pendant_number = settings.number(BusNode.SAFETY_MODULE, "PEN")
         self._questions = [  # the pendant first: it states why the mode changes
-            frames.get(Node.SAFETY_MODULE, self._pendant_number),
-            frames.get(Node.SAFETY_MODULE, self._mode),
-            frames.get(Group.MOTORS, self._mode, Bit.GROUP),
+            frames.get(BusNode.SAFETY_MODULE, self._pendant_number),
+            frames.get(BusNode.SAFETY_MODULE, self._mode),
+            frames.get(BusGroup.MOTORS, self._mode, Bit.GROUP),
         ]
         self.brake()
 
@@ -180,19 +180,19 @@ class BusCycle:
         """Let the controllers follow their torques, which are zero first."""
         self.is_released = True
         self._send_torques(self._zero)
-        self._send(frames.put(Group.MOTORS, self._mode, BUS.torque_mode, Bit.GROUP))
+        self._send(frames.put(BusGroup.MOTORS, self._mode, BUS.torque_mode, Bit.GROUP))
 
     def brake(self) -> None:
         """Zero torque, and idle controllers."""
         self.is_released = False
         self._send_torques(self._zero)
-        self._send(frames.put(Group.MOTORS, self._mode, BUS.idle_mode, Bit.GROUP))
+        self._send(frames.put(BusGroup.MOTORS, self._mode, BUS.idle_mode, Bit.GROUP))
 
     def idle_safety_module(self) -> None:
         """Let the safety module go to idle, where its firmware takes that."""
-        is_settable = self.settings.versions[Node.SAFETY_MODULE] >= BUS.settable_version
+        is_settable = self.settings.versions[BusNode.SAFETY_MODULE] >= BUS.settable_version
         if is_settable and self.safety_mode is SafetyMode.ACTIVE:
-            self._send(frames.put(Node.SAFETY_MODULE, self._mode, SafetyMode.IDLE))
+            self._send(frames.put(BusNode.SAFETY_MODULE, self._mode, SafetyMode.IDLE))
 
     def command(self, wanted: Sequence[float]) -> list[int]:
         """Send torques in counts, (n,), clipped; what was sent."""
@@ -220,7 +220,7 @@ class BusCycle:
 
     def _collect(self) -> None:
         """Take the positions of this period, and all else that has come before them."""
-        asked, patience = self._line.now(), BUS.collect * self._period
+        requested, patience = self._line.now(), BUS.collect * self._period
         self.moved = {}
         for _ in range(BUS.most_frames):
             if len(self.moved) == self._n:
@@ -232,15 +232,15 @@ class BusCycle:
                 break
             if frame is None:
                 break
-            self._take(frame, asked)
+            self._take(frame, requested)
 
-    def _take(self, frame: Frame, asked: float) -> None:
-        if frame.sender == Node.HOST:
+    def _take(self, frame: Frame, requested: float) -> None:
+        if frame.sender == BusNode.HOST:
             self._stray(BusFault.FOREIGN, 0)
         found = frames.read(frame)
         if isinstance(found, Position) and 1 <= found.node <= self._n:
-            self._take_position(found.node, found.motor, asked)
-        elif isinstance(found, Value) and found.node == Node.SAFETY_MODULE:
+            self._take_position(found.node, found.motor, requested)
+        elif isinstance(found, Value) and found.node == BusNode.SAFETY_MODULE:
             self._was_answered = True
             if found.number == self._mode and 0 <= found.value <= SafetyMode.ACTIVE:
                 self._take_safety_mode(SafetyMode(found.value))
@@ -251,17 +251,17 @@ class BusCycle:
         elif found is None:
             self._counts["other frames"] += 1
 
-    def _take_position(self, node: int, count: int, asked: float) -> None:
+    def _take_position(self, node: int, count: int, requested: float) -> None:
         at = node - 1
         if at in self.moved:
             self._stray(BusFault.DOUBLED, node)
             return
-        before, when = self._last.get(at, (count, asked))
+        before, when = self._last.get(at, (count, requested))
         if abs(count - before) > BUS.jump * self.settings.counts[at]:
             self._jumped[at] += 1
             return
-        self._last[at] = count, asked
-        self.moved[at] = count, count - before, asked - when
+        self._last[at] = count, requested
+        self.moved[at] = count, count - before, requested - when
 
     def _take_safety_mode(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
@@ -291,18 +291,18 @@ class BusCycle:
         elif self._jumped[silent[0] - 1]:
             self._fault(BusFault.JUMP, silent[0])
         else:
-            is_reset = self._asked(silent[0], "STAT") == 0
+            is_reset = self._requested(silent[0], "STAT") == 0
             self._fault(BusFault.RESET if is_reset else BusFault.NO_REPLY, silent[0])
 
     def _judge_silence(self) -> None:
         """No controller answers: E-stop, power or cable, by what the safety module answers."""
-        mode = self._asked(Node.SAFETY_MODULE, "MODE")
+        mode = self._requested(BusNode.SAFETY_MODULE, "MODE")
         if mode is None:
             self._fault(BusFault.NO_POWER)
         else:
             self._fault(BusFault.ESTOP if mode == SafetyMode.ESTOP else BusFault.ALL_SILENT)
 
-    def _asked(self, node: int, name: str) -> int | None:
+    def _requested(self, node: int, name: str) -> int | None:
         with suppress(StartError):
             nodes = Nodes(self._line)
             nodes.versions = self.settings.versions
@@ -325,7 +325,7 @@ class BusCycle:
             self.brake()
 
     def _send_torques(self, counts: Sequence[int]) -> None:
-        for group, start in zip((Group.ARM, Group.WRIST), range(0, self._n, 4), strict=False):
+        for group, start in zip((BusGroup.ARM, BusGroup.WRIST), range(0, self._n, 4), strict=False):
             self._send(frames.torques(group, self._torque, counts[start : start + 4]))
 
     def _send(self, frame: Frame) -> None:

@@ -72,7 +72,7 @@ class Hardware(Protocol):
         """Forget a fault; the motors stay braked."""
 
     def confirm_home(self) -> bool:
-        """A person states that the arm is at its home pose; whether that was asked."""
+        """A person states that the arm is at its home pose; whether that was requested."""
 
     def close(self) -> None:
         """End the connection."""
@@ -98,7 +98,7 @@ class BusDriver(TolerantNode):
         self._tick, self._begin = 1, time.perf_counter()
         self._session, self._since, self._mode = int(time.time() * 1e3), 0, Mode.BRAKED
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
-        self._told = ""
+        self._published = ""
         self._ports = Ports(self, declaration, self.shared, Interface(self.shared))
         self._ports.waits = lambda: not self.hardware.is_running
         self._ports.takes_problem = self._trip  # a second publisher of the command
@@ -141,7 +141,7 @@ class BusDriver(TolerantNode):
         if hardware.is_running:
             age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
             if self.safety.mode is Mode.ENABLED and age > self._watchdog:
-                cure = f"{due - 1} periods late, check that velocity_loop runs"
+                cure = f"{due - 1} periods missed, check that velocity_loop runs"
                 self._trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
             hardware.exchange(due)
             self._publish(due)
@@ -226,8 +226,8 @@ class BusDriver(TolerantNode):
 
     def _announce(self) -> None:
         safety, advice = self.safety, self.hardware.advice
-        if advice != self._told and safety.mode is not Mode.FAULT:
-            self._told = advice
+        if advice != self._published and safety.mode is not Mode.FAULT:
+            self._published = advice
             self.get_logger().info(advice or "the arm may be enabled")
         if safety.mode is not self._mode:
             self._mode, self._since = safety.mode, self.stamp + self.shared.timing.period_ns

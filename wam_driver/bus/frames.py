@@ -9,14 +9,14 @@ from enum import IntEnum
 from typing import NamedTuple
 
 
-class Node(IntEnum):
+class BusNode(IntEnum):
     """Nodes that are no motor controllers, which have 1 to 7."""
 
     HOST = 0
     SAFETY_MODULE = 10
 
 
-class Group(IntEnum):
+class BusGroup(IntEnum):
     """Groups of nodes that take a frame."""
 
     ARM = 1  # torques of the controllers 1 to 4
@@ -33,7 +33,7 @@ class Bit(IntEnum):
     WRITE = 0x80
 
 
-POSITION_REPLY, VALUE_REPLY = Bit.GROUP | Group.POSITIONS, Bit.GROUP | Group.VALUES
+POSITION_REPLY, VALUE_REPLY = Bit.GROUP | BusGroup.POSITIONS, Bit.GROUP | BusGroup.VALUES
 RECEIVER = Bit.GROUP | 31
 
 
@@ -45,12 +45,12 @@ class Frame(NamedTuple):
 
     @property
     def sender(self) -> int:
-        """Node that sends it, 0 is the host."""
+        """BusNode that sends it, 0 is the host."""
         return self.identifier >> 5 & 31
 
     @property
     def receiver(self) -> int:
-        """Node or, with the group bit, group that takes it."""
+        """BusNode or, with the group bit, group that takes it."""
         return self.identifier & 31
 
     @property
@@ -87,7 +87,7 @@ def put(receiver: int, number: int, value: int, group: int = 0) -> Frame:
 
 def reply(node: int, number: int, value: int) -> Frame:
     """The answer of a node to `get`."""
-    return put(Group.VALUES, number, value, Bit.GROUP | node << 5)
+    return put(BusGroup.VALUES, number, value, Bit.GROUP | node << 5)
 
 
 def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
@@ -109,7 +109,7 @@ def position(node: int, motor: int, joint: int | None = None) -> Frame:
     """The answer of a controller to `get` of its position."""
     counts = [motor] if joint is None else [motor, joint]
     data = b"".join((count & 0x3FFFFF).to_bytes(3, "big") for count in counts)
-    return Frame(Bit.GROUP | node << 5 | Group.POSITIONS, data)
+    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, data)
 
 
 def read(frame: Frame) -> Value | Position | None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.bus import frames, properties
-from wam_driver.bus.frames import Bit, Frame, Group, Node
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
 from wam_driver.bus.safety_module import Button, Pendant, SafetyMode
 from wam_driver.plant import Plant
 from wam_driver.thresholds import BUS
@@ -24,11 +24,11 @@ class SimulatedController:
     Attributes
     ----------
     values : what it is, to be changed by tests.
-    woken : bus time at which it was told to wake, ns; None where it was not.
+    woken : bus time at which it was reported to wake, ns; None where it was not.
     """
 
     def __init__(self, node: int, version: int, values: Mapping[str, int]) -> None:
-        self.node, self.is_safety = node, node == Node.SAFETY_MODULE
+        self.node, self.is_safety = node, node == BusNode.SAFETY_MODULE
         self.values: dict[str, int] = {"VERS": version, "MODE": 0, **values}
         self.woken: int | None = None
         table = properties.SAFETY if self.is_safety else properties.MOTOR
@@ -95,12 +95,12 @@ class SimulatedBus:
         motors = range(1, len(arm.motors.names) + 1)
         self.controllers = {node: SimulatedController(node, version, _motor(node)) for node in motors}
         self._motors = list(self.controllers.values())
-        self._safety = SimulatedController(Node.SAFETY_MODULE, version, SAFETY_VALUES | {"MODE": SafetyMode.IDLE})
-        self.controllers[Node.SAFETY_MODULE] = self._safety
+        self._safety = SimulatedController(BusNode.SAFETY_MODULE, version, SAFETY_VALUES | {"MODE": SafetyMode.IDLE})
+        self.controllers[BusNode.SAFETY_MODULE] = self._safety
         self._show(Pendant(Button.NONE))
         self.on_line: Callable[[Frame], list[Frame]] = lambda frame: [frame]
         self._queue: deque[Frame] = deque()
-        self.time = self._reached = self._asked = self._pressed = self._passed = 0
+        self.time = self._reached = self._requested = self._pressed = self._passed = 0
         self._offsets = [0] * len(self._motors)
         if is_homed:
             self._safety.values["ZERO"] = 1
@@ -120,7 +120,7 @@ class SimulatedBus:
 
     def let_pass(self, seconds: float, late: float) -> None:
         """A period of the host has passed, in which there may have been frames; the late part is no silence."""
-        self._asked += round(late * BUS.second)
+        self._requested += round(late * BUS.second)
         self._passed += round(seconds * BUS.second)
         if self._passed < self.time:
             self._passed = self.time
@@ -144,10 +144,10 @@ class SimulatedBus:
 
     def _deliver(self, frame: Frame) -> None:
         self._spend(frame)
-        is_request = frame.identifier == Bit.GROUP | Group.MOTORS and not frame.data[0] & Bit.WRITE
+        is_request = frame.identifier == Bit.GROUP | BusGroup.MOTORS and not frame.data[0] & Bit.WRITE
         number = properties.number("P", self._motors[0].values["VERS"])
         if is_request and frame.data[0] == number:
-            self._asked = self.time
+            self._requested = self.time
         for one in self.controllers.values():
             if one.is_addressed(frame) and self._is_on(one):
                 self._obey(one, frame)
@@ -229,7 +229,7 @@ class SimulatedBus:
         if mode is before:
             return
         self._safety.values["MODE"] = mode
-        self._asked = self._pressed = self.time
+        self._requested = self._pressed = self.time
         for one in self._motors:
             one.values["MODE"] = BUS.torque_mode if mode is SafetyMode.ACTIVE else BUS.idle_mode
             one.values["T"] = 0
@@ -254,11 +254,11 @@ class SimulatedBus:
                 self._fault("torque", SafetyMode.IDLE)
             elif 0 < values["VL2"] < max(speeds) * 4096:
                 self._fault("velocity", SafetyMode.IDLE)
-            elif self.time - self._asked > BUS.heartbeat * BUS.second:
+            elif self.time - self._requested > BUS.heartbeat * BUS.second:
                 self._fault("heartbeat", SafetyMode.ESTOP)
         elif self.is_attended and self.time - self._pressed > BUS.attention * BUS.second:
             has_faults = bool(Pendant.of(values["PEN"]).faults)
-            is_running = values["ZERO"] and self.time - self._asked < BUS.heartbeat * BUS.second
+            is_running = values["ZERO"] and self.time - self._requested < BUS.heartbeat * BUS.second
             if has_faults or values["MODE"] == SafetyMode.ESTOP:
                 self.press(Button.IDLE)
             elif is_running:
@@ -278,6 +278,6 @@ def _motor(node: int) -> dict[str, int]:
         "PIDX": (node - 1) % 4 + 1,
         "POLES": BUS.wrist_poles if node == 7 else 12,
         "GRPA": 0,
-        "GRPB": Group.ARM if node <= 4 else Group.WRIST,
-        "GRPC": Group.MOTORS,
+        "GRPB": BusGroup.ARM if node <= 4 else BusGroup.WRIST,
+        "GRPC": BusGroup.MOTORS,
     }

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, StartError
-from wam_driver.bus.frames import Bit, Frame, Group, Node, Position, Value
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Position, Value
 from wam_driver.bus.line import Line, LineError
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.thresholds import BUS
@@ -45,7 +45,7 @@ class Settings(NamedTuple):
 
     def number(self, node: int, name: str) -> int:
         """Number of a property of a node."""
-        return properties.number(name, self.versions[node], node == Node.SAFETY_MODULE)
+        return properties.number(name, self.versions[node], node == BusNode.SAFETY_MODULE)
 
 
 class Nodes:
@@ -69,7 +69,7 @@ class Nodes:
             where its firmware has none.
         """
         try:
-            return properties.number(name, self.versions.get(node, 0), node == Node.SAFETY_MODULE)
+            return properties.number(name, self.versions.get(node, 0), node == BusNode.SAFETY_MODULE)
         except KeyError as error:
             raise StartError(BusFault.FIRMWARE, node, error.args[0]) from error
 
@@ -103,7 +103,7 @@ class Nodes:
         """
         found = self.ask(node, name)
         if found is None:
-            raise StartError(BusFault.NO_SAFETY_MODULE if node == Node.SAFETY_MODULE else BusFault.MISSING, node)
+            raise StartError(BusFault.NO_SAFETY_MODULE if node == BusNode.SAFETY_MODULE else BusFault.MISSING, node)
         return found
 
     def write(self, node: int, name: str, value: int) -> None:
@@ -157,11 +157,11 @@ class StartUp:
         self._restore_limits()
         yield from self._wake()
         settings = self._read()
-        if self._nodes.demand(Node.SAFETY_MODULE, "ZERO") != 1:
+        if self._nodes.demand(BusNode.SAFETY_MODULE, "ZERO") != 1:
             while not self.is_at_home:
                 yield from self._pause(Wait.HOME, BUS.look)
             self._set_zero(settings)
-        self._nodes.write(Node.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
+        self._nodes.write(BusNode.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
         self.settings = settings
 
     def _pause(self, wait: Wait, seconds: float) -> Iterator[Wait]:
@@ -174,12 +174,12 @@ class StartUp:
     def _await_idle(self) -> Iterator[Wait]:
         """Until the safety module is idle: in E-stop no controller answers, active it needs the positions."""
         nodes = self._nodes
-        while nodes.ask(Node.SAFETY_MODULE, "STAT") is None:
+        while nodes.ask(BusNode.SAFETY_MODULE, "STAT") is None:
             if any(nodes.ask(node, "STAT", 1) is not None for node in self._motors):
-                raise StartError(BusFault.NO_SAFETY_MODULE, Node.SAFETY_MODULE)
+                raise StartError(BusFault.NO_SAFETY_MODULE, BusNode.SAFETY_MODULE)
             yield from self._pause(Wait.POWER, BUS.look)
-        nodes.versions[Node.SAFETY_MODULE] = nodes.demand(Node.SAFETY_MODULE, "VERS")
-        while nodes.demand(Node.SAFETY_MODULE, "MODE") != SafetyMode.IDLE:
+        nodes.versions[BusNode.SAFETY_MODULE] = nodes.demand(BusNode.SAFETY_MODULE, "VERS")
+        while nodes.demand(BusNode.SAFETY_MODULE, "MODE") != SafetyMode.IDLE:
             yield from self._pause(Wait.IDLE, BUS.look)
 
     def _find(self) -> Iterator[Wait]:
@@ -202,7 +202,7 @@ class StartUp:
         """The limits that the safety module has stored."""
         for name in ("VL1", "VL2", "TL1", "TL2"):
             for what in ("DEF", "LOAD"):
-                self._nodes.write(Node.SAFETY_MODULE, what, self._nodes.number(Node.SAFETY_MODULE, name))
+                self._nodes.write(BusNode.SAFETY_MODULE, what, self._nodes.number(BusNode.SAFETY_MODULE, name))
                 self._line.sleep(BUS.between_writes)
 
     def _wake(self) -> Iterator[Wait]:
@@ -217,7 +217,7 @@ class StartUp:
             status = nodes.ask(node, "STAT")
             if status != BUS.ready:
                 raise StartError(BusFault.NOT_AWAKE, node, "none" if status is None else status)
-        nodes.send(frames.put(Group.MOTORS, nodes.number(1, "MODE"), 0, Bit.GROUP))
+        nodes.send(frames.put(BusGroup.MOTORS, nodes.number(1, "MODE"), 0, Bit.GROUP))
 
     def _read(self) -> Settings:
         """Read and check what the driver relies on."""
@@ -227,7 +227,7 @@ class StartUp:
             poles = nodes.demand(7, "POLES")
             if poles != BUS.wrist_poles:
                 raise StartError(BusFault.WRIST, 7, poles)
-        safe = nodes.demand(Node.SAFETY_MODULE, "TL1")
+        safe = nodes.demand(BusNode.SAFETY_MODULE, "TL1")
         rows = [self._read_motor(node) for node in self._motors]
         counts, gains, limits = zip(*rows, strict=True)
         limit = tuple(min(each, safe, BUS.largest_torque) for each in limits)
@@ -235,7 +235,7 @@ class StartUp:
 
     def _read_motor(self, node: int) -> tuple[int, int, int]:
         demand = self._nodes.demand
-        expected = [(node - 1) % 4 + 1, 0, Group.ARM if node <= 4 else Group.WRIST, Group.MOTORS]
+        expected = [(node - 1) % 4 + 1, 0, BusGroup.ARM if node <= 4 else BusGroup.WRIST, BusGroup.MOTORS]
         found = [demand(node, name) for name in ("PIDX", "GRPA", "GRPB", "GRPC")]
         if found != expected:
             detail = f"index and groups {found}, expected {list(map(int, expected))}"
@@ -252,7 +252,7 @@ class StartUp:
     def _set_zero(self, settings: Settings) -> None:
         """Write the counts of the home pose, at which the arm is."""
         nodes = self._nodes
-        nodes.write(Node.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
+        nodes.write(BusNode.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
         for node, angle, counts in zip(self._motors, self._home, settings.counts, strict=True):
             wanted = math.floor(angle / math.tau * counts)
             nodes.write(node, "P", wanted)
@@ -260,5 +260,5 @@ class StartUp:
             if abs(away) > BUS.jump * counts:
                 raise StartError(BusFault.NOT_ZEROED, node, away)
         self._line.sleep(BUS.between_writes)
-        nodes.write(Node.SAFETY_MODULE, "ZERO", 1)
+        nodes.write(BusNode.SAFETY_MODULE, "ZERO", 1)
         self._line.sleep(BUS.between_writes)

@@ -73,7 +73,7 @@ def _claim(row: dict[str, object]) -> Claim:
     if is_shown and not (claim.shown and claim.agreement):
         raise ValueError(f"{claim.section}, '{claim.claim}': give it 'shown' and 'agreement', or status 'not shown'")
     if not is_shown and not claim.open:
-        raise ValueError(f"{claim.section}, '{claim.claim}': it is not shown; 'open' must say why")
+        raise ValueError(f"{claim.section}, '{claim.claim}': it is not shown; 'open' must state why")
     return claim
 
 

@@ -17,7 +17,7 @@ from wam_studies.thesis.evaluation import evaluate
 from wam_studies.thesis.rows import Comparison
 
 
-class RecordedRun(NamedTuple):
+class SweptRun(NamedTuple):
     """A run of an experiment, and the directory of its bag."""
 
     experiment: Experiment
@@ -54,7 +54,7 @@ def points(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence
     return [ExperimentPoint(experiment, tuple(values.items())) for values in named]
 
 
-def record_run(case: RecordedRun) -> str:
+def record_run(case: SweptRun) -> str:
     """Record a run into a bag of its name, in lockstep without ROS; why it ended early, '' if it did not."""
     configuration = configured(case.experiment, case.run, Path(case.directory))
     steps = scenario.load_for(configuration, f"{case.directory}/{case.run.name}.yaml")
@@ -69,7 +69,7 @@ def outcome(point: ExperimentPoint) -> ExperimentOutcome:
     with TemporaryDirectory(prefix="wam_sweep_") as folder:
         try:
             for run in runs:
-                record_run(RecordedRun(experiment, run, folder))
+                record_run(SweptRun(experiment, run, folder))
             rows = evaluate(experiment, Path(folder)).rows
         except (ParameterError, BagError) as error:
             return ExperimentOutcome(str(error).replace(f"{folder}/", ""), ())
