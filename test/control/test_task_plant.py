@@ -106,19 +106,6 @@ def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [4e4, 400.0])
-def test_two_forces_between_which_a_link_turns_are_held_however_little_friction_is_declared(stiffness: float) -> None:
-    """Without friction a surface presses across the link, wherever that has turned to: 9.7 N of 8 were known to 0.2."""
-    q = (0.3, -1.2, 0.4, 0.9)
-    x, y, z = (-BODY.cover_pose(q, OUTER).rotation[:, 1]).tolist()
-    soft = Surface(OUTER, 0.36, (x, y, z), 400.0, 0.0, is_plane=False)
-    stiff = Surface(OUTER, 0.12, (x, y, z), stiffness, 0.0, is_plane=False)
-    changes = {"force_loop:sensing.friction": 0.01}
-    played = Played(Task(q, soft, 8.0, second=(stiff, 8.0)), [force(soft, 8.0), force(stiff, 8.0)], 4.0, **changes)
-    assert "; the arm holds its position" in played.reason
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5), (0.2, 20.0)])
 def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: float, newtons: float) -> None:
     """After a motion along the link, by 6 cm: it went back at its full speed, and pressed with up to 25 N of 6.5."""

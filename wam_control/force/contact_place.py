@@ -24,6 +24,7 @@ class ForcePlace(NamedTuple):
     cover, position, position_sd : cover, position along it and its standard deviation, m.
     is_pinned : whether the command or the parameters give it.
     is_known : whether it is pinned, or estimated well enough while something is touched.
+    is_touched : whether it is where the estimator finds the one contact, well enough or not.
     is_in_doubt : whether something is touched, and it is neither pinned nor known on which link.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     """
@@ -33,6 +34,7 @@ class ForcePlace(NamedTuple):
     position_sd: float
     is_pinned: bool = False
     is_known: bool = False
+    is_touched: bool = False
     is_in_doubt: bool = False
     rejection: str = ""
 
@@ -87,7 +89,7 @@ class ContactPlace:
             self._last = None
         elif is_identified and not rejection:
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
-            self._last = self._estimated(contact.cover, contact.position, sd)
+            self._last = self._estimated(contact.cover, contact.position, sd)._replace(is_touched=True)
         cover = axis.cover or parameters.contact_cover
         assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
         where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)

@@ -43,7 +43,8 @@ class SensingParameters:
         high=1e3,
     )
     least_apparent_mass: float = tunable(
-        "least mass of the arm that the loop sees in the measured force: with less, the arm is not passive along it",
+        "least mass of the arm that the loop sees in the measured force; 0: any, also less than none, with which the "
+        "stable gain is smaller, and the error of the force, too",
         "kg",
         high=100.0,
     )
@@ -235,7 +236,8 @@ class ForceAxes:
         moved *= position_sd**2
         weight = inverse(spread + moved)
         inertia = self.inertia(q)
-        sense = _passive(weight, press, inertia @ lever, parameters.least_apparent_mass * square)
+        least = parameters.least_apparent_mass * square if parameters.least_apparent_mass else -math.inf
+        sense = _passive(weight, press, inertia @ lever, least)
         carried: Array = sense @ inertia
         mass = float(carried @ lever) / square
         impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)

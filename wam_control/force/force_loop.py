@@ -329,14 +329,15 @@ class ForceLoop:
             size = math.hypot(*(one.desired for one in axes if one.is_joint))
         own, torques, wound = self.parameters, self._measurement.torques, self._supervision.wound
         known = self._run.believe(axis, size, torques, own, wound)
-        if axis.place is None or axis.place.is_pinned or known.force >= axis.desired:
+        place = axis.place
+        if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
             return known
-        along = self._body.cover_pose(self._q, axis.place.cover).rotation[:, 0]
+        along = self._body.cover_pose(self._q, place.cover).rotation[:, 0]
         if abs(float(axis.direction @ along)) > math.sin(STEEPEST):
             return known  # nor will it be known
         # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
-        sd = axis.place.position_sd * max(known.force / axis.desired, 0.0) if axis.place.is_known else 0.0
-        place = axis.place._replace(position_sd=max(sd, own.contact_position_sd))
+        sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
+        place = place._replace(position_sd=max(sd, own.contact_position_sd))
         touched = axis._replace(sensed=self._axes.forces.axis(q, place.pressed(axis.direction, axis.desired)))
         return known._replace(errors=self._run.believe(touched, size, torques, own, wound).errors)
 
