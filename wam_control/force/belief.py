@@ -38,7 +38,7 @@ class Errors(NamedTuple):
     @property
     def cause(self) -> str:
         """Name of the largest part."""
-        return max(self._fields, key=lambda name: float(getattr(self, name)))
+        return self._fields[self.index(max(self))]
 
 
 class Belief(NamedTuple):
