@@ -597,7 +597,7 @@ def test_the_command_writes_text_json_and_page(
     assert "reading" in err
     with pytest.raises(SystemExit) as ended:
         main(["analyse", str(tmp_path / "nothing")])
-    assert ended.value.code == 1
+    assert ended.value.code == 2
     assert "does not exist" in capsys.readouterr().err
 
 

@@ -178,7 +178,8 @@ def said(message: str, stamp: int, level: int) -> Any:
 
 
 def event(code: str, reason: str = "why") -> dict[str, str]:
-    return {"event.1": code, "event.1.severity": "WARN", "event.1.reason": reason}
+    holds = {"event.1.holds": "1.0"} if code == "refused" else {}
+    return {"event.1": code, "event.1.severity": "WARN", "event.1.reason": reason, **holds}
 
 
 def array(stamp: int, *statuses: Any) -> Any:
@@ -438,9 +439,7 @@ def with_limits(recording: Recording) -> Bag:
     sections = Configuration.load(packaged("wam")).sections
     content = yaml.safe_dump({"/wam/force_loop": {"ros__parameters": {**sections["/**"], **sections["force_loop"]}}})
     bag = recording.bag()
-    reacts = status(
-        "force_loop", "at least 81 N", stamp=str(START + 9300 * MS), **event("contact_force", "at least 81 N")
-    )
+    reacts = status("force_loop", "at least 81 N", stamp=str(START + 9300 * MS), **event("pushed", "at least 81 N"))
     stated = messages([*itertools.starmap(said, recording.statuses), reacts])
     topics = {**bag.topics, "/wam/status": stated, "/wam/task_command": NO_TASK}
     return bag._replace(topics=topics, attachments={"parameters.yaml": content.encode()})
@@ -906,7 +905,7 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
         clock + START + 7000 * MS,
         Event(Code.REFUSED, values={"reason": "why", "holds": 1.0}),
     )
-    assert sentences("press", [reaction], traces.zero) == ["press: refused (refused) from 5.00 to 7.00 s: why"]
+    assert sentences("press", [reaction], traces.zero) == ["press: refused from 5.00 to 7.00 s: why"]
 
 
 def test_where_the_true_contact_is_recorded_its_error_is_next_to_each_contact():
@@ -1200,7 +1199,7 @@ def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was
     """Latched topics are kept from before the part; no joint state is."""
     recording, kept = Recording(), slice(1200, 2000)  # from 6.0 s
     bag = recording.bag()
-    holds = status("force_loop", "not sensed", **event("not_sensed"))
+    holds = status("force_loop", "not sensed", **event("refused"))
     logged = [*(at for _, at, _ in recording.statuses[:4]), START + 5002 * MS, recording.statuses[4][1]]
     stated = [*itertools.starmap(said, recording.statuses[:4]), holds, said(*recording.statuses[4])]
     states = JointColumns(*(column[kept] for column in joints()[:3]), joints().names, *(c[kept] for c in joints()[4:7]))
@@ -1218,12 +1217,12 @@ def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
     bag = recording.bag()
     reacts = [
         status("force_loop", "", stamp=str(START + at * MS), **events)
-        for at, events in ((1000, event("joint_end")), (1500, {}))
+        for at, events in ((1000, event("at_limit")), (1500, {}))
     ]
     stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
     found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/status": stated}), lambda doing: None)
     (force,) = (section for section in found.sections if section.key == "force")
-    assert any(line.startswith("move: reported (joint_end) from 1.20 to 1.70 s") for line in force.sentences)
+    assert any(line.startswith("move: reported (at_limit) from 1.20 to 1.70 s") for line in force.sentences)
 
 
 def test_failed_scenario_says_why_and_ends_its_last_step():

@@ -284,7 +284,7 @@ def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_files_are_offered_where_a_file_is_asked_for_and_names_where_a_name_is(tmp_path: Path) -> None:
     pytest.importorskip("argcomplete")
-    assert set(completed("wam demo --config barrett", tmp_path)) == {"barrett-wam4", "barrett-wam7"}
+    assert set(completed("wam demo --config barrett", tmp_path)) >= {"barrett-wam4", "barrett-wam7"}
     assert f"{ROOT}/README.md" in completed(f"wam live {ROOT}/READ", tmp_path)
     assert completed(f"wam demo --name {ROOT}/READ", tmp_path) == []
 

@@ -153,12 +153,12 @@ def test_every_section_of_every_configuration_builds_the_class_of_its_node(path:
     assert set(values(configuration.shared)) == set(shared) | derived, "nothing is left over"
     assert not derived & set(shared), "they have their home elsewhere"
     sections = set(configuration.sections) - {"/**"}
-    every = {declared(entry).name for file in FILES for entry in Configuration.load(file).shared.nodes}
-    assert sections <= set(NODES) | every, "every section is that of a node"
+    every = {declared(entry).name: entry for file in FILES for entry in Configuration.load(file).shared.nodes}
+    assert sections <= {*NODES, *every}, "every section is that of a node"
     listed = {declared(entry).name: entry for entry in configuration.shared.nodes}
     assert {declared(entry).name for entry in configuration.shared.nodes} <= sections, "every node has one"
     for name in sections:
-        built = configuration.node(name, own_class(listed.get(name, name)))
+        built = configuration.node(name, own_class(listed.get(name) or every.get(name, name)))
         assert set(values(built)) == set(configuration.sections[name])
 
 

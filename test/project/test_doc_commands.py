@@ -232,7 +232,7 @@ def is_among(line: str, printed: str) -> bool:
 def first_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`bags/first`: a scenario shorter than the demonstration."""
     press = {"frame": "outer_link", "newtons": [0.0, -1.0, 0.0]}
-    steps = [{"name": "press", "seconds": 0.05, "force": press}]
+    steps = [{"name": "press", "seconds": 0.05, "force": press, "request": "enable"}]
     with locked_domain() as number:
         arm = RunningArm(number, tmp_path_factory.mktemp("first"))
         return arm.play(steps, recorder={"name": "first"}).path

@@ -133,7 +133,7 @@ class Apart(Stack):
 
     def force_servo(self) -> Servo:
         """Gains of the velocity loop with which the guard of the force loop assesses."""
-        found: Servo = self.nodes["force_loop"].node._loop._servo
+        found: Servo = self.nodes["force_loop"].node._loop._supervision.servo
         return found
 
     def problem(self) -> str:

@@ -148,7 +148,9 @@ def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: An
     assert feeder.facts()[0].level == DiagnosticStatus.ERROR  # the driver brakes: nothing guards these gains
     set_gain(1.05)
     feeder.feed_until(lambda: "domain I" in feeder.facts()[0].message)
-    assert feeder.loop.node._loop._servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]
+    assert (
+        feeder.loop.node._loop._supervision.servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]
+    )
 
 
 def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_path: Path) -> None:

@@ -26,5 +26,5 @@
 ``stability_guard``        domain, margin and largest saturation of a parameter set on the arm
 ``task``                   a task as data: axes of force, velocity, position, impedance; its limits
 ``thresholds``             what no parameter sets
-=========================
+=========================  ================================================================================
 """

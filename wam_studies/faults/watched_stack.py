@@ -146,7 +146,7 @@ class WatchedStack:
     def _take_status(self, message: DiagnosticStatus) -> None:
         self.statuses[message.name] = message
         status = read_status(message)
-        if any(event.values.get(CAUSE) == RAISED for event in status.events):
+        if any(event.values.get(CAUSE) in (RAISED, "node") for event in status.events):
             self._escape(f"{status.node}: {status.message[:200]}")
 
     def _command(self, stamp: int) -> None:
