@@ -46,7 +46,7 @@ class AxisRun:
         self.place = ContactPlace(covers)
         self.watch, self.motion = ForceWatch(), MotionWatch()
         self.anchor, self.side, self.is_kept = math.nan, 1.0, False
-        self.is_force, self.of = of.kind is AxisKind.FORCE, of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
+        self.of = of._replace(value=0.0, rate=0.0, stiffness=0.0, damping=0.0)
 
     def goal(self, axis: CommandedAxis, dt: float, lasting: float) -> float:
         """Position that is commanded along the axis, m or rad; of a velocity the one that it leads to by now."""

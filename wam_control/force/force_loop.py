@@ -374,7 +374,7 @@ class ForceLoop:
             ]
         else:
             run.held.at = None
-            rows = self._rows(axes, known, contact, factor, dt)
+            rows = self._rows(axes, known, factor, dt)
             if rate is None:
                 wanted = self._slowed(axes, rows, wanted)
         least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
@@ -419,7 +419,7 @@ class ForceLoop:
         return self.parameters.task.fastest(axis.is_joint)[0]
 
     def _rows(
-        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], contact: Contact, factor: float, dt: float
+        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], factor: float, dt: float
     ) -> list[VelocityRow]:
         """The commanded velocity along each axis."""
         run, own = self._run, self.parameters
