@@ -10,6 +10,8 @@ Nothing is used that is from the future, too old, or from before the driver's se
   one goes on from it: a single message never moves the clock, a driver that starts again does.
 - An input far ahead of the clock is refused; one a little ahead is kept until the clock is there.
 - An input older than its limit is given as absent, and an older one never replaces a newer one.
+- A step waits for an input that answers an earlier state only until the clock is `LONGEST_WAIT` ahead.  Two nodes
+  that wait for each other go on so, after one of them has missed a state.
 - A session that a status announces forgets nothing by itself, as anybody can send a status; its first state does.
 - A command of a program counts while it is streamed: a message of its own, which no other has preceded within
   the limit, does nothing.  Without a stamp it has that of the newest state when it comes.
@@ -26,6 +28,7 @@ LONGEST_JUMP = (
 )
 MOST_AHEAD = 1000  # messages ahead of the clock that are kept
 MOST_EARLY = 64  # messages of a session that was announced, kept until its first state comes
+LONGEST_WAIT = 10  # outer periods by which states go on before a step is made without an input of a state before
 
 
 class OutOfTime(ValueError):
@@ -268,7 +271,13 @@ class Synchroniser:
                 self._lacks = None
                 return ()
         self._triggers.append((stamp, value))
+        if (lacks := self._lacks) is not None and self._is_overdue(lacks[0], lacks[1]):
+            return self._complete()
         return ()
+
+    def _is_overdue(self, group: "_Group", cause: int) -> bool:
+        """Whether states have gone on for so long that inputs which answer an earlier one will not come any more."""
+        return group.is_delayed and self._last - cause > LONGEST_WAIT * self._outer_period
 
     def _complete(self) -> Sequence[Inputs]:
         """The inputs of each step that is complete, in the order of their stamps."""
@@ -353,7 +362,7 @@ class Synchroniser:
         step: no message that is not later can show that an input was missed.
         """
         for group in self._groups:  # before the others: most often it is one of these that is not there yet
-            if stamp >= group.until and not group.find(stamp):
+            if stamp >= group.until and not group.find(stamp) and not self._is_overdue(group, group.cause(stamp)):
                 self._lacks = group, group.cause(stamp), min([each.cause(stamp) for each in self._groups])
                 return None
         inputs = Inputs()
@@ -432,6 +441,7 @@ class _Group:
     Attributes
     ----------
     count : number of its topics.
+    is_delayed : whether they answer an earlier state than that of the step.
     kept : the inputs by stamp and topic.
     newest : largest stamp of those that came, ns.
     found : those of the last step, by topic.
@@ -446,6 +456,7 @@ class _Group:
         "_repeats_ns",
         "count",
         "found",
+        "is_delayed",
         "kept",
         "newest",
         "origin",
@@ -455,7 +466,7 @@ class _Group:
 
     def __init__(self, delay_ns: int, repeats_ns: int, phase_ns: int, topics: tuple[str, ...]) -> None:
         self._delay_ns, self._repeats_ns, self._phase_ns, self.topics = delay_ns, repeats_ns, phase_ns, topics
-        self.count = len(topics)
+        self.count, self.is_delayed = len(topics), delay_ns > 0
         self.kept: dict[int, dict[str, Any]] = {}
         self.restart(0)
 

@@ -27,7 +27,7 @@ from wam_ros.outlets import Outlets
 from wam_ros.priority import PRIORITY, set_priority
 from wam_ros.refusals import Claims, Refusals
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import DEPTH, DIAGNOSTICS, SECOND, header, qos, topic_name
+from wam_ros.topics import DIAGNOSTICS, SECOND, header, listening, topic_name
 from wam_ros.wire import decoder, deserialized, stamp_of
 
 READY = NodeStatus(Level.OK, "ready", connected=True)
@@ -171,10 +171,8 @@ class Ports:
                     self.publish_status(self._plain)
 
         row = self.interface.topics[topic]
-        profile = qos(row)
-        if row.latched:
-            profile.depth = DEPTH  # it may have many publishers, each with a message of its own
-        elif self.shared.timing.mode == "realtime":
+        profile = listening(row)
+        if not row.latched and self.shared.timing.mode == "realtime":
             profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
         kind = message_type(row)
         name = topic_name(self.node, row)

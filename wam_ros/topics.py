@@ -36,6 +36,13 @@ def qos(topic: Topic) -> QoSProfile:
     )
 
 
+def listening(topic: Topic) -> QoSProfile:
+    """`qos` of a subscription: a latched topic may have many publishers, each with a message of its own."""
+    profile = qos(topic)
+    profile.depth = DEPTH
+    return profile
+
+
 def header(stamp: int, frame: str = "") -> Header:
     """Header with a stamp in nanoseconds."""
     return Header(stamp=Time(sec=stamp // SECOND, nanosec=stamp % SECOND), frame_id=frame)

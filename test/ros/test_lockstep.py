@@ -189,6 +189,24 @@ def test_a_node_that_begins_late_leaves_out_the_steps_whose_inputs_it_has_missed
     assert puts(synchroniser, "state", 1007 * ms, "s1007") == [(1007 * ms, 0.001, "s1007", "c1006")]
 
 
+def test_a_step_waits_fifty_periods_for_the_answer_to_an_earlier_state_and_then_does_without() -> None:
+    """Two nodes that wait for each other, of which one has missed a state, go on."""
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=5)})
+    ms = 1_000_000
+    puts(synchroniser, "state", 1 * ms, "s1")
+    puts(synchroniser, "command", 1 * ms, "c1")
+    for tick in range(6, 61):  # they need the answers to 1, 6, 11 ...; that to 6 never comes
+        made = puts(synchroniser, "state", tick * ms, "s")
+        if tick in (10, 56, 57):
+            expected = {
+                10: [(10 * ms, 0.001, "s", "c1")],
+                56: [],
+                57: [((11 + i) * ms, 0.001, "s", "c1") for i in range(5)],
+            }
+            assert made == expected[tick]
+    assert puts(synchroniser, "command", 11 * ms, "c11")[0][2:] == ("s", "c11")
+
+
 def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
     realtime = dataclasses.replace(TIMING, mode="realtime")
     synchroniser = Synchroniser(realtime, "state", {"command": InputSpec(outer=True)})

@@ -139,7 +139,6 @@ def test_in_lockstep_the_node_that_does_not_answer_is_named_and_time_goes_on_wit
     stack.enable()
 
 
-@pytest.mark.xfail(reason="enabling again after such a fault is refused at times: known, not mended", strict=False)
 def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "lockstep")
     node = stack.nodes["force_loop"]
@@ -175,7 +174,6 @@ def test_a_node_that_is_ended_brakes_before_its_commands_cease(ros: Network, tmp
     assert "gravity has ended; start it again, then reset_fault" in stack.fault
 
 
-@pytest.mark.xfail(reason="enabling again after such a fault is refused at times: known, not mended", strict=False)
 @pytest.mark.parametrize(
     ("topic", "names"),
     [

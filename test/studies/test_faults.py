@@ -148,7 +148,6 @@ def in_lockstep(**more: object) -> Configuration:
     return CONFIGURATION.with_values({"timing.mode": "lockstep", **more})
 
 
-@pytest.mark.xfail(reason="an exception in a timer reaches the driver, not this list: known, not mended", strict=False)
 def test_what_escapes_is_noticed(domain_id: int) -> None:
     with WatchedStack(in_lockstep(), domain_id) as stack:
         assert stack.begin() == ""

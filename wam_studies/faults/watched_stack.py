@@ -19,7 +19,7 @@ from wam_driver.safety import Mode
 from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type, read_status
 from wam_ros.requests import answer_of, switch_request
-from wam_ros.topics import NAMESPACE, qos
+from wam_ros.topics import NAMESPACE, listening, qos
 from wam_ros.wire import Encode, encoder, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves
@@ -90,7 +90,7 @@ class WatchedStack:
         self.is_commanding = True
         for name, row in self.interface.topics.items():
             watch = self._watching(name, message_type(row))
-            self.node.create_subscription(message_type(row), name, watch, qos(row), raw=True)
+            self.node.create_subscription(message_type(row), name, watch, listening(row), raw=True)
         self._clients = {
             "enable": self.node.create_client(SetBool, "driver/enable"),
             **{name: self.node.create_client(Trigger, f"driver/{name}") for name in ("reset_fault", "reset", "estop")},
@@ -146,7 +146,7 @@ class WatchedStack:
     def _take_status(self, message: DiagnosticStatus) -> None:
         self.statuses[message.name] = message
         status = read_status(message)
-        if any(event.values.get(CAUSE) in (RAISED, "node") for event in status.events):
+        if any(event.values.get(CAUSE) == RAISED for event in status.events):
             self._escape(f"{status.node}: {status.message[:200]}")
 
     def _command(self, stamp: int) -> None:
