@@ -33,6 +33,7 @@ from wam_ros.wire import decoder, deserialized, stamp_of
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+PARAMETERS = "parameters of "  # beginning of what a problem concerns, before the name of a node
 
 
 def problem_of(cause: str, reason: str) -> Event | None:
@@ -260,6 +261,11 @@ class Ports:
     def _look_for_rivals(self) -> None:
         for topic in self.claims.subscriptions:
             self.set_problem(topic, self.claims.rivals(topic))
+        expected = self.interface.declarations
+        for concerned in [problem for problem in self.problems if problem.startswith(PARAMETERS)]:
+            node = concerned.removeprefix(PARAMETERS)
+            if node not in expected and node not in self.node.get_node_names():
+                self.set_problem(concerned, None)  # it has ended, or never was: its status was replayed
 
     def set_status(self, status: NodeStatus) -> None:
         """Publish the status of the node, latched; kept until the node is ready."""
@@ -340,7 +346,7 @@ class Ports:
             # a node of the stack that this bring-up does not list answers all the same
             if self.takes_problem is not None and (is_peer or status.node in NODES.keys() - {self._name}):
                 reason = disagreement(status.node, self._digests, status.facts.get(DIGESTS, ""))
-                self.set_problem(f"parameters of {status.node}", problem_of("parameters", reason))
+                self.set_problem(PARAMETERS + status.node, problem_of("parameters", reason))
             if status.connected:
                 self._absent.discard(status.node)
                 self._inform()
