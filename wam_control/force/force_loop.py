@@ -332,7 +332,7 @@ class ForceLoop:
         place = axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
             return known
-        along = self._body.cover_pose(self._q, place.cover).rotation[:, 0]
+        along = self._body.cover_pose(q, place.cover).rotation[:, 0]
         if abs(float(axis.direction @ along)) > math.sin(STEEPEST):
             return known  # nor will it be known
         # what is touched shows where, and the better the harder it is pressed: it is decided for the whole force
