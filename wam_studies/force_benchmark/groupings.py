@@ -10,7 +10,12 @@ SENSORS, MOTORS = "joint sensors", "motors with dither"
 STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000": 4e5}  # N/m
 FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
 MOTIONS = ("at rest", "moves along the force", "moves across it")
-UNKNOWNS = ("masses, friction, cables, constants", "a payload, too", "the law of friction, too")
+UNKNOWNS = (
+    "masses, centres, friction, cables, constants",
+    "a payload, too",
+    "the law of friction, too",
+    "the position, declared wrongly",
+)
 COURSES = ("one force", "another force first", "small force for long")
 
 
@@ -46,6 +51,8 @@ def _motion(task: Task) -> str:
 def unknown_of(task: Task) -> str:
     """What the controllers do not know."""
     conditions = task.conditions
+    if task.mistake:
+        return UNKNOWNS[3]
     return UNKNOWNS[1] if conditions.payload else UNKNOWNS[2] if conditions.asymmetry else UNKNOWNS[0]
 
 

@@ -19,13 +19,15 @@ from wam_studies.force_benchmark.groupings import (
     course_of,
     unknown_of,
 )  # fmt: skip
-from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd
+from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd, TaskResult
 from wam_studies.force_benchmark.tasks import RANGES, draw, task_values
 from wam_studies.force_benchmark.trial import ForceTaskCase, ForceTrial, play
 from wam_studies.harness import Study, option
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, share
 
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
+OF_FEASIBLE = {SENSORS: (0.6, 0.85), MOTORS: (0.4, 0.7)}  # share of the feasible ones: required, aim
+KNOWN = 0.05  # error of a force, per force, up to which it can be known
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,14 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     count: ClassVar[int | None] = 100
 
     seconds: float = option(RANGES.seconds, "time of the whole force in each task", 1.0)
+    compare: bool = option(False, "let other controllers do each task, too: four times as long")
 
     def cases(self, seed: int) -> Iterator[ForceTaskCase]:
         """Tasks without end."""
         arm = self.configuration.shared.arm
         return (
-            ForceTaskCase(self.configuration, seed, number, draw(arm, seed, number), self.seconds) for number in count()
+            ForceTaskCase(self.configuration, seed, number, draw(arm, seed, number), self.seconds, self.compare)
+            for number in count()
         )
 
     run = staticmethod(play)
@@ -54,8 +58,9 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
 
     def score(self, records: Sequence[ForceTrial]) -> Scores:
         """Shares of accepted tasks, what must not happen, outcomes by class, reasons."""
-        rows = [*_accepted(records), *_forbidden(records), *_further(records)]
-        return Scores(rows, [_outcomes(records), _reasons(records)])
+        rows = [*_accepted(records), *_of_feasible(records), *_forbidden(records), *_further(records)]
+        compared = [_controllers(records)] if any(trial.others for trial in records) else []
+        return Scores(rows, [*compared, _outcomes(records), _reasons(records)])
 
     def failure(self, record: ForceTrial) -> str:
         """A wrong force without a reason, a force above the limit, an unreported cycle."""
@@ -94,9 +99,9 @@ def _of_end(trials: Sequence[ForceTrial], *ends: TaskEnd) -> int:
 
 
 def _accepted(trials: Sequence[ForceTrial]) -> Iterator[Row]:
-    """How many accepted tasks end with the force."""
+    """How many accepted tasks end with the force, where the user makes no mistake."""
     for name, least in REQUIRED.items():
-        own = FEEDBACK.trials(trials, name)
+        own = [trial for trial in FEEDBACK.trials(trials, name) if not trial.task.mistake]
         done, refused = _of_end(own, TaskEnd.DONE), _of_end(own, TaskEnd.REFUSED)
         title = f"accepted tasks within {OUTCOME.tolerance:.0%}, {name}"
         accepted = len(own) - refused - _of_end(own, TaskEnd.GIVEN_UP)
@@ -104,17 +109,59 @@ def _accepted(trials: Sequence[ForceTrial]) -> Iterator[Row]:
         yield Row(f"{title}, and those given up count as accepted", share(done, len(own) - refused), "%", 100.0)
 
 
+def _is_feasible(trial: ForceTrial) -> bool:
+    """Whether the force can be known, or anything compared gets it right."""
+    results = [trial.result, *trial.others.values()]
+    return trial.knowable <= KNOWN or any(one.outcome is TaskEnd.DONE and not one.is_over for one in results)
+
+
+def _of_feasible(trials: Sequence[ForceTrial]) -> Iterator[Row]:
+    """How many of the tasks that can be done are done."""
+    for name, (least, aim) in OF_FEASIBLE.items():
+        own = [trial for trial in FEEDBACK.trials(trials, name) if trial.others and _is_feasible(trial)]
+        if own:
+            found = share(_of_end(own, TaskEnd.DONE), len(own))
+            yield Row(f"right, of the feasible, {name}", found, "%", 100.0, (least, 1.0), (aim, 1.0))
+
+
+def _controllers(trials: Sequence[ForceTrial]) -> ScoreTable:
+    """What other controllers do with the same tasks."""
+    compared = [trial for trial in trials if trial.others]
+    names = list(dict.fromkeys(name for trial in compared for name in trial.others))
+    rows = []
+    for feedback in FEEDBACK.classes:
+        own = FEEDBACK.trials(compared, feedback)
+        results = {"force loop": [trial.result for trial in own]}
+        results |= {name: [trial.others[name] for trial in own if name in trial.others] for name in names}
+        rows += [[feedback, name, *map(str, _counted(found))] for name, found in results.items()]
+    note = (
+        f"A task is feasible where the force can be known to {KNOWN:.0%} by generalised least squares with the true "
+        "friction, or where one of these gets it right."
+    )
+    head = ("feedback", "controller", "tasks", "within 10 %", "wrong", "above the limit")
+    return ScoreTable("Other controllers", head, rows, note)
+
+
+def _counted(results: Sequence[TaskResult]) -> tuple[int, int, int, int]:
+    """Tasks, those that are right, those that are wrong and not declined, those above the limit."""
+    ends = Counter(one.outcome for one in results)
+    wrong = ends[TaskEnd.ENDED] + ends[TaskEnd.SILENT]
+    return len(results), ends[TaskEnd.DONE], wrong, sum(one.is_over for one in results)
+
+
 def _forbidden(trials: Sequence[ForceTrial]) -> Iterator[Row]:
     """What must not happen."""
-    for title, number in (
-        (
-            f"true force above {OUTCOME.overshoot:g} times the commanded plus the impact (3.1)",
-            sum(trial.result.is_over for trial in trials),
-        ),
-        ("limit cycles that nothing reports", sum(trial.result.cycles_silently for trial in trials)),
-        ("wrong force without a reason", _of_end(trials, TaskEnd.SILENT)),
+    over = f"true force above {OUTCOME.overshoot:g} times the commanded plus the impact (3.1)"
+    own = [trial for trial in trials if not trial.task.mistake]
+    mistaken = [trial for trial in trials if trial.task.mistake]
+    for title, number, of in (
+        (over, sum(trial.result.is_over for trial in trials), trials),
+        ("limit cycles that nothing reports", sum(trial.result.cycles_silently for trial in trials), trials),
+        ("wrong force without a reason", _of_end(own, TaskEnd.SILENT), own),
     ):
-        yield Row(title, exact(number, len(trials)), "tasks", required=NONE_AT_ALL)
+        yield Row(title, exact(number, len(of)), "tasks", required=NONE_AT_ALL)
+    silent = exact(_of_end(mistaken, TaskEnd.SILENT), len(mistaken))
+    yield Row("wrong force without a reason, the position declared wrongly", silent, "tasks")
 
 
 def _further(trials: Sequence[ForceTrial]) -> Iterator[Row]:

@@ -43,6 +43,10 @@ class TaskRanges:
     payloads: Range = (0.05, 2.0)  # kg
     other_friction: float = 0.05  # share of arms with another law of friction
     asymmetry: float = 0.15  # of that friction by direction
+    centres: float = 0.005  # m, sd of the centre of mass of each link along each axis
+    strain_noises: Range = (0.0, 0.05)  # N m, sd of each measured joint torque
+    mistaken: float = 0.1  # share of pinned positions that are declared elsewhere on the link
+    mistakes: Range = (0.01, 0.06)  # m, by which
 
     forces: Range = (1.0, 40.0)  # N
     stiffnesses: Range = (400.0, 4e5)  # N/m: a hundred times the foam that the defaults are for
@@ -102,6 +106,9 @@ class TaskConditions(NamedTuple):
     mass, motor_friction, joint_friction, cables, torque_constant : factors of the true arm; () for none.
     payload : mass at the tool that nobody declares, kg.
     asymmetry : of all friction, which then falls with the speed as Stribeck's, too; 0 for friction as configured.
+    centres : m, by which the controllers are wrong about the centre of mass of each link, x y z of each; () for none.
+    strain_noise : sd of each measured joint torque, N m.
+    mistake : m, by which a pinned position is declared too far along the link.
     """
 
     is_dithered: bool
@@ -115,6 +122,9 @@ class TaskConditions(NamedTuple):
     torque_constant: tuple[float, ...] = ()
     payload: float = 0.0
     asymmetry: float = 0.0
+    centres: tuple[float, ...] = ()
+    strain_noise: float = 0.0
+    mistake: float = 0.0
 
 
 NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp=0.0)
@@ -147,6 +157,11 @@ class Task(NamedTuple):
     def forces(self) -> list[tuple[Surface, float]]:
         """Each surface with its force, N."""
         return [(self.surface, self.force), *([self.second] if self.second else [])]
+
+    @property
+    def mistake(self) -> float:
+        """By how much the user declares the touched position too far along the link, m."""
+        return self.conditions.mistake if self.conditions.is_pinned and not self.second else 0.0
 
 
 class ElbowJoint(NamedTuple):
@@ -183,6 +198,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     random = np.random.Generator(np.random.PCG64((seed, number)))
     body = RigidBody(arm)
     conditions = _with_unknowns(_conditions(arm, random), np.random.Generator(np.random.PCG64((seed, number, 2))))
+    conditions = _with_errors(conditions, arm, np.random.Generator(np.random.PCG64((seed, number, 3))))
     force = _log_uniform(random, *RANGES.forces)
     elbow = ElbowJoint.of(body)
     q = _pose(arm, elbow, random)
@@ -222,6 +238,16 @@ def _with_unknowns(conditions: TaskConditions, random: np.random.Generator) -> T
     if share < RANGES.loaded + RANGES.other_friction:
         return conditions._replace(asymmetry=float(random.uniform(-RANGES.asymmetry, RANGES.asymmetry)))
     return conditions
+
+
+def _with_errors(conditions: TaskConditions, arm: Arm, random: np.random.Generator) -> TaskConditions:
+    """The conditions, with centres of mass that are off, noise of the joint sensors, and mistakes of the user."""
+    mistake = float(random.uniform(*RANGES.mistakes) * random.choice((-1.0, 1.0)))
+    return conditions._replace(
+        centres=tuple((RANGES.centres * random.normal(size=3 * len(arm.links.names))).tolist()),
+        strain_noise=float(random.uniform(*RANGES.strain_noises)),
+        mistake=mistake if random.random() < RANGES.mistaken else 0.0,
+    )
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
@@ -307,6 +333,12 @@ def configured(base: Configuration, task: Task) -> Configuration:
     return base.with_values(task_values(base, task))
 
 
+def declared(base: Configuration, task: Task) -> float:
+    """Position, m, at which the user says that the first surface is touched."""
+    length = base.shared.arm.covers.length_of(task.surface.cover)
+    return min(max(task.surface.position + task.mistake, 0.0), length)
+
+
 def task_values(base: Configuration, task: Task) -> dict[str, Any]:
     """What `configured` sets, by parameter."""
     surface, conditions = task.surface, task.conditions
@@ -326,8 +358,11 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
     if conditions.asymmetry:
         values |= {f"driver:friction.{one}_asymmetry": [conditions.asymmetry] for one in ("motor", "joint")}
         values["driver:friction.law"] = "stribeck"
+    if conditions.centres:
+        values["model.links.centre"] = np.add(base.shared.model.links.centre, conditions.centres).tolist()
+    values["driver:sensors.strain_noise"] = [conditions.strain_noise] * n
     if conditions.is_pinned:
-        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.position}
+        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": declared(base, task)}
     if surface.frequency:
         along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
         values |= {

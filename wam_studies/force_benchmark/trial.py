@@ -18,12 +18,19 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_sim.simulation import Simulation
+from wam_studies.force_benchmark.controllers import Admittance, TorqueControl, UsualController
 from wam_studies.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
 from wam_studies.force_benchmark.surfaces import NAMES
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps
 
 Array = NDArray[np.float64]
 STOPPED = 1.0  # s, after which a task that is held or in fault is over
+# what else does a task: values of the configuration, and what takes the place of the force loop
+OTHERS: Mapping[str, tuple[Mapping[str, Any], type[UsualController] | None]] = {
+    "force loop that tries everything": ({"force_loop:limits.doubt": 1e6}, None),
+    "admittance": ({}, Admittance),
+    "torque control": ({}, TorqueControl),
+}
 
 
 class _Standing(NamedTuple):
@@ -36,34 +43,53 @@ class _Standing(NamedTuple):
 
 
 class ForceTaskCase(NamedTuple):
-    """A task of a number, and the seconds of its whole force."""
+    """A task of a number, the seconds of its whole force, and whether others do it, too."""
 
     configuration: Configuration
     seed: int
     number: int
     task: Task
     seconds: float
+    is_compared: bool = False
 
     def __str__(self) -> str:
         return f"task {self.number} of seed {self.seed}"
 
 
 class ForceTrial(NamedTuple):
-    """A task of the benchmark and its result."""
+    """A task of the benchmark, its result, those of others by name, and how well the force can be known at all.
+
+    `knowable` is the error of the force per force, at best; NaN where nothing was compared.
+    """
 
     seed: int
     number: int
     task: Task
     result: TaskResult
+    others: Mapping[str, TaskResult] = {}
+    knowable: float = math.nan
 
 
 def play(case: ForceTaskCase) -> ForceTrial:
     """Do the task of a case."""
-    return ForceTrial(case.seed, case.number, case.task, perform(case.configuration, case.task, case.seconds))
+    seed, number, task = case.seed, case.number, case.task
+    result = perform(case.configuration, task, case.seconds)
+    if not case.is_compared:
+        return ForceTrial(seed, number, task, result)
+    others = {
+        name: perform(case.configuration, task, case.seconds, changes, controller)
+        for name, (changes, controller) in OTHERS.items()
+        if not (task.second and controller)  # these know one force
+    }
+    return ForceTrial(seed, number, task, result, others, knowable(case.configuration, task))
 
 
 def perform(
-    base: Configuration, task: Task, seconds: float = RANGES.seconds, changes: Mapping[str, Any] | None = None
+    base: Configuration,
+    task: Task,
+    seconds: float = RANGES.seconds,
+    changes: Mapping[str, Any] | None = None,
+    controller: type[UsualController] | None = None,
 ) -> TaskResult:
     """Do a task in simulation and evaluate it by the simulator's force.
 
@@ -73,10 +99,11 @@ def perform(
     task : what to do.
     seconds : of the whole force.
     changes : values that override the configuration of the task.
+    controller : in place of the force loop.
     """
     try:
         configuration = with_accepted_gain(configured(base, task).with_values(changes or {}))
-        run = Simulation(configuration, steps(task, seconds))
+        run = Simulation(configuration, steps(task, seconds), {"force_loop": controller} if controller else None)
     except ValueError as error:
         return refused(task, str(error))
     traces = TaskWatch(configuration, task, run).traces()
@@ -199,6 +226,28 @@ class TaskWatch:
         speed = np.array(qd)
         energy = float(speed @ inertia(self._arm, self._body, q) @ speed)
         return math.sqrt(energy * self._task.surface.stiffness)
+
+
+def knowable(base: Configuration, task: Task) -> float:
+    """Standard deviation of the first force per force by generalised least squares, whatever controls it.
+
+    The torques tau = -J'(u f + t) + e have the noise e of the sensors, or the error of the estimate from the motors;
+    friction t across the force is anywhere in the true cone, mu^2 f^2 / 4 along each axis; a position that is not
+    declared is anywhere on the link.
+    """
+    arm, surface = base.shared.arm, task.surface
+    sensing = base.node("force_loop", ForceLoopParameters).sensing
+    sd = sensing.estimated_torque_sd if task.conditions.is_dithered else max(task.conditions.strain_noise, 0.005)
+    body, u = RigidBody(arm), np.array(surface.direction)
+    here, there = (
+        body.point_jacobian(task.q, surface.cover, (surface.position + by, *arm.covers.aside(surface.cover, 0.0)))
+        for by in (0.0, 1.0)
+    )
+    lever, shift = u @ here, u @ (there - here)
+    spread = 0.0 if task.conditions.is_pinned else arm.covers.length_of(surface.cover) / math.sqrt(12.0)
+    across = 0.5 * surface.friction * (np.eye(3) - np.outer(u, u)) @ here
+    covariance = (sd / task.force) ** 2 * np.eye(len(lever)) + across.T @ across + spread**2 * np.outer(shift, shift)
+    return float(lever @ np.linalg.solve(covariance, lever)) ** -0.5
 
 
 def inertia(arm: Arm, body: RigidBody, q: list[float]) -> Array:
