@@ -14,11 +14,13 @@ from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import Driver, DriverParameters
+from wam_studies.force_benchmark.controllers import Admittance, TorqueControl
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
 from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import NOMINAL, RANGES, Task, TaskConditions, configured, draw, steps
-from wam_studies.force_benchmark.trial import ForceTrial, inertia, perform, with_accepted_gain
+from wam_studies.force_benchmark.trial import ForceTrial, inertia, knowable, perform, with_accepted_gain
+from wam_studies.force_benchmark.usual_tasks import rod
 from wam_studies.harness import chosen_cases
 
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
@@ -301,12 +303,37 @@ def test_required_shares_are_of_the_accepted_tasks() -> None:
     number = next(t.number for t in found[6:] if not t.task.conditions.is_dithered)
     left = held(0.0, event=REPORTED, is_stopped=True)
     found[number] = found[number]._replace(result=evaluated(DRAWN[number], left))
-    ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
+    ends = [t.result.outcome for t in found if not (t.task.conditions.is_dithered or t.task.mistake)]
     refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
     assert withdrawals == 1
     strict, wide = [row.found.observed for row in STUDY.score(found).rows if "joint sensors" in row.name]
     assert strict == len(ends) - refusals - withdrawals
     assert wide == len(ends) - refusals
+
+
+def test_a_task_is_feasible_where_its_force_can_be_known_or_something_does_it() -> None:
+    right, wrong = (evaluated(DRAWN[0], held(factor * DRAWN[0].force)) for factor in (1.0, 0.5))
+    sensed = DRAWN[0]._replace(conditions=DRAWN[0].conditions._replace(is_dithered=False))
+    trial = ForceTrial(7, 0, sensed, wrong, {"another": wrong}, knowable=0.5)
+    known, done = trial._replace(knowable=0.01), trial._replace(others={"another": right})
+    rows = {row.name: row.found for row in STUDY.score([trial, known, done, done._replace(result=right)]).rows}
+    assert rows["right, of the feasible, joint sensors"][::3] == (1 / 3, 3)
+
+
+def test_the_force_can_be_known_worse_the_rougher_the_surface_and_the_less_is_declared() -> None:
+    task = next(t for t in DRAWN if t.conditions.is_pinned and not t.conditions.is_dithered and not t.surface.is_plane)
+    smooth, rough = (
+        knowable(CONFIGURATION, task._replace(surface=task.surface._replace(friction=mu))) for mu in (0.0, 0.8)
+    )
+    anywhere = knowable(CONFIGURATION, task._replace(conditions=task.conditions._replace(is_pinned=False)))
+    assert 0.0 < smooth <= rough
+    assert anywhere > knowable(CONFIGURATION, task)
+
+
+@pytest.mark.parametrize("controller", [Admittance, TorqueControl])
+def test_what_a_user_would_write_presses_on_a_soft_rod_at_a_known_position(controller: type) -> None:
+    task = rod(CONFIGURATION, (0.0, -0.6, 0.0, 0.5), 0.3, 8.0)
+    assert perform(CONFIGURATION, task, controller=controller).mean == pytest.approx(8.0, rel=0.1)
 
 
 def test_cases_are_the_tasks_of_the_seed() -> None:
