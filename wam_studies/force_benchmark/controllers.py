@@ -1,7 +1,7 @@
 """What a user would write in place of the force loop, in a few lines each: what can be done at all.
 
 Both press along the commanded direction at the declared position, or at the estimated one, and measure the force by
-least squares of the estimated torques of the world.  They refuse nothing and limit nothing but their speed.
+the pseudoinverse of the Jacobian there.  They refuse nothing and limit nothing but their speed.
 """
 
 import math
@@ -56,9 +56,11 @@ class UsualController:
         velocity, effort = 2.0 * (self._start - q), np.zeros(len(q))
         size = math.hypot(*command.force) if command else 0.0
         if size:
-            lever = self._lever(joints.position, np.array(command.force) / size, inputs["contact/hypotheses"])
+            direction = np.array(command.force) / size
+            jacobian = self._jacobian(joints.position, inputs["contact/hypotheses"])
+            force = -float(direction @ np.linalg.pinv(jacobian.T, rcond=0.1) @ (self._torques - self._zero))
+            lever: Array = direction @ jacobian
             square = max(float(lever @ lever), 1e-4)
-            force = -float(lever @ (self._torques - self._zero)) / square
             velocity = velocity - lever * (float(lever @ velocity) / square)
             velocity, effort = self.press(lever, square, size, force, velocity, np.array(joints.velocity), inputs.dt)
         return {
@@ -67,15 +69,14 @@ class UsualController:
             "external_torque_zero": State([], [], [0.0] * len(q)),
         }
 
-    def _lever(self, q: list[float], direction: Array, hypotheses: Any) -> Array:
+    def _jacobian(self, q: list[float], hypotheses: Any) -> Array:
         own, covers = self._own, self._body.arm.covers
         cover, position = own.contact_cover, own.contact_position
         if own.contact_source != "pinned" and hypotheses:
             contact = contact_of(hypotheses, covers.names)
             if contact.cover and not math.isnan(contact.position):
                 cover, position = contact.cover, contact.position
-        lever: Array = direction @ self._body.point_jacobian(q, cover, (position, 0.0, 0.0))
-        return lever
+        return self._body.point_jacobian(q, cover, (position, 0.0, 0.0))
 
     def press(
         self, lever: Array, square: float, size: float, force: float, velocity: Array, moving: Array, dt: float
@@ -102,7 +103,7 @@ class Admittance(UsualController):
 class TorqueControl(UsualController):
     """The torque of the force, an integral of what is missing of it, and damping of the joints."""
 
-    INTEGRAL, SHARE, DAMPING, STIFFNESS = 2.0, 0.3, 4.0, 20.0  # 1/s, of the force, N m s/rad, N m/rad
+    INTEGRAL, SHARE, DAMPING, STIFFNESS = 4.0, 1.0, 4.0, 20.0  # 1/s, of the force, N m s/rad, N m/rad
     _missing = 0.0
 
     def press(
