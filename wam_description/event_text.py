@@ -59,7 +59,6 @@ SENTENCES: Final = {  # by cause
     "command what can be reached, another direction, or bend the arm",
     "force_strays": "{axis}: the force was reached, and is off by more than {allowed:b} {unit} again: {measured:.3g} "
     "{unit} of {desired:.3g} {unit}; the surface moves, something else pushes, or friction turns",
-    "rising": "{rising_sentence}",
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, and it is at {measured:.4g} {unit}; allowed: "
     "{allowed:.2g} {unit}, for {time:b} s: something is in the way, a joint is at its end, or the arm has no lever "
     "for it here",
@@ -95,10 +94,6 @@ SENTENCES: Final = {  # by cause
 }
 HOLDING: Final = "; the arm holds its position"
 SINCE: Final = ("and nothing was touched", "since the force last was right, or rose")
-RISING: Final = (
-    "the set point is {rising:.3g} {rising_unit} on its way to the command, {rising_to:.3g} {rising_unit}, at "
-    "{rising_limit}, {rising_rate:g} {rising_unit}/s: raise that, or command it for longer"
-)
 
 
 class _Sentence(string.Formatter):
@@ -140,8 +135,6 @@ def _parts(values: Mapping[str, Any]) -> dict[str, str]:
         is_joint = math.isnan(values["position"])
         where = values["cover"] if is_joint else f"{values['position']:.3g} m of {values['cover']}"
         found |= {"part_text": part, "part_help": helps, "where": where, "help": _help(values, helps)}
-    if "rising" in values:
-        found["rising_sentence"] = _fill(RISING, values)
     return found
 
 

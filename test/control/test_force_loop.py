@@ -380,25 +380,8 @@ def test_a_posture_that_is_not_reached_is_reported(gain: float, way: float, is_f
     assert loop.event.code is Code.NONE, "a force moves the arm away from it"
 
 
-@pytest.mark.parametrize(("mode", "rate", "given"), [
-    ("hybrid", {"force_rate_limit": 2.0}, {"force": 4.0}),
-    ("joint_torque", {"torque_rate_limit": 1.0}, {"torque": [0.0, -2.0, 0.0, 0.0]}),
-])  # fmt: skip
-def test_a_force_that_its_rate_limit_keeps_from_the_command_is_reported(
-    mode: str, rate: dict[str, float], given: dict[str, Any]
-) -> None:
-    loop, world = force_loop(ARM, replace(limited(settling_time=0.5), mode=mode, **rate)), World()
-    late = []
-    for _ in range(round(2.5 / DT)):
-        moved(loop, world, **given)
-        late.append(any(event.cause == "rising" for event in loop.events))
-    assert late.index(True) == pytest.approx(0.5 / DT, abs=2)
-    assert not any(late[round(2.1 / DT) :]), "the set point is the command"
-
-
 def test_with_the_brakes_nothing_moves_and_nothing_is_late() -> None:
-    own = replace(limited(settling_time=0.1), force_rate_limit=1.0)
-    loop, world = force_loop(ARM, own), World(1e-9)
+    loop, world = force_loop(ARM, limited(settling_time=0.1)), World(1e-9)
     goal = [POSE[0], POSE[1] + 1.0, *POSE[2:]]
     braked = world.joints._replace(effort=[0.0] * 4)
     for _ in range(round(0.5 / DT)):

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -301,24 +300,6 @@ def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_h
     )
     assert admitted(admission, posture=[0.1, 1e300, 0.0, 0.6]).refusals
     assert not admitted(admission, posture=list(ARM.joints.upper)).refusals
-
-
-def test_force_and_torque_rise_no_faster_than_their_limits() -> None:
-    own = replace(OWN, force_rate_limit=400.0, torque_rate_limit=200.0)  # 2 N and 1 N m in a period
-    admission = CommandAdmission(ARM.joints, ARM.covers, math.inf)
-    wanted = ForceCommand("base", (3.0, 0.0, -4.0))
-    sizes = [math.hypot(*admitted(admission, own, wanted).force.force) for _ in range(4)]
-    assert sizes == pytest.approx([2.0, 4.0, 5.0, 5.0])
-    assert admitted(admission, own, wanted).force is wanted, "what is within the limits is taken as it is"
-    turned = admitted(admission, own, ForceCommand("base", (3.0, 0.0, 4.0))).force
-    assert turned.force == pytest.approx((3.0, 0.0, -2.0))
-    assert admitted(admission, own, ForceCommand("outer_link", (0.0, 9.0, 0.0))).force.force == (0.0, 2.0, 0.0)
-    torques = [admitted(admission, own, torque=[2.5, 0.0, -0.5, 0.0]).torque for _ in range(3)]
-    assert np.array(torques) == pytest.approx(np.array([[1.0, 0, -0.5, 0], [2.0, 0, -0.5, 0], [2.5, 0, -0.5, 0]]))
-    admission.restart(ARM.joints.start)
-    assert admitted(admission, own, wanted, torque=[2.5, 0.0, 0.0, 0.0]).torque == [1.0, 0.0, 0.0, 0.0]
-    unlimited = admitted(CommandAdmission(ARM.joints, ARM.covers, math.inf), OWN, wanted)
-    assert unlimited.force is wanted, "the configured limit is above any step"
 
 
 @pytest.mark.parametrize(

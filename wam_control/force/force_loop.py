@@ -236,8 +236,6 @@ class ForceLoop:
         velocity, fed, limits = self._move(axes, known, found, contact, commands.posture, rate, is_braked, dt)
         found += limits
         found += self._watch_motions(axes, found, commands.posture if posture is not None else None, rate, dt)
-        if commands.rising and axes and commands.risen > own.limits.settling_time:
-            found.append(warning(Code.NOT_REACHED, "rising", **commands.rising))
         self.events = _by_seriousness(self._advised(found, done, axes))
         if self.event.holds:
             self.refusals["task_command" if task else "force_command"] = self.event

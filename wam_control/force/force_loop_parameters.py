@@ -111,7 +111,6 @@ class ForceLoopParameters:
         "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
     )
     force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
-    force_rate_limit: float = tunable("largest rate at which the desired force follows its command", "N/s", low=1.0)
     torque_gain: tuple[float, ...] = tunable(
         "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", high=100.0
     )
@@ -123,9 +122,6 @@ class ForceLoopParameters:
         "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
     )
     torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
-    torque_rate_limit: float = tunable(
-        "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0
-    )
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
     force_feedforward: float = tunable(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
