@@ -365,11 +365,6 @@ class ForceLoop:
         if holds:
             inertia = self._axes.forces.moved_inertia(self._q)
             wanted = run.held.velocity(self._q, self._hold_at(axes, found), inertia, allowed, own)
-            least += [
-                self._no_harder(axis, belief, factor)
-                for axis, belief in zip(axes, known, strict=True)
-                if axis.sensed is not None and axis.desired and belief.sd < math.inf and self._has_way(found)
-            ]
         else:
             run.held.at = None
             rows = self._rows(axes, known, factor, dt)
@@ -398,19 +393,6 @@ class ForceLoop:
             return q
         along = axes[0].along
         return self._run.free_at - along * (FORCE.way_back / float(along @ along))  # friction would hold it in less
-
-    def _has_way(self, found: Sequence[Event]) -> bool:
-        """Whether an arm that holds has not moved as far as it may."""
-        if self._run.held.at is None or any(event.holds and event.code is Code.AT_LIMIT for event in found):
-            return False
-        here, there = (self._body.tool_pose(q).position for q in (self._q, self._run.held.at))
-        return float(np.linalg.norm(here - there)) <= self.parameters.limits.free_travel
-
-    def _no_harder(self, axis: CommandedAxis, known: Belief, factor: float) -> VelocityRow:
-        """An arm that holds presses no harder than commanded, as far as the force is known."""
-        assert axis.sensed is not None
-        gain = factor * max(self.parameters.force_gain) * axis.sensed.speed_fraction
-        return VelocityRow(-axis.along, min(gain * (known.force - axis.desired - known.sd), self._fastest(axis)))
 
     def _fastest(self, axis: CommandedAxis) -> float:
         """Largest speed along an axis, m/s or rad/s."""
