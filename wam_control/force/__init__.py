@@ -18,6 +18,7 @@
 ``friction_trial``         the sampled loop with saturation and friction, for an arm of one joint
 ``friction_verdict``       domain, stable error and limit cycle of one friction node, chapter 5
 ``guard``                  admits a parameter set, scales its gains while the arm moves, reports
+``guarded``                what is controlled, as the guard sees it
 ``held_arm``               an arm that holds, and an arm that is pushed
 ``limits``                 what bounds the motion
 ``loop_design``            the guard's model for a force loop of your own

@@ -133,10 +133,14 @@ class ForceAxes:
     arm : the arm as the controller knows it.
     body : its kinematics and dynamics.
     parameters : of sensing.
+
+    Attributes
+    ----------
+    covers : of the arm.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: SensingParameters) -> None:
-        self._body, self._covers, self._parameters = body, arm.covers, parameters
+        self._body, self.covers, self._parameters = body, arm.covers, parameters
         through = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)
         self._rotors = through.at_joints(arm.motors.inertia)
@@ -169,13 +173,13 @@ class ForceAxes:
 
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
-        point = (position, *self._covers.aside(cover, position))
+        point = (position, *self.covers.aside(cover, position))
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
-        covers = self._covers
+        covers = self.covers
         point = np.array([position, *covers.aside(cover, position)])
         point += covers.radius_of(cover) * (self._body.cover_pose(q, cover).rotation.T @ normal)
         return self._body.point_jacobian(q, cover, point), point
@@ -218,10 +222,10 @@ class ForceAxes:
                 lever, zero, zero, zero, math.inf, 0.0, 0.0, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
         size = max(force, FORCE.sized_force)
-        length = self._covers.length_of(cover)
+        length = self.covers.length_of(cover)
         aside = self._push(q, cover, direction)
         # the end of a link is round, and other forces at the same position press the surface as well
-        is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
+        is_side = position + 2.0 * position_sd < length - self.covers.radius_of(cover) and not others
         push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
         tangential = friction @ jacobian

@@ -25,12 +25,13 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
+from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
 from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time
-from wam_control.force.problem import VelocityRow, linear, solve
-from wam_control.force.stability_guard import GuardAssessment, Guarded, GuardedContact, GuardedForces
+from wam_control.force.problem import VelocityRow, solve
+from wam_control.force.stability_guard import GuardAssessment, Guarded
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
-from wam_control.force.thresholds import FORCE, GUARD
+from wam_control.force.thresholds import FORCE
 from wam_control.thresholds import MOTION
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.event import OBEYED, Code, Event, holding, refused, warning
@@ -353,7 +354,7 @@ class ForceLoop:
         """Joint velocities and torques (n,), and what limits them."""
         own, run, q = self.parameters, self._run, np.array(self._q)
         holds = any(event.holds for event in found)
-        factor = self._gain_factor(axes, contact, dt)
+        factor = self._supervision.factor(lambda: self._guarded(axes, contact), dt) if axes else 1.0
         wanted = np.clip(
             own.posture_gain * (np.array(posture) + run.approached - q) + (0.0 if rate is None else np.array(rate)),
             -own.joint_speed_limit,
@@ -508,6 +509,10 @@ class ForceLoop:
         torques = torques._replace(now=now)
         return self._pushed.step(self._q, forces, torques, contact, chi2, allowed, bool(pressed), gain, own, dt)
 
+    def _guarded(self, axes: Sequence[CommandedAxis], contact: Contact) -> list[Guarded]:
+        """What is controlled now, for the guard."""
+        return guarded(self._q, axes, contact, self._axes.forces, self.parameters, self._supervision)
+
     def _at_ends(self, unlimited: Array, velocity: Array) -> list[Event]:
         """The joints that do not move on at their ends."""
         own, joints = self.parameters, self._body.arm.joints
@@ -582,64 +587,6 @@ class ForceLoop:
             )
         )
         return [event.with_values(**self._run.advice.ways) if event.cause == "error" else event for event in found]
-
-    def _gain_factor(self, axes: Sequence[CommandedAxis], contact: Contact, dt: float) -> float:
-        """The guard's factor of the gains."""
-        if not axes:
-            return 1.0
-        if self.parameters.mode == "joint_torque" and all(axis.is_joint for axis in axes):
-            return self._supervision.factor(lambda: self._torques_at(contact), dt)
-        return self._supervision.factor(
-            lambda: [one for each in self._possible(axes) for one in self._guarded(each)], dt
-        )
-
-    def _torques_at(self, contact: Contact) -> list[Guarded]:
-        """Where the torques of the joints press, for the guard: at the estimated contact, or anywhere on the cover."""
-        own, covers = self.parameters, self._body.arm.covers
-        place = ContactPlace(covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
-        positions = [(place.position, place.position_sd)]
-        if own.schedule == "position" and not place.is_known:
-            positions = [(part * covers.length_of(place.cover), 0.0) for part in GUARD.positions]
-        return [each for position in positions for each in self._supervision.contacts(self._q, place.cover, *position)]
-
-    def _possible(self, axes: Sequence[CommandedAxis]) -> list[Sequence[CommandedAxis]]:
-        """The axes, and where the gains follow the position, and it is not known, those of other positions."""
-        place = axes[0].place
-        if self.parameters.schedule != "position" or len(axes) > 1 or place is None or place.is_known:
-            return [axes]
-        length = self._body.arm.covers.length_of(place.cover)
-        pressed = [place._replace(position=part * length, position_sd=0.0) for part in GUARD.positions]
-        sensed = [self._axes.forces.axis(self._q, each.pressed(axes[0].direction, axes[0].desired)) for each in pressed]
-        return [
-            [axes[0]._replace(sensed=axis, along=axis.lever, place=each)]
-            for axis, each in zip(sensed, pressed, strict=True)
-        ]
-
-    def _guarded(self, axes: Sequence[CommandedAxis]) -> list[GuardedForces]:
-        """What is controlled, for the guard: all contacts at once; none where nothing is sensed at a point."""
-        contacts = [
-            GuardedContact(tuple(self._q), *axis.place[:3], _triple(axis.direction), axis.desired or FORCE.hand)
-            for axis in axes
-            if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < math.inf
-        ]
-        if not contacts:
-            return []
-        own, n = self.parameters, len(self._q)
-        move, left = linear([axis.along for axis in axes], n)
-        hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
-        for i, axis in enumerate(axes):
-            if axis.of.is_sensed:
-                sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
-            if axis.is_force:
-                move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
-                gain[:, i] = self._supervision.gains(axis.of.joint, axis.in_frame.tolist())
-            elif axis.of.kind is not AxisKind.VELOCITY:
-                rate = own.task.largest_rate
-                if axis.of.kind is AxisKind.IMPEDANCE:
-                    damping = own.task.damping(axis.of)
-                    rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
-                hold = hold + rate * np.outer(move[:, i], axis.along)
-        return [GuardedForces(tuple(contacts), sense, move, gain[0], gain[1], hold)]
 
 
 def _task(commands: Commands, task: TaskCommand | None, own: ForceLoopParameters) -> tuple[TaskCommand | None, object]:

@@ -1,0 +1,83 @@
+"""What the force loop controls, as its guard sees it: the linear part of the problem of a period."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wam_control.force.axes import CommandedAxis
+from wam_control.force.contact_place import ContactPlace
+from wam_control.force.force_axis import ForceAxes
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.guard import Supervision
+from wam_control.force.problem import linear
+from wam_control.force.stability_guard import Guarded, GuardedContact, GuardedForces
+from wam_control.force.task import AxisKind, TaskAxis
+from wam_control.force.thresholds import FORCE, GUARD
+from wam_description.signals import Contact
+
+
+def guarded(
+    q: Sequence[float],
+    axes: Sequence[CommandedAxis],
+    contact: Contact,
+    forces: ForceAxes,
+    own: ForceLoopParameters,
+    supervision: Supervision,
+) -> list[Guarded]:
+    """Where the commanded axes press: at all contacts at once; nothing where nothing is sensed at a point.
+
+    Where the gains follow a position that is not known, it is looked for at several ones.
+
+    Parameters
+    ----------
+    q : joint angles (n,), rad.
+    axes : that are commanded.
+    contact : estimated.
+    forces : how forces are sensed.
+    own : parameters of the force loop.
+    supervision : its gains.
+    """
+    covers = forces.covers
+    if own.mode == "joint_torque" and all(axis.is_joint for axis in axes):  # they press wherever something is
+        place = ContactPlace(covers).step(TaskAxis(AxisKind.FORCE, position=None), contact, 0.0, own)
+        positions = [(place.position, place.position_sd)]
+        if own.schedule == "position" and not place.is_known:
+            positions = [(part * covers.length_of(place.cover), 0.0) for part in GUARD.positions]
+        return [each for position in positions for each in supervision.contacts(q, place.cover, *position)]
+    at = axes[0].place
+    if own.schedule != "position" or len(axes) > 1 or at is None or at.is_known:
+        return list(_linear(q, axes, own, supervision))
+    found: list[Guarded] = []
+    for part in GUARD.positions:
+        there = at._replace(position=part * covers.length_of(at.cover), position_sd=0.0)
+        sensed = forces.axis(q, there.pressed(axes[0].direction, axes[0].desired))
+        found += _linear(q, [axes[0]._replace(sensed=sensed, along=sensed.lever, place=there)], own, supervision)
+    return found
+
+
+def _linear(
+    q: Sequence[float], axes: Sequence[CommandedAxis], own: ForceLoopParameters, supervision: Supervision
+) -> list[GuardedForces]:
+    contacts = []
+    for axis in axes:
+        if axis.place is not None and axis.sensed is not None and axis.sensed.force_sd < np.inf:
+            x, y, z = axis.direction.tolist()
+            contacts.append(GuardedContact(tuple(q), *axis.place[:3], (x, y, z), axis.desired or FORCE.hand))
+    if not contacts:
+        return []
+    n = len(q)
+    move, left = linear([axis.along for axis in axes], n)
+    hold, sense, gain = own.posture_gain * left, np.zeros((len(axes), n)), np.zeros((2, len(axes)))
+    for i, axis in enumerate(axes):
+        if axis.of.is_sensed:
+            sense[i] = axis.along if axis.sensed is None else axis.sensed.sense
+        if axis.is_force:
+            move[:, i] *= 1.0 if axis.sensed is None else axis.sensed.speed_fraction
+            gain[:, i] = supervision.gains(axis.of.joint, axis.in_frame.tolist())
+        elif axis.of.kind is not AxisKind.VELOCITY:
+            rate = own.task.largest_rate
+            if axis.of.kind is AxisKind.IMPEDANCE:
+                damping = own.task.damping(axis.of)
+                rate, gain[0, i] = axis.of.stiffness / damping, 1.0 / damping
+            hold = hold + rate * np.outer(move[:, i], axis.along)
+    return [GuardedForces(tuple(contacts), sense, move, gain[0], gain[1], hold)]
