@@ -117,7 +117,7 @@ def with_accepted_gain(configuration: Configuration) -> Configuration:
     shared = configuration.shared
     warned = configuration.with_values({"force_loop:guard.mode": "warn"})
     own = warned.node("force_loop", ForceLoopParameters)
-    found = ForceLoop(shared.arm, shared.servo, own, shared.timing).assessment
+    found = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).assessment
     if found is None or not found.reason:
         return configuration
     fraction = 0.99 * found.scale * own.guard.stability_fraction
