@@ -28,6 +28,7 @@ ARROWS = {
         "wam_theory", "wam_description", "wam_bag", "wam_driver", "wam_control", "wam_ros", "wam_sim", "wam_analysis",
         "wam_live", "wam_studies",
     },
+    "wam_stack": {"wam_description", "wam_bag", "wam_control", "wam_sim", "wam_analysis"},
 }  # fmt: skip
 # package -> all that it may import of others; the rest take what they need
 DEPENDENCIES = {
@@ -291,6 +292,7 @@ def plant_a_sound_tree(root: Path) -> None:
         "wam_studies/press.py": "from wam_analysis import report\nimport wam_driver.plant\nimport wam_sim",
         "wam_live/page.py": "import viser\nimport rclpy\nfrom wam_ros import messages\nfrom wam_analysis import report",
         "wam_studies/losses.py": "import rclpy\nimport wam_ros.messages\nfrom wam_studies import press",
+        "wam_stack/simulate.py": "from wam_sim.simulation import Simulation",
         "wam_cli/main.py": "import importlib",
         "wam_cli/commands/up.py": "import rclpy\nimport wam_ros.messages\nfrom wam_studies import press\nprint(1)",
     }

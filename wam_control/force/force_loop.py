@@ -443,8 +443,6 @@ class ForceLoop:
         if axis.sensed is None:
             return factor * self._supervision.torque_law.velocity(axis.of.joint, error, before, dt)
         law = self._supervision.force_law.along(axis.in_frame.tolist())
-        if axis.place is not None and axis.place.is_in_doubt:
-            error = self._unidentified(axis, error)
         if own.limits.impact:
             band = resolution(axis.sensed, axis.desired, own) * (2.0 if one.is_kept else 1.0)
             one.is_kept = one.watch.touch.is_there and abs(error) < band
@@ -455,22 +453,6 @@ class ForceLoop:
             most = approach_speed(axis, one.watch.touch.is_there, own)
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
-
-    def _unidentified(self, axis: CommandedAxis, error: float) -> float:
-        """The error, N, while it is not known which link is touched: none may be pressed harder than commanded.
-
-        The force is taken for that in the middle of another link, and, going on, for that near its base, where the same
-        torques are those of a larger force.  The motors identify a link only by a large force.
-        """
-        parts = [(FORCE.middle, -math.inf)] + ([] if self.parameters.is_estimated else [(FORCE.near_base, 0.0)])
-        for part, least in parts:
-            for cover, length in zip(self._body.arm.covers.names, self._body.arm.covers.length, strict=True):
-                pressed = ForcePlace(cover, part * length, 0.0).pressed(axis.direction, axis.desired)
-                sensed = self._axes.forces.axis(self._q, pressed)
-                if sensed.force_sd <= FORCE.vague * axis.desired:
-                    force = -float(sensed.sense @ self._measurement.torques.now)
-                    error = min(error, max(axis.desired - force, least))
-        return error
 
     def _slowed(self, axes: Sequence[CommandedAxis], rows: Sequence[VelocityRow], wanted: Array) -> Array:
         """Velocities of the posture (n,), rad/s, at which the forces stay right."""

@@ -1,0 +1,150 @@
+"""What people use of the stack from Python, in one place; each package below it can be imported as well.
+
+========  ===================================================
+load      a configuration, with values of your own
+simulate  play a scenario on the simulated arm, without ROS
+read      the numbers in a bag
+analyse   what a recording shows, and what is wrong with it
+guard     how stable the force loop of a configuration is
+identify  the model of the controllers, from a recording
+arm       kinematics, Jacobians and gravity torques
+========  ===================================================
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wam_analysis.findings.analysis import Analysis
+from wam_analysis.findings.analysis import analyse as _analyse
+from wam_analysis.identification.contradictions import contradictions, sentence
+from wam_analysis.identification.fit import identify as _identify
+from wam_analysis.identification.motion import recorded_motion
+from wam_analysis.identification.overlay import model_values
+from wam_analysis.identification.report import report
+from wam_bag.bag import read
+from wam_control.force.force_loop import ForceLoop
+from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.guard import Report
+from wam_control.task.scenario import ScenarioStep, load_for
+from wam_description.configuration import Configuration, packaged
+from wam_description.rigid_body import RigidBody
+from wam_sim.recording import recorded_run
+from wam_sim.simulation import Simulation
+
+__all__ = ["IdentifiedModel", "analyse", "arm", "guard", "identify", "load", "read", "simulate"]
+
+Named = str | Path | Configuration
+
+
+def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> Configuration:
+    """A configuration.
+
+    Parameters
+    ----------
+    name : of one that comes with the package, or a YAML file.
+    values : in place of its own, as ``{"timing.mode": "realtime", "force_loop:force_gain": [0.01]}``.
+
+    Raises
+    ------
+    ParameterError
+        names the parameter and what is allowed.
+    """
+    path = Path(name)
+    configuration = Configuration.load(path if path.suffix in (".yaml", ".yml") else packaged(str(name)))
+    configuration = configuration.with_values(values) if values else configuration
+    _ = configuration.shared  # checks it
+    return configuration
+
+
+def simulate(
+    configuration: Named = "wam", scenario: str | Path | Sequence[ScenarioStep] = "demo_scenario"
+) -> Simulation:
+    """Play a scenario to its end on the simulated arm: the same nodes and numbers as in lockstep.
+
+    Parameters
+    ----------
+    configuration : or its name or file.
+    scenario : name or file, or its steps.
+
+    Returns
+    -------
+    Simulation
+        `rows` has what was published on each topic, `nodes` and `driver` are what was simulated.
+
+    Raises
+    ------
+    RuntimeError
+        where the scenario could not be played to its end; the text says why.
+    """
+    found = _loaded(configuration)
+    steps = load_for(found, str(scenario)) if isinstance(scenario, str | Path) else scenario
+    run = Simulation(found, steps)
+    if reason := run.play():
+        raise RuntimeError(reason)
+    return run
+
+
+def analyse(recording: str | Path | Mapping[str, Any]) -> Analysis:
+    """What a recording shows: of this stack or of another robot, as a bag, a CSV file or a table such as a DataFrame.
+
+    Raises
+    ------
+    BagError
+        where it cannot be read, or is empty.
+    """
+    return _analyse(recording, lambda doing: None)
+
+
+def guard(configuration: Named = "wam") -> Report:
+    """The stability of the force loop at its configured posture: one line, whether it is a warning, and numbers.
+
+    Raises
+    ------
+    ParameterError
+        where the guard does not accept the gains; the text names those that it does.
+    """
+    found = _loaded(configuration)
+    shared, own = found.shared, found.node("force_loop", ForceLoopParameters)
+    return ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
+
+
+class IdentifiedModel(NamedTuple):
+    """The model of the controllers as a recording shows it.
+
+    Attributes
+    ----------
+    values : of the parameters, for `load`.
+    contradictions : why it cannot be true of the configured arm, none where it can.
+    text : the same with standard deviations, for people.
+    """
+
+    values: dict[str, Any]
+    contradictions: list[str]
+    text: str
+
+
+def identify(bag: str | Path, configuration: Named = "wam") -> IdentifiedModel:
+    """Friction, masses and centres of mass of the arm, from a bag of free motion.
+
+    Raises
+    ------
+    BagError
+        where the bag cannot be read.
+    ValueError
+        where the motion shows nothing of them.
+    """
+    shared = _loaded(configuration).shared
+    motion = recorded_motion(recorded_run(read(bag, may_lack=True)), shared.arm)
+    found = _identify(shared, motion)
+    against = [sentence(one) for one in contradictions(shared, motion, found)]
+    return IdentifiedModel(model_values(shared, found, Path(bag).name), against, report(shared, found, str(bag)))
+
+
+def arm(configuration: Named = "wam") -> RigidBody:
+    """Kinematics and dynamics of the arm of a configuration: poses, Jacobians, gravity torques, inertia."""
+    return RigidBody(_loaded(configuration).shared.arm)
+
+
+def _loaded(configuration: Named) -> Configuration:
+    return configuration if isinstance(configuration, Configuration) else load(configuration)
