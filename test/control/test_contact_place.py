@@ -55,27 +55,27 @@ def test_a_pinned_place_is_not_overridden_and_known_as_well_as_declared(contact:
 
 
 @pytest.mark.parametrize(
-    ("axis", "contact", "lean", "where", "is_known", "is_in_doubt"),
+    ("axis", "contact", "lean", "where", "is_known"),
     [
-        (force(), NO_CONTACT, 0.0, (OUTER, 0.28, ANYWHERE), False, False),
-        (force(INNER), NO_CONTACT, 0.0, (INNER, COVERS.length_of(INNER) / 2, ...), False, False),
-        (force(), SURE, 0.0, (OUTER, 0.1, 0.001), True, False),
-        (force(), SURE._replace(position_sd=math.nan), 0.0, (OUTER, 0.1, 0.0), True, False),
-        (force(), SURE._replace(cover=INNER), 0.0, (INNER, 0.1, 0.001), True, False),
-        (force(), SURE._replace(position=math.nan), 0.0, (OUTER, LENGTH / 2, ...), False, False),
-        (force(), SURE._replace(probability=0.5), 0.0, (OUTER, 0.28, ANYWHERE), False, True),
-        (force(OUTER), SURE._replace(cover=INNER), 0.0, (OUTER, 0.28, ANYWHERE), False, True),
-        (force(), SURE, math.radians(25.0), (OUTER, 0.1, 0.001), True, False),
-        (force(), SURE, math.radians(35.0), (OUTER, 0.28, ANYWHERE), False, False),
+        (force(), NO_CONTACT, 0.0, (OUTER, 0.28, ANYWHERE), False),
+        (force(INNER), NO_CONTACT, 0.0, (INNER, COVERS.length_of(INNER) / 2, ...), False),
+        (force(), SURE, 0.0, (OUTER, 0.1, 0.001), True),
+        (force(), SURE._replace(position_sd=math.nan), 0.0, (OUTER, 0.1, 0.0), True),
+        (force(), SURE._replace(cover=INNER), 0.0, (INNER, 0.1, 0.001), True),
+        (force(), SURE._replace(position=math.nan), 0.0, (OUTER, LENGTH / 2, ...), False),
+        (force(), SURE._replace(probability=0.5), 0.0, (OUTER, 0.28, ANYWHERE), False),
+        (force(OUTER), SURE._replace(cover=INNER), 0.0, (OUTER, 0.28, ANYWHERE), False),
+        (force(), SURE, math.radians(25.0), (OUTER, 0.1, 0.001), True),
+        (force(), SURE, math.radians(35.0), (OUTER, 0.28, ANYWHERE), False),
     ],
 )
 def test_an_estimated_place_is_used_where_it_is_good_enough(
-    axis: TaskAxis, contact: Contact, lean: float, where: tuple[str, float, float], is_known: bool, is_in_doubt: bool
+    axis: TaskAxis, contact: Contact, lean: float, where: tuple[str, float, float], is_known: bool
 ) -> None:
     found = at(axis, contact, lean)
     assert found[:2] == (where[0], pytest.approx(where[1]))
     assert where[2] is ... or found.position_sd == pytest.approx(where[2])
-    assert (found.is_pinned, found.is_known, found.is_in_doubt) == (False, is_known, is_in_doubt)
+    assert (found.is_pinned, found.is_known) == (False, is_known)
     is_rejected = lean > math.radians(30.0)
     assert bool(found.rejection) is is_rejected
 

@@ -67,7 +67,7 @@ def tries(
     own : parameters of the force loop.
     """
     (force,) = task.axes
-    pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True, is_in_doubt=False)
+    pinned = place._replace(position_sd=own.contact_position_sd, is_pinned=True, is_known=True)
 
     def is_obeyed(pose: Sequence[float], where: ForcePlace, size: float) -> bool:
         (axis,) = axes.of(pose, task._replace(axes=(force._replace(value=size),)), [where], [1.0])

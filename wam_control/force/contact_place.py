@@ -25,7 +25,6 @@ class ForcePlace(NamedTuple):
     is_pinned : whether the command or the parameters give it.
     is_known : whether it is pinned, or estimated well enough while something is touched.
     is_touched : whether it is where the estimator finds the one contact, well enough or not.
-    is_in_doubt : whether something is touched, and it is neither pinned nor known on which link.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     """
 
@@ -35,7 +34,6 @@ class ForcePlace(NamedTuple):
     is_pinned: bool = False
     is_known: bool = False
     is_touched: bool = False
-    is_in_doubt: bool = False
     rejection: str = ""
 
     def pressed(self, direction: Array, force: float) -> PressedForce:
@@ -93,7 +91,7 @@ class ContactPlace:
         cover = axis.cover or parameters.contact_cover
         assumed = parameters.contact_position if cover == parameters.contact_cover else math.nan
         where = self._last or self._estimated(cover, assumed, 0.0, is_known=False)
-        return where._replace(is_in_doubt=bool(contact.cover) and not is_identified, rejection=rejection)
+        return where._replace(rejection=rejection)
 
     def _estimated(self, cover: str, position: float, sd: float, is_known: bool = True) -> ForcePlace:
         """A position and its standard deviation, m; one that is not known is anywhere on the cover."""
