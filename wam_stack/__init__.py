@@ -75,7 +75,7 @@ def simulate(
     Raises
     ------
     RuntimeError
-        where the scenario could not be played to its end; the text says why.
+        where the scenario could not be played to its end; the text has the reason.
     """
     found = _loaded(configuration)
     steps = load_for(found, str(scenario)) if isinstance(scenario, str | Path) else scenario

@@ -334,7 +334,7 @@ def configured(base: Configuration, task: Task) -> Configuration:
 
 
 def declared(base: Configuration, task: Task) -> float:
-    """Position, m, at which the user says that the first surface is touched."""
+    """Position, m, at which the user declares the first surface."""
     length = base.shared.arm.covers.length_of(task.surface.cover)
     return min(max(task.surface.position + task.mistake, 0.0), length)
 
