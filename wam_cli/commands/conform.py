@@ -9,6 +9,10 @@ from wam_cli.options import COUNT, bounded, configuration_of, take_configuration
 from wam_description.configuration import Configuration
 from wam_description.driver_contract import DriverContract
 from wam_description.interface import declared
+from wam_driver.bus.dry_run import heard, sent
+from wam_driver.bus.interface import BusParameters
+from wam_driver.bus.lines import line_of
+from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
@@ -26,6 +30,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL",
         help="bus of a configuration for a real arm: can0, or INTERFACE:CHANNEL of python-can; simulated:200 is a "
         "simulated one with firmware 200",
+    )
+    parser.add_argument(
+        "--dry-run",
+        type=bounded(float, 0.1, 3600.0, "s"),
+        metavar="SECONDS",
+        help="instead: listen to the bus for so long without sending a frame, then print what the driver would send",
     )
     parser.add_argument(
         "--running",
@@ -62,6 +72,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Print the rows as they are found; 1 where one is wrong."""
     configuration = driver_alone(on_bus(configuration_of(given), given.bus))
+    if given.dry_run:
+        return _listen(configuration, given.dry_run)
     print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
@@ -79,6 +91,23 @@ def run(given: argparse.Namespace) -> int:
                 driver.close()
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)
+
+
+def _listen(configuration: Configuration, seconds: float) -> int:
+    """Print what is on the bus, and what the driver would send."""
+    if "interface" not in configuration.sections.get("driver", {}):
+        raise ValueError("--dry-run is for a driver on a bus; give its configuration, as --config barrett-wam4-bus")
+    own = configuration.node("driver", BusParameters)
+    line = line_of(configuration.shared, own)
+    print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
+    try:
+        print(*heard(line, seconds), sep="\n")
+    finally:
+        line.close()
+    version = BUS.described_firmware
+    print(f"\nwhat the driver would send to an arm with firmware {version}, and how often:")
+    print(*sent(configuration.shared, own, version), sep="\n")
+    return 0
 
 
 def driver_alone(configuration: Configuration) -> Configuration:

@@ -8,5 +8,7 @@
 - bus_fault: what is wrong, as data
 - arm_bus: the driver, one call per period
 - interface, bus_driver: the node, also for a bus of your own
+- lines: the bus that the parameters name
+- dry_run: what is on the bus, and what would be sent
 - simulator: controllers, safety module and a person, in bus time
 """

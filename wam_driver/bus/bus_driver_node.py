@@ -15,10 +15,7 @@ from wam_description.signals import Answer, NodeStatus, State
 from wam_description.transmission_map import TransmissionMap
 from wam_description.urdf import urdf
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.interface import BusParameters
-from wam_driver.bus.line import CanLine, Line
-from wam_driver.bus.simulator import SimulatedBus
-from wam_driver.plant import Plant
+from wam_driver.bus.lines import SIMULATED, line_of
 from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 from wam_ros.messages import Refused
@@ -117,8 +114,8 @@ class BusDriver(TolerantNode):
         """The motors: those of the production WAM on its bus."""
         arm, timing = shared.arm, shared.timing
         home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        line = simulated_line(shared, own) if own.interface == "simulated" else real_line(own)
-        if own.interface != "simulated":
+        line = line_of(shared, own)
+        if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
         return ArmBus(line, arm.motors.torque_constant, home, timing.period)
 
@@ -244,29 +241,3 @@ class BusDriver(TolerantNode):
         super().destroy_node()
         self.hardware.close()
         self._place.close()
-
-
-def simulated_line(shared: Shared, own: BusParameters) -> Line:
-    """A simulated bus with the plant of the configuration; its firmware has the version `channel`."""
-    arm, timing = shared.arm, shared.timing
-    plant = Plant(arm, own.world, own.effects, timing.substep, own.friction)
-    return SimulatedBus(arm, plant, timing.substep, int(own.channel))
-
-
-def real_line(own: BusParameters) -> Line:
-    """A bus of python-can.
-
-    Raises
-    ------
-    ParameterError
-        where python-can is not installed, or cannot open the bus.
-    """
-    try:
-        import can
-
-        bus = can.Bus(interface=own.interface, channel=own.channel or None)
-    except ImportError as error:
-        raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
-    except (can.CanError, OSError, ValueError) as error:
-        raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, time.perf_counter, time.sleep)

@@ -1,0 +1,67 @@
+"""A dry run of the driver on a bus: nothing is sent, and what would be sent is what is sent."""
+
+import re
+
+import can
+import pytest
+
+from wam_description.configuration import Configuration, packaged
+from wam_driver.bus import frames
+from wam_driver.bus.dry_run import heard, in_words, sent
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
+from wam_driver.bus.interface import BusParameters
+from wam_driver.bus.lines import line_of
+
+BUS4 = Configuration.load(packaged("barrett-wam4-bus"))
+
+
+def virtual(name: str) -> BusParameters:
+    return BUS4.with_values({"driver:interface": "virtual", "driver:channel": name}).node("driver", BusParameters)
+
+
+def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
+    with can.Bus(interface="virtual", channel="dry") as other:
+        line = line_of(BUS4.shared, virtual("dry"))
+        for count in (100, 200, 300):
+            position = frames.position(2, count)
+            other.send(can.Message(arbitration_id=position.identifier, data=position.data, is_extended_id=False))
+        found = list(heard(line, 0.1))
+        assert other.recv(0.0) is None
+        line.close()
+    assert [re.sub(" +", " ", text).strip() for text in found] == ["3 443 00 01 2c controller 2 is at 300 counts"]
+
+
+def test_a_silent_bus_is_no_fault() -> None:
+    line = line_of(BUS4.shared, virtual("silent"))
+    (text,) = heard(line, 0.05)
+    line.close()
+    assert "the bus is silent while no driver asks" in text
+
+
+@pytest.mark.parametrize("version", [60, 200])
+def test_what_would_be_sent_has_every_step_of_the_start_and_no_torque(version: int) -> None:
+    own = BUS4.with_values({"driver:interface": "simulated", "driver:channel": str(version)}).node(
+        "driver", BusParameters
+    )
+    found = list(sent(BUS4.shared, own, version))
+    remarks = [text for text in found if text.startswith("--")]
+    assert [part in "\n".join(remarks) for part in ("wake up", "confirm_home", "each period")] == [True] * 3
+    torques = [text for text in found if "torques" in text and not text.startswith("--")]
+    assert torques
+    assert all("torques [0, 0, 0, 0] counts" in text for text in torques)
+    assert any("set ZERO to 1" in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        (frames.get(3, 48), "host to controller 3: get P"),
+        (frames.put(BusNode.SAFETY_MODULE, 8, 1), "host to safety module: set MODE to 1"),
+        (frames.reply(1, 5, 2), "controller 1 has STAT = 2"),
+        (frames.torques(BusGroup.ARM, 42, [1, -2, 3, -4]), "host to group 1: torques [1, -2, 3, -4] counts"),
+        (Frame(Bit.GROUP | BusGroup.MOTORS, b""), "host: no data"),
+        (frames.get(3, 127), "host to controller 3: get property 127"),
+    ],
+)
+def test_a_frame_in_words(frame: Frame, text: str) -> None:
+    assert in_words(frame, 200).endswith(text)

@@ -1,0 +1,42 @@
+"""The bus that the parameters of a driver name: one of python-can, or the simulated one."""
+
+import time
+
+from wam_description.arm import Shared
+from wam_description.parameters import ParameterError
+from wam_driver.bus.interface import BusParameters
+from wam_driver.bus.line import CanLine, Line
+from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.plant import Plant
+
+SIMULATED = "simulated"
+
+
+def line_of(shared: Shared, own: BusParameters) -> Line:
+    """The line to the bus of a driver.
+
+    Raises
+    ------
+    ParameterError
+        where python-can is not installed, or cannot open the bus.
+    """
+    return simulated_line(shared, own, int(own.channel)) if own.interface == SIMULATED else _real_line(own)
+
+
+def simulated_line(shared: Shared, own: BusParameters, version: int, is_homed: bool = True) -> Line:
+    """A simulated bus with the plant of the configuration and firmware of a version; whether the zero is known."""
+    arm, timing = shared.arm, shared.timing
+    plant = Plant(arm, own.world, own.effects, timing.substep, own.friction)
+    return SimulatedBus(arm, plant, timing.substep, version, is_homed)
+
+
+def _real_line(own: BusParameters) -> Line:
+    try:
+        import can
+
+        bus = can.Bus(interface=own.interface, channel=own.channel or None)
+    except ImportError as error:
+        raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
+    except (can.CanError, OSError, ValueError) as error:
+        raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
+    return CanLine(bus, time.perf_counter, time.sleep)
