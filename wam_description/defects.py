@@ -4,13 +4,14 @@ Messages that come over topics and what a node returns are refused for the same 
 returns may be any sequence of numbers, as a numpy array; the others get lists and tuples of Python's own.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
 from math import isfinite, isinf, isnan
 from typing import Any
 
 import numpy as np
 
-from wam_description.signals import Point, State, Table, Wrench
+from wam_description.arm import Arm
+from wam_description.signals import BASE, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
 
 Check = Callable[[Any], Any]  # the value in lists and tuples of floats; raises UnusableOutput
@@ -25,38 +26,43 @@ class UnusableOutput(ValueError):
         super().__init__(f"node '{node}' returned an {self.what}")
 
 
-def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence[str], arrays: str) -> Check:
+def owners(topic: Topic, arm: Arm) -> tuple[str, ...]:
+    """The motors or joints of the numbers of a JointState topic, in their order."""
+    return arm.motors.names if topic.side == "motors" else arm.joints.names
+
+
+def frames(arm: Arm) -> tuple[str, ...]:
+    """The frames that a force, a point or a table may have."""
+    return (BASE, *arm.covers.names)
+
+
+def defect_finder(topic: Topic, arm: Arm, arrays: str) -> Callable[[Any], str]:
+    """What finds the defect of a value of a topic, '' where there is none.
+
+    Parameters
+    ----------
+    topic : row of the table of topics, of one of the types that carry numbers.
+    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+    """
+    names, wanted, allowed = owners(topic, arm), frozenset(arrays.split()), frames(arm)
+    finders: dict[str, Callable[[Any], str]] = {
+        JOINT_STATE: lambda value: state_defect(value, names, wanted),
+        WRENCH: lambda value: wrench_defect(value, allowed),
+        POINT: lambda value: point_defect(value, allowed),
+        TABLE: lambda value: table_defect(value, topic.columns, allowed),
+    }
+    return finders[topic.type]
+
+
+def output_check(node: str, topic: Topic, defect_of: Callable[[Any], str] = lambda value: "") -> Check:
     """What refuses an unusable output of a node, and returns another as the nodes of the stack take it.
 
     Parameters
     ----------
     node : its name.
     topic : row of the table of topics, of one of the types that carry numbers.
-    names : of motors or joints, in the order of the numbers of a JointState.
-    frames : that a force, a point or a table may have.
-    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+    defect_of : see `defect_finder`; without it NaN, too, is a value, as where no other node takes the output.
     """
-    defect_of: Callable[[Any], str] = {
-        JOINT_STATE: lambda value: state_defect(value, names, arrays),
-        WRENCH: lambda value: wrench_defect(value, frames),
-        POINT: lambda value: point_defect(value, frames),
-        TABLE: lambda value: table_defect(value, topic.columns, frames),
-    }[topic.type]
-    return _converting(node, topic, defect_of)
-
-
-def conversion(node: str, topic: Topic) -> Check:
-    """What makes an output that no other node takes into lists and tuples of floats; NaN, too, is a value there.
-
-    Parameters
-    ----------
-    node : its name.
-    topic : row of the table of topics, of one of the types that carry numbers.
-    """
-    return _converting(node, topic, lambda value: "")
-
-
-def _converting(node: str, topic: Topic, defect_of: Callable[[Any], str]) -> Check:
     kind, convert = _KINDS[topic.type], _AS_TAKEN[topic.type]
 
     def check(value: Any) -> Any:
@@ -116,24 +122,26 @@ _AS_TAKEN: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def state_defect(state: State, owners: Sequence[str], arrays: str) -> str:
+def state_defect(state: State, owners: Sequence[str], wanted: Collection[str]) -> str:
     """What is wrong with positions, velocities and torques of motors or joints.
 
     Parameters
     ----------
     state : the values.
     owners : motors or joints in the order of the values.
-    arrays : that must be filled; one with a '?' may be empty.
+    wanted : arrays that must be filled.
     """
-    wanted, count = arrays.split(), len(owners)
+    count = len(owners)
     for name, values in zip(State._fields, state, strict=True):
         if len(values) != count and (len(values) or name in wanted):
             return f"{name} has {len(values)} values; send {count}, one for each of {', '.join(owners)}"
-        for value, owner in zip(values, owners, strict=False):
-            if not isfinite(value):
+        limit = LARGEST[name]
+        for value in values:
+            if not -limit <= value <= limit:  # NaN, too
+                owner = owners[[-limit <= one <= limit for one in values].index(False)]
+                if isfinite(value):
+                    return f"{name} of {owner} is {value:g}; {_allowed(limit)}"
                 return f"{name} of {owner} is {value}; send finite numbers"
-            if abs(value) > LARGEST[name]:
-                return f"{name} of {owner} is {value:g}; {_allowed(LARGEST[name])}"
     return ""
 
 
@@ -143,11 +151,13 @@ def wrench_defect(wrench: Wrench, frames: Sequence[str]) -> str:
         return f"frame_id is '{wrench.frame}'; allowed are {', '.join(frames)}"
     if [len(vector) for vector in wrench[1:]] != [3, 3]:
         return f"force {wrench.force} N, torque {wrench.torque} N m; send three numbers for each"
-    if not all(isfinite(value) for value in (*wrench.force, *wrench.torque)):
-        return f"force {wrench.force} N, torque {wrench.torque} N m; send finite numbers"
     for name, unit, vector in (("force", "N", wrench.force), ("torque", "N m", wrench.torque)):
-        if (most := max(map(abs, vector))) > LARGEST[name]:
-            return f"{name} has {most:g} {unit}; {_allowed(LARGEST[name])}"
+        limit = LARGEST[name]
+        for value in vector:
+            if not isfinite(value):
+                return f"force {wrench.force} N, torque {wrench.torque} N m; send finite numbers"
+            if abs(value) > limit:
+                return f"{name} has {abs(value):g} {unit}; {_allowed(limit)}"
     return ""
 
 
@@ -171,14 +181,14 @@ def table_defect(table: Table, columns: Sequence[str], frames: Sequence[str]) ->
         return f"frame_id is '{table.frame}'; allowed are {', '.join(frames)}"
     if sizes := {len(row) for row in table.rows} - {len(columns)}:
         return f"a row has {min(sizes)} numbers; send {len(columns)}: {', '.join(columns)}"
-    if any(isinf(value) for row in table.rows for value in row):
-        return "a number is infinite; send finite numbers, or NaN where one is not known"
+    known = columns_of(tuple(columns))
     for row in table.rows:
-        for (name, largest, may_be_unknown), value in zip(columns_of(tuple(columns)), row, strict=True):
-            if isnan(value) and not may_be_unknown:
-                return f"{name} is nan; send a finite number"
-            if abs(value) > largest:
+        for value, (name, largest, may_be_unknown) in zip(row, known, strict=True):
+            if abs(value) <= largest or (may_be_unknown and isnan(value)):
+                continue
+            if isfinite(value):
                 return f"{name} is {value:g}; {_allowed(largest)}, or NaN where it is not known"
+            return f"{name} is {value}; send a finite number{', or NaN where it is not known' * may_be_unknown}"
     for link in (row[0] for row in table.rows if columns[0] == LINK):
         if link not in range(len(frames) - 1):
             return f"link is {link}; send the index of one of {', '.join(frames[1:])}"

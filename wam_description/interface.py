@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
-from wam_description.defects import Check, UnusableOutput, conversion, output_check
+from wam_description.defects import Check, UnusableOutput, defect_finder, output_check
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError, meant
-from wam_description.signals import BASE
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
@@ -196,12 +195,9 @@ class Interface:
             taken = [item.arrays for one in self.declarations.values() for item in one.taken if item.topic == name]
             taken += ["effort" for one in self.declarations.values() if name in one.listens]  # the driver, currents
             topic = self.topics.get(name)
-            if topic is not None and topic.is_numbers and not taken:
-                found[name] = conversion(declaration.name, topic)
-            elif topic is not None and topic.is_numbers:
-                names = self._arm.motors.names if topic.side == "motors" else self._arm.joints.names
-                frames = (BASE, *self._arm.covers.names)
-                found[name] = output_check(declaration.name, topic, names, frames, needed_arrays(taken))
+            if topic is not None and topic.is_numbers:
+                finder = [defect_finder(topic, self._arm, needed_arrays(taken))] * bool(taken)
+                found[name] = output_check(declaration.name, topic, *finder)
         return found
 
     def feeds(self, declaration: Declaration, node: Any) -> dict[str, list["Feed"]]:

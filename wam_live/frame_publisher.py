@@ -12,8 +12,9 @@ from wam_description.arm import Shared
 from wam_description.frames import ArmFrames, FramePlacement
 from wam_description.topics import BY_NAME
 from wam_live.thresholds import LIVE
-from wam_ros.messages import Refused, read_joint_state
-from wam_ros.topics import NAMESPACE, header, qos, stamp_of
+from wam_ros.messages import Refused
+from wam_ros.topics import NAMESPACE, header, qos
+from wam_ros.wire import decoder, stamp_of
 
 
 class FramesNode(Node):
@@ -31,7 +32,8 @@ class FramesNode(Node):
 
     def __init__(self, context: Any, namespace: str, shared: Shared, prefix: str) -> None:
         super().__init__("frames", context=context, namespace=namespace)
-        self._frames, self._names = ArmFrames(shared.arm, prefix), list(shared.arm.joints.names)
+        self._frames = ArmFrames(shared.arm, prefix)
+        self._decode = decoder(BY_NAME["joint_states"], shared, "position")
         self._period = shared.timing.outer_period_ns * shared.timing.display_divisor
         self._last = -self._period
         place = "/" if prefix or namespace.strip("/") == NAMESPACE else ""
@@ -39,14 +41,14 @@ class FramesNode(Node):
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._fixed = self.create_publisher(TFMessage, f"{place}tf_static", latched)
         self._fixed.publish(TFMessage(transforms=[_message(one, 0) for one in self._frames.fixed]))
-        self.create_subscription(JointState, "joint_states", self._take, qos(BY_NAME["joint_states"]))
+        self.create_subscription(JointState, "joint_states", self._take, qos(BY_NAME["joint_states"]), raw=True)
 
-    def _take(self, message: JointState) -> None:
-        stamp = stamp_of(message)
+    def _take(self, data: bytes) -> None:
+        stamp = stamp_of(data)
         if 0 <= stamp - self._last < self._period:
             return
         try:
-            q = read_joint_state(message, self._names, "position").position
+            q = self._decode(data).position
         except Refused as refusal:
             self.get_logger().warning(f"joint_states: {refusal}", throttle_duration_sec=5.0)
             return

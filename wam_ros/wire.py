@@ -1,33 +1,36 @@
-"""The fast path between bytes on the wire (CDR) and values, for the four types that carry numbers and the clock.
+"""The codec between bytes on the wire (CDR) and values.
 
-`wam_ros.messages` does the same through message objects; it is the reference, and whatever does not have
-the expected layout (another byte order, other names or their order, other arrays) goes through it, so that both
-refuse the same.  Padding is written as zeros.  benchmarks/README.md shows the gain.
+The types that carry numbers, and the clock, have a fast path: messages of one layout differ in their numbers alone.
+Whatever has another layout (another byte order, other names or their order, other arrays) goes through a message object
+and `wam_ros.messages`.  Both give the same values, which are checked alike.  Padding is written as zeros.
+benchmarks/README.md shows the gain.
 """
 
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from itertools import chain, product
-from typing import Any, TypeVar
+from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Bool, String
 
 from wam_bag.cdr import Pattern, first_stamp
-from wam_description.arm import Shared
-from wam_description.signals import BASE, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, TIME, TRAJECTORY, WRENCH, Topic, columns_of
+from wam_description.arm import Arm, Shared
+from wam_description.defects import defect_finder, frames, owners
+from wam_description.signals import Point, State, Table, Wrench
+from wam_description.topics import BOOL, JOINT_STATE, POINT, STRING, TABLE, TIME, TRAJECTORY, WRENCH, Topic
+from wam_description.wiring import mask
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.messages import Refused, message_type, most_rows, reader, writer
+from wam_ros.markers import contact_markers
+from wam_ros.messages import Refused, message_type, most_rows, reader
 
-_LARGEST = tuple(LARGEST[name] for name in State._fields)
-_LARGEST_WRENCH = (LARGEST["force"],) * 3 + (LARGEST["torque"],) * 3
 _NO_HEADER = ((0, 0), "")  # stamp and frame
 _FLOAT64 = 8  # sensor_msgs/PointField
 _STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
 Encode = Callable[[int, Any], bytes]
 Decode = Callable[[bytes], Any]
-Key = TypeVar("Key")
+Numbers = list[tuple[float, ...]]
 
 
 def stamp_of(data: bytes) -> int:
@@ -36,21 +39,29 @@ def stamp_of(data: bytes) -> int:
 
 
 def encoder(topic: Topic, shared: Shared) -> Encode:
-    """What turns a stamp in ns and a value into a serialized message of a topic."""
-    if topic.type == JOINT_STATE:
-        names = _names(topic, shared)
-        return lambda stamp, value: _joint_state(names, stamp, value)
-    if topic.type == WRENCH:
-        return lambda stamp, value: _wrench(value.frame).pack(stamp, (*value.force, *value.torque))
-    if topic.type == POINT:
-        return lambda stamp, value: _point(value.frame).pack(stamp, value.position)
-    if topic.type == TABLE:
-        return lambda stamp, value: _packed_table(topic.columns, stamp, value)
-    if topic.type == TIME:
-        clock = Pattern(TIME, _NO_HEADER[:1])
-        return lambda stamp, value: clock.pack(stamp)
-    write = writer(topic, shared)
-    return lambda stamp, value: bytes(serialize_message(write(stamp, value)))
+    """What turns a stamp in ns and a value into a serialized message of a topic.
+
+    Raises
+    ------
+    TypeError
+        where no step can return a value for a topic of this type.
+    """
+    names, clock = owners(topic, shared.arm), Pattern(TIME, _NO_HEADER[:1])
+    encoders: dict[str, Encode] = {
+        JOINT_STATE: lambda stamp, value: _state(names, tuple(map(len, value))).pack(stamp, *value),
+        WRENCH: lambda stamp, value: _wrench(value.frame).pack(stamp, (*value.force, *value.torque)),
+        POINT: lambda stamp, value: _point(value.frame).pack(stamp, value.position),
+        TABLE: lambda stamp, value: _packed_table(topic.columns, stamp, value),
+        TIME: lambda stamp, value: clock.pack(stamp),
+        BOOL: lambda stamp, value: bytes(serialize_message(Bool(data=bool(value)))),
+        STRING: lambda stamp, value: bytes(serialize_message(String(data=value))),
+        "visualization_msgs/msg/MarkerArray": lambda stamp, value: bytes(
+            serialize_message(contact_markers(stamp, value))
+        ),
+    }
+    if topic.type not in encoders:
+        raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the output of a step")
+    return encoders[topic.type]
 
 
 def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
@@ -60,29 +71,27 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
     ----------
     topic : row of the table of topics.
     shared : names of motors, joints and covers.
-    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty, others are left empty.
     """
-    kind, read = message_type(topic), reader(topic, shared, arrays)
+    kind, read = message_type(topic), reader(topic, shared.arm)
 
     def slowly(data: bytes) -> Any:
         return read(deserialized(data, kind, topic.type))
 
-    frames = (BASE, *shared.arm.covers.names)
-    if topic.type == JOINT_STATE:
-        wanted = arrays.split()
-        names = _names(topic, shared)
-        # which arrays are filled, as far as that is allowed
-        filled = product(*((True,) if name in wanted else (True, False) for name in State._fields))
-        states = [(there, _state(names, tuple(len(names) * each for each in there))) for there in filled]
-        taken = [name in wanted or name + "?" in wanted for name in State._fields]
-        return lambda data: _read_state(data, states, taken) or slowly(data)
-    if topic.type == WRENCH:
-        wrenches = [(frame, _wrench(frame)) for frame in frames]
-        return lambda data: _read_wrench(data, wrenches) or slowly(data)
-    if topic.type == TABLE:
-        most = most_rows(topic, shared)
-        return lambda data: _read_table(data, topic.columns, frames, most) or slowly(data)
-    return _repeated(slowly) if topic.type == TRAJECTORY else slowly
+    if topic.type == TRAJECTORY:
+        return _repeated(slowly)
+    find, defect_of = _finder(topic, shared.arm), defect_finder(topic, shared.arm, arrays)
+    masked = mask(arrays) if topic.type == JOINT_STATE else None
+
+    def decode(data: bytes) -> Any:
+        value = find(data)
+        if value is None:
+            value = slowly(data)
+        if defect := defect_of(value):
+            raise Refused(defect)
+        return masked(value) if masked else value
+
+    return decode
 
 
 def deserialized(data: bytes, kind: Any, name: str) -> Any:
@@ -115,10 +124,6 @@ def _repeated(decode: Decode) -> Decode:
     return take
 
 
-def _names(topic: Topic, shared: Shared) -> tuple[str, ...]:
-    return shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names
-
-
 @cache
 def _state(names: tuple[str, ...], counts: tuple[int, ...]) -> Pattern:
     return Pattern(JOINT_STATE, (_NO_HEADER, names, *((0.0,) * count for count in counts)))
@@ -143,88 +148,54 @@ def _table(columns: tuple[str, ...], frame: str, rows: int) -> Pattern:
     )
 
 
-def _joint_state(names: tuple[str, ...], stamp: int, value: State) -> bytes:
-    position, velocity, effort = value
-    counts = len(position), len(velocity), len(effort)
-    return _state(names, counts).pack(stamp, position, velocity, effort)
-
-
 def _packed_table(columns: tuple[str, ...], stamp: int, value: Table) -> bytes:
-    rows = value.rows
-    return _table(columns, value.frame, len(rows)).pack(stamp, tuple(chain.from_iterable(rows)))
+    return _table(columns, value.frame, len(value.rows)).pack(stamp, tuple(chain.from_iterable(value.rows)))
 
 
-def _found(data: bytes, patterns: list[tuple[Key, Pattern]]) -> tuple[Key, list[tuple[float, ...]]] | None:
-    """The key of the pattern of a message and its numbers, None where it has none; the newest is tried first."""
-    for i, (key, pattern) in enumerate(patterns):
-        numbers = pattern.numbers(data)
-        if numbers is not None:
-            if i:
-                patterns.insert(0, patterns.pop(i))
-            return key, numbers
-    return None
+def _finder(topic: Topic, arm: Arm) -> Decode:
+    """What finds the value in a message of a known layout, None in any other; the newest layout is tried first."""
+    if topic.type == TABLE:
+        return partial(_find_table, topic.columns, frames(arm), most_rows(topic, arm))
+    known: list[tuple[Pattern, Callable[[Numbers], Any]]]
+    if topic.type == JOINT_STATE:
+        names = owners(topic, arm)
+        known = [(_state(names, counts), _as_state) for counts in product((len(names), 0), repeat=3)]
+    elif topic.type == WRENCH:
+        known = [(_wrench(frame), partial(_as_wrench, frame)) for frame in frames(arm)]
+    else:
+        known = [(_point(frame), partial(_as_point, frame)) for frame in frames(arm)]
 
-
-def _read_state(data: bytes, patterns: list[tuple[tuple[bool, ...], Pattern]], taken: list[bool]) -> State | None:
-    """The value, None where the message has to be looked at more closely."""
-    found = _found(data, patterns)
-    if found is None:
+    def find(data: bytes) -> Any:
+        for i, (pattern, value_of) in enumerate(known):
+            if (numbers := pattern.numbers(data)) is not None:
+                if i:
+                    known.insert(0, known.pop(i))
+                return value_of(numbers)
         return None
-    _, numbers = found
-    arrays: list[list[float]] = []
-    for i in range(3):
-        values = list(numbers[i])
-        limit = _LARGEST[i]
-        for value in values:
-            if not -limit <= value <= limit:  # NaN, too
-                return None
-        arrays.append(values if taken[i] else [])
-    return State(*arrays)
+
+    return find
 
 
-def _read_wrench(data: bytes, patterns: list[tuple[str, Pattern]]) -> Wrench | None:
-    """The value, None where the message has to be looked at more closely."""
-    found = _found(data, patterns)
-    if found is None:
-        return None
-    frame, (numbers,) = found
-    for value, limit in zip(numbers, _LARGEST_WRENCH, strict=True):
-        if not -limit <= value <= limit:  # NaN, too
-            return None
-    fx, fy, fz, tx, ty, tz = numbers
+def _as_state(numbers: Numbers) -> State:
+    position, velocity, effort = numbers
+    return State(list(position), list(velocity), list(effort))
+
+
+def _as_wrench(frame: str, numbers: Numbers) -> Wrench:
+    fx, fy, fz, tx, ty, tz = numbers[0]
     return Wrench(frame, (fx, fy, fz), (tx, ty, tz))
 
 
-@cache
-def _table_limits(columns: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """The largest magnitude of each column, and which ones may not be NaN."""
-    found = columns_of(columns)
-    return tuple(column.largest for column in found), tuple(
-        i for i, column in enumerate(found) if not column.may_be_unknown
-    )
+def _as_point(frame: str, numbers: Numbers) -> Point:
+    x, y, z = numbers[0]
+    return Point(frame, (x, y, z))
 
 
-def _read_table(data: bytes, columns: tuple[str, ...], frames: tuple[str, ...], most: int) -> Table | None:
-    """The value, None where the message has to be looked at more closely."""
-    step = 8 * len(columns)
+def _find_table(columns: tuple[str, ...], frames: tuple[str, ...], most: int, data: bytes) -> Table | None:
     for frame in frames:
-        count = (len(data) - _table(columns, frame, 0).size) // step
-        if count > most:
-            continue
-        numbers = _table(columns, frame, max(count, 0)).numbers(data)
-        if numbers is not None:
-            break
-    else:
-        return None
-    rows = tuple(zip(*[iter(numbers[0])] * len(columns), strict=True))
-    largest, known = _table_limits(columns)
-    for row in rows:
-        for number, limit in zip(row, largest, strict=True):
-            if abs(number) > limit:
-                return None
-        for i in known:
-            if row[i] != row[i]:
-                return None
-    if columns[0] == LINK and any(row[0] not in range(len(frames) - 1) for row in rows):
-        return None
-    return Table(frame, rows)
+        count = (len(data) - _table(columns, frame, 0).size) // (8 * len(columns))
+        if 0 <= count <= most:
+            numbers = _table(columns, frame, count).numbers(data)
+            if numbers is not None:
+                return Table(frame, tuple(zip(*[iter(numbers[0])] * len(columns), strict=True)))
+    return None

@@ -177,8 +177,8 @@ def test_a_trajectory_message_is_matched_by_name() -> None:
     ("given", "reason"),
     [
         (message(), "0 points; send 1 to"),
-        (message([1.0]), "position of point 0 has 1 values; send 4"),
-        (message([float("nan")] * 4), "position of point 0 is nan"),
+        (message([1.0]), "point 0: position has 1 values; send 4"),
+        (message([float("nan")] * 4), "point 0: position of joint1 is nan"),
         (message([0.0] * 4, names=NAMES[:3]), "name 'joint4' is missing"),
     ],
 )

@@ -14,11 +14,13 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ZERO, State, Wrench
 from wam_description.topics import BY_NAME
-from wam_ros.messages import joint_state, message_type, wrench_stamped
+from wam_ros.messages import joint_state, message_type
 from wam_ros.topics import qos, stamp_of
+from wam_ros.wire import encoder
 
 MS = 1_000_000
 NAMES = list(ARM.joints.names)
+FORCE = encoder(BY_NAME["force_command"], WAM.shared)
 WALL = 1_700_000_000_000_000_000  # ns, a wall clock
 CARRYING = RigidBody(ARM).gravity_torque([0.0, -1.8, 0.0, 1.45]).tolist()  # N m: nothing touches
 
@@ -41,7 +43,7 @@ class Feeder:
         """One state, with a force commanded unless it is None."""
         self.stamp += 5 * MS
         if newtons is not None:
-            force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, torque)))
+            force = FORCE(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, torque)))
             self._publishers["force_command"].publish(force)
         sensed = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, CARRYING)
         self._publishers["joint_sensors"].publish(joint_state(self.stamp, ARM.joints.names, sensed))
@@ -175,8 +177,8 @@ def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_pat
 @pytest.mark.parametrize(
     ("topic", "message", "reason"),
     [
-        ("force_command", lambda stamp: wrench_stamped(stamp, Wrench("outer", ZERO, ZERO)), "frame_id is 'outer'"),
-        ("force_command", lambda stamp: wrench_stamped(WALL, Wrench("base", ZERO, ZERO)), "ahead of the newest state"),
+        ("force_command", lambda stamp: FORCE(stamp, Wrench("outer", ZERO, ZERO)), "frame_id is 'outer'"),
+        ("force_command", lambda stamp: FORCE(WALL, Wrench("base", ZERO, ZERO)), "ahead of the newest state"),
         ("joint_posture_command", lambda stamp: joint_state(stamp, NAMES, State([0.0] * 3, [], [])), "has 3 values"),
         ("joint_posture_command", lambda stamp: joint_state(stamp, [], State([0.0] * 4, [], [])), "is missing"),
     ],

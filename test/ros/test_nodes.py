@@ -23,12 +23,13 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
-from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status, wrench_stamped
+from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
 from wam_ros.ports import READY
 from wam_ros.testing import Network, RunningArm, playing
 from wam_ros.topics import DEPTH, qos, stamp_of
+from wam_ros.wire import encoder
 from wam_studies.faults.answered_clock import AnsweredClock
 
 PLAYING = ("scenario", "recorder")
@@ -422,7 +423,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
     row = BY_NAME["sim/disturbance"]
     publisher = hand.ros.node("pusher").create_publisher(message_type(row), row.name, qos(row))
     hand.ros.wait(publisher.get_subscription_count)
-    refusals = hand.node._ports.refusals.counts
+    refusals, push = hand.node._ports.refusals.counts, encoder(row, WAM.shared)
     zero = (0.0, 0.0, 0.0)
     for k, wrench in enumerate(
         [
@@ -432,14 +433,14 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
             Wrench("outer_link", (501.0, 0.0, 0.0), zero),
         ]
     ):
-        publisher.publish(wrench_stamped(hand.driver.stamp, wrench))
+        publisher.publish(push(hand.driver.stamp, wrench))
         hand.ros.wait(lambda k=k: refusals["sim/disturbance"] == k + 1)
     assert hand.driver.plant.loads() == []
-    publisher.publish(wrench_stamped(hand.driver.stamp, Wrench("outer_link", (0.0, 2.0, 0.0), (0.0, 0.0, 0.6))))
+    publisher.publish(push(hand.driver.stamp, Wrench("outer_link", (0.0, 2.0, 0.0), (0.0, 0.0, 0.6))))
     hand.ros.wait(hand.driver.plant.loads)
     (load,) = hand.driver.plant.loads()
     assert (load.cover, load.position) == ("outer_link", pytest.approx(0.3))
-    publisher.publish(wrench_stamped(hand.driver.stamp, Wrench("base", zero, zero)))
+    publisher.publish(push(hand.driver.stamp, Wrench("base", zero, zero)))
     hand.ros.wait(lambda: not hand.driver.plant.loads())
 
 

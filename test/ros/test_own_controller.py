@@ -15,7 +15,7 @@ from wam_bag.bag import JointColumns
 from wam_control.task.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.defects import UnusableOutput, conversion
+from wam_description.defects import UnusableOutput, output_check
 from wam_description.event import Level
 from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
@@ -512,7 +512,7 @@ def test_an_output_that_no_other_node_takes_is_refused_where_it_holds_no_numbers
 ) -> None:
     """It was published as other numbers than those that were returned, or in an order that nobody chose."""
     with pytest.raises(UnusableOutput) as refusal:
-        conversion("careless", BY_NAME[topic])(given)
+        output_check("careless", BY_NAME[topic])(given)
     assert str(refusal.value).startswith(f"node 'careless' returned an unusable {topic}: ")
     assert text in str(refusal.value)
 
