@@ -2,167 +2,177 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.event import RAISED, Code, Event, Level, fault
-from wam_description.interface import Interface, declared
-from wam_description.signals import BASE, Answer, NodeStatus, Point, State, Wrench
-from wam_description.status import PAUSED
-from wam_description.urdf import urdf
-from wam_driver.driver import Driver, DriverParameters
+from wam_description.event import Event
+from wam_description.interface import declared
+from wam_description.signals import BASE, Answer, Point, State, Wrench
+from wam_driver.arm_driver_node import ArmDriver
+from wam_driver.driver import Driver
 from wam_driver.lockstep import Lockstep
 from wam_driver.pacer import Pacer
 from wam_driver.realtime import Realtime
-from wam_driver.safety import Mode
-from wam_driver.session import Session
 from wam_driver.thresholds import DRIVER
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.network import take_place
-from wam_ros.parameters import declare, follow
-from wam_ros.ports import Ports
-from wam_ros.tolerance import TolerantNode
+from wam_ros.parameters import follow
 
 
-class DriverNode(TolerantNode):
+class DriverNode(ArmDriver):
     """Publishes the state of the arm and takes currents; `Lockstep` or `Realtime` advances its time."""
 
     def __init__(self, **ros: Any) -> None:
-        super().__init__("driver", **ros)
-        self._place = take_place(self, "driver")
-        shared, own = declare(self, DriverParameters)
+        super().__init__(declared("driver"), **ros)
+        shared, own = self.shared, self.own
+        timing, interface = shared.timing, self.interface
         self.driver = Driver(shared, own)
+        self.safety = self.driver.safety
         follow(self, own, lambda new: self.driver.set_effects(new.effects))
-        self._ports = ports = Ports(self, declared("driver"), shared, Interface(shared))
-        self._arm, self._timing = shared.arm, shared.timing
         self._directory = own.post_mortem_directory
-        self._motors = list(shared.arm.motors.names)
-        self._frames = (BASE, *shared.arm.covers.names)
-        self._reported = ("", False, 0, 0, False)
-        self._connected = self._started = False
-        self._answered = 0  # newest state, ns, that a command has answered
-        self._mode = self.driver.safety.mode
-        is_lockstep = shared.timing.mode == "lockstep"
-        chain = [name for name, one in ports.interface.declarations.items() if one.reactions]
-        self._session = Session(chain, 0 if is_lockstep else int(time.time() * 1e3))  # ms: no driver before had it
-        ports.takes_problem = self._take_problem
-        ports.feed("motor_current_command", self._take_currents, "effort")
-        ports.feed("sim/disturbance", self._take_push)
-        ports.watch_peers(self._take_status)
-        self.time: Lockstep | Realtime
-        if is_lockstep:
-            self.time = Lockstep(
-                self.driver,
-                shared.timing,
-                self._senders(shared.nodes),
-                ports.interface.unanswered,
-                self._session,
-                self._publish,
-                self._announce,
-                self._fault,
-                Pacer(shared.timing.real_time_factor, time.perf_counter),
-                time.perf_counter,
-            )
-        else:
-            self.time = Realtime(
-                self.driver,
-                shared.timing,
-                own.watchdog,
-                own.late_periods,
-                self._publish,
-                time.perf_counter,
-                lambda: ports.held_up(STEPS.nodes),
-            )
-            advice = self.driver.stale_advice
-            senders = ports.interface.publishers("motor_current_command")
-            self.driver.stale_advice = lambda: self._with_lateness(ports.held_up(senders) or advice())
-        for name, kind, answer in (
-            ("enable", SetBool, self._enable),
-            ("pause", SetBool, self._pause),
-            ("estop", Trigger, lambda _: self.driver.estop()),
-            ("reset_fault", Trigger, lambda _: self.driver.reset_fault()),
-            ("reset", Trigger, lambda _: self.driver.reset()),
-            ("step", Trigger, lambda _: self.time.step()),
-        ):
-            self.create_service(kind, f"~/{name}", self._served(answer))
-        ports.publish("robot_description", 0, urdf(shared.arm))
+        self._started = timing.mode == "realtime"
+        self.inlets.feed("sim/disturbance", self._take_push)
+        self.serve("pause", SetBool, self._pause)
+        self.serve("reset", Trigger, lambda _: self.driver.reset())
+        self.serve("step", Trigger, lambda _: self.time.step())
         self._try_post_mortem()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
-        if isinstance(self.time, Lockstep):
+        self.time: Lockstep | Realtime
+        if timing.mode == "lockstep":
+            self.time = Lockstep(
+                self.driver,
+                timing,
+                self._senders(),
+                interface.unanswered,
+                self.session,
+                self._publish,
+                self.announce,
+                self.trip,
+                Pacer(timing.real_time_factor, time.perf_counter),
+                time.perf_counter,
+            )
             self.create_timer(DRIVER.watch, self._watch_lockstep, clock=steady)
-            if factor := shared.timing.real_time_factor:
-                self.create_timer(shared.timing.period / factor, self.time.go_on, clock=steady)
-        else:
-            self._started = True
-            ports.waits = lambda: bool(ports.absent) or self.time.settles()
-            self._announce()  # in lockstep the first status goes to all peers
-            self.create_timer(shared.timing.period, self.time.tick, clock=steady)
-            self.create_timer(DRIVER.status_period, ports.repeat_taken_status, clock=steady)
-            self.time.start()
+            if timing.real_time_factor:
+                self.create_timer(timing.period / timing.real_time_factor, self.time.go_on, clock=steady)
+            return  # the first status goes to all peers
+        self.time = Realtime(
+            self.driver,
+            timing,
+            own.watchdog,
+            own.late_periods,
+            self._publish,
+            time.perf_counter,
+            lambda: self.peers.held_up(STEPS.nodes),
+        )
+        advice, senders = self.driver.stale_advice, interface.publishers("motor_current_command")
+        self.driver.stale_advice = lambda: "; ".join(
+            filter(None, (self.peers.held_up(senders) or advice(), self.lateness))
+        )
+        self.announce()
+        self.create_timer(timing.period, self.time.tick, clock=steady)
+        self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
+        self.time.start()
+
+    def _senders(self) -> dict[str, str]:
+        """Who answers the state of a period in lockstep, by topic."""
+        topics = ["motor_current_command", *(["sim/disturbance"] if "scenario" in self.shared.nodes else [])]
+        return {topic: " and ".join(self.interface.publishers(topic)) or "its publisher" for topic in topics}
 
     def destroy_node(self) -> None:
         """Put on the brakes and report it."""
-        self.driver.disable()
-        self._announce()
-        self.get_logger().info(f"{self._timing.mode}: {self.time.summary}")
-        self._ports.wait_for_delivery()
+        self.get_logger().info(f"{self.shared.timing.mode}: {self.time.summary}")
         super().destroy_node()
-        self._place.close()
 
-    def raise_priority(self) -> None:
-        """Ask the system to prefer this process."""
-        self._ports.raise_priority(is_first=True)
+    # the motors
 
-    def take_fault(self, reason: str) -> None:
-        """Brake where a callback raised."""
-        if reason:
-            self._fault(fault(RAISED, reason=reason))
+    @property
+    def stamp(self) -> int:
+        """Time of the present state, ns."""
+        return self.driver.stamp
 
-    def _senders(self, nodes: Sequence[str]) -> dict[str, str]:
-        """Who answers the state of a period in lockstep, by topic."""
-        topics = ["motor_current_command", *(["sim/disturbance"] if "scenario" in nodes else [])]
-        return {topic: " and ".join(self._ports.interface.publishers(topic)) or "its publisher" for topic in topics}
+    def command(self, stamp: int, currents: list[float]) -> None:
+        """Take currents, A, that answer the state of a stamp, ns."""
+        self.time.take_currents(stamp, currents)
 
-    # what comes in
+    def release(self, obstacle: str) -> Answer:
+        """Release the brakes, unless an obstacle is named."""
+        return self.driver.enable(obstacle)
 
-    def _take_currents(self, stamp: int, command: State) -> None:
-        if not 0 < stamp <= self.driver.stamp:
-            raise Refused(
-                f"stamp {stamp} ns is not that of a state that was sent, newest {self.driver.stamp} ns; "
-                "answer a state with its own stamp"
-            )
-        if stamp <= self._answered:
-            self._ports.claims.stray("motor_current_command")
-        self._answered = stamp
-        self.time.take_currents(stamp, command.effort)
+    def brake(self) -> Answer:
+        """Put on the brakes at once."""
+        return self.driver.disable()
 
-    def _take_status(self, status: NodeStatus) -> None:
-        """Brake where another node reports a fault; note which session it follows."""
-        self._session.hear(status)
-        if status.level is Level.ERROR and status.fault:
-            found = [one.values["topic"] for one in status.events if one.code is Code.FAULT and "topic" in one.values]
-            late = f"; {self.time.lateness}" if self.time.lateness else ""
-            self._fault(fault("node", node=status.node, fault=status.fault, late=late, topic=next(iter(found), "")))
+    def clear(self) -> Answer:
+        """Clear a latched fault; the arm stays braked."""
+        return self.driver.reset_fault()
 
-    def _with_lateness(self, reason: str) -> str:
-        """The reason, and that the computer may be the cause of it where many periods are late."""
-        return "; ".join(filter(None, (reason, self.time.lateness)))
+    def trip(self, event: Event) -> None:
+        """Brake and latch a fault."""
+        self.driver.fault(event)
+        self.announce()
 
-    def _take_problem(self, problem: Event | None) -> None:
-        if problem and self.driver.safety.mode is Mode.ENABLED:
-            self.driver.fault(problem)
-        self._announce()
+    def obstacle(self) -> str:
+        """What speaks against a release of the brakes in the time of the arm."""
+        return self.time.obstacle()
 
-    def end(self) -> None:
-        """Put on the brakes at once; the others hear of it when the node is destroyed."""
-        self.driver.disable()
-        self._announce()
+    @property
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What a person should know, though the arm may move."""
+        return tuple(self.driver.warnings)
+
+    @property
+    def lateness(self) -> str:  # type: ignore[override]
+        """How many periods were late and what to do about it, '' where few were."""
+        return self.time.lateness
+
+    @property
+    def is_paused(self) -> bool:  # type: ignore[override]
+        """Whether the time of the arm is stopped."""
+        return self.time.is_paused
+
+    # the beginning
+
+    @property
+    def awaited(self) -> str:
+        """Nodes without which lockstep does not start, '' once it has."""
+        if self._started:
+            return ""
+        return ", ".join(self.peers.absent or self.session.silent) or "the peers of the driver"
+
+    @property
+    def unready(self) -> str:  # type: ignore[override]
+        """What the arm still lacks before the brakes may be released, '' where nothing."""
+        return f"not connected yet: {self.awaited}; start what is missing, then enable" if self.awaited else ""
+
+    def is_waiting(self) -> bool:
+        """Whether a realtime driver waits for all nodes, and for a computer that keeps the periods."""
+        return isinstance(self.time, Realtime) and (bool(self.peers.absent) or self.time.settles())
+
+    def _look_for_start(self) -> None:
+        """Begin lockstep when all peers are connected and follow this driver."""
+        if not self.health.is_ready or self.peers.absent:
+            return
+        if not self._started:
+            if not self.session.number or self.session.is_overtaken:
+                self.session.begin()
+                self.announce()
+            if self.session.silent:
+                return
+            self._started = True
+            self.time.start()
+        self._watching.cancel()
+
+    def _watch_lockstep(self) -> None:
+        assert isinstance(self.time, Lockstep)
+        self.time.watch()
+        if self.time.start_overdue:
+            self.get_logger().warning(f"waiting for {self.awaited} to be ready", throttle_duration_sec=5.0)
+
+    # what comes in and goes out
 
     def _take_push(self, stamp: int, wrench: Wrench) -> None:
         refusal = ""
@@ -174,110 +184,50 @@ class DriverNode(TolerantNode):
         if refusal:
             raise Refused(refusal)
 
-    def _look_for_start(self) -> None:
-        """Report that the peers are connected; in lockstep begin."""
-        if self._ports.ready and not self._connected:
-            self._connected = True
-            self._announce()
-        if not self._connected or self._ports.absent:
-            return
-        if not self._started:
-            if not self._session.number or self._session.is_overtaken:
-                self._session.begin()
-                self._announce()
-            if self._session.silent:
-                return
-        self._watching.cancel()
-        if not self._started:
-            self._started = True
-            self.time.start()
-
-    def _watch_lockstep(self) -> None:
-        assert isinstance(self.time, Lockstep)
-        self.time.watch()
-        if self.time.start_overdue:
-            self.get_logger().warning(f"waiting for {self.awaited} to be ready", throttle_duration_sec=5.0)
-
-    @property
-    def awaited(self) -> str:
-        """Nodes without which lockstep does not start, '' once it has."""
-        if self._started:
-            return ""
-        return ", ".join(self._ports.absent or self._session.silent) or "the peers of the driver"
-
-    # what goes out
+    def _pause(self, request: SetBool.Request) -> Answer:
+        self.time.pause(bool(request.data))
+        return Answer(True, "paused" if request.data else "running")
 
     def _publish(self) -> None:
-        driver, ports = self.driver, self._ports
+        driver, publish = self.driver, self.outlets.publish
         stamp = driver.stamp
-        if self._arm.joint_sensors:
-            ports.publish("joint_sensors", stamp, driver.joint_sensors)
-        ports.publish("motor_states", stamp, driver.motor_state)
-        ports.counts["steps"] += 1
+        if self.shared.arm.joint_sensors:
+            publish("joint_sensors", stamp, driver.joint_sensors)
+        publish("motor_states", stamp, driver.motor_state)
+        self.health.counts["steps"] += 1
         if driver.is_outer:
             load = driver.true_contact
             frame = load.cover or BASE
-            ports.publish("/clock", stamp, None)
-            ports.publish("motor_currents", stamp, State([], [], driver.currents))
-            ports.publish("sim/joint_states", stamp, driver.true_joint_state)
-            ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
-            ports.publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
+            publish("/clock", stamp, None)
+            publish("motor_currents", stamp, State([], [], driver.currents))
+            publish("sim/joint_states", stamp, driver.true_joint_state)
+            publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
+            publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
             if objects := driver.true_objects:
-                ports.publish("sim/objects", stamp, objects)
-        if ports.report_due(stamp):
-            ports.facts |= self.time.facts()
-        ports.report(stamp)
-        self._announce()
+                publish("sim/objects", stamp, objects)
+        if self.diagnostics.are_due(stamp):
+            self.diagnostics.facts |= self.time.facts()
+            self.diagnostics.report(stamp)
+        self.announce()
 
-    def _announce(self) -> None:
-        """Publish the status where it has changed."""
-        safety, warnings = self.driver.safety, self.driver.warnings
-        if safety.mode is not self._mode:
-            self._mode = safety.mode
-            self._session.since = self.driver.stamp + self._timing.period_ns
-        problem = self._ports.problem
-        message = f"{safety.mode.value}: {safety.fault or problem or '; '.join(warnings)}".removesuffix(": ")
-        reported = (message, self._connected, self._session.number, self._session.since, self.time.is_paused)
-        if reported == self._reported:
-            return
-        is_new_fault = bool(safety.fault) and message != self._reported[0]
-        self._reported = reported
-        level = Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK
-        if is_new_fault:
-            self.get_logger().error(message)
-        self._ports.publish_status(
-            NodeStatus(
-                level,
-                message,
-                connected=self._connected,
-                mode=safety.mode.value,
-                fault=safety.fault,
-                session=self._session.number,
-                since=self._session.since,
-                stamp=self.driver.stamp,
-                facts={PAUSED: "paused"} if self.time.is_paused else {},
-                events=safety.events,
-            )
-        )
-        if is_new_fault:
-            self._write_post_mortem()
+    # the samples before a fault
 
-    def _write_post_mortem(self) -> None:
+    def keep_samples(self) -> None:
+        """Write what came before a fault, where a directory is given."""
         if not self._directory:
             return
-        path = Path(self._directory) / f"post_mortem_{self.driver.stamp}.csv"
-        names = [f"{what} {motor}" for what in ("theta", "thetad", "commanded", "actual") for motor in self._motors]
+        path = Path(self._directory) / f"post_mortem_{self.stamp}.csv"
+        motors, recent = self.shared.arm.motors.names, self.driver.recent
+        names = [f"{what} {motor}" for what in ("theta", "thetad", "commanded", "actual") for motor in motors]
         rows = [",".join(["stamp", *names])]
-        rows += [
-            ",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in self.driver.recent
-        ]
+        rows += [",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in recent]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("\n".join(rows) + "\n", encoding="utf-8")
         except OSError as error:
             self._warn_of_post_mortem(error)
         else:
-            self.get_logger().error(f"the last {len(self.driver.recent)} samples are in {path}")
+            self.get_logger().error(f"the last {len(recent)} samples are in {path}")
 
     def _try_post_mortem(self) -> None:
         """Warn at the start where the samples of a fault could not be written."""
@@ -291,47 +241,5 @@ class DriverNode(TolerantNode):
 
     def _warn_of_post_mortem(self, error: OSError) -> None:
         reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
-        self._ports.facts["post_mortem"] = reason
+        self.diagnostics.facts["post_mortem"] = reason
         self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")
-
-    # services
-
-    def _served(self, answer: Callable[[Any], Answer]) -> Callable[[Any, Any], Any]:
-        def serve(request: Any, response: Any) -> Any:
-            response.success, response.message = answer(request)
-            self._announce()
-            return response
-
-        return serve
-
-    def _enable(self, request: SetBool.Request) -> Answer:
-        if not request.data:
-            return self.driver.disable()
-        if self.driver.safety.mode is Mode.ENABLED:
-            return self.driver.enable("")
-        if self.awaited and not self._ports.problem:  # which may be why nodes are not connected
-            return Answer(False, f"refused: not connected yet: {self.awaited}; start what is missing, then enable")
-        faults = {node: fault for node, fault in sorted(self._ports.faults.items()) if fault}
-        if problem := self._ports.problem:
-            obstacle = problem
-        elif self.count_publishers("motor_states") > 1:
-            obstacle = TWO_DRIVERS
-        elif faults:
-            obstacle = "; ".join(f"{node}: {fault}" for node, fault in faults.items())
-        else:
-            obstacle = self.time.obstacle()
-        return self.driver.enable(obstacle)
-
-    def _pause(self, request: SetBool.Request) -> Answer:
-        self.time.pause(bool(request.data))
-        return Answer(True, "paused" if request.data else "running")
-
-    def _fault(self, event: Event) -> None:
-        self.driver.fault(event)
-        self._announce()
-
-
-TWO_DRIVERS = (
-    "another driver sends motor_states in this namespace; stop it, or give one of the two another namespace "
-    "(-r __ns:=/other) or another ROS_DOMAIN_ID"
-)

@@ -20,9 +20,9 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State
 from wam_description.topics import BY_NAME
 from wam_description.transmission_map import TransmissionMap
+from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
-from wam_ros.ports import READY
 from wam_ros.topics import qos, stamp_of, topic_name
 
 Spin = Callable[[float], None]

@@ -27,12 +27,12 @@ class Refused(ValueError):
 
     Attributes
     ----------
-    kind : what is refused in the same way on many topics at once, and so reported together; '' where it is not.
+    is_late : whether it is only out of time, as on a loaded machine all topics of other nodes are, at once.
     """
 
-    def __init__(self, reason: str, kind: str = "") -> None:
+    def __init__(self, reason: str, is_late: bool = False) -> None:
         super().__init__(printable(reason, NODE_LIMITS.reason_length))
-        self.kind = kind
+        self.is_late = is_late
 
 
 def reader(topic: Topic, arm: Arm) -> Read:

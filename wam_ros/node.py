@@ -4,7 +4,6 @@ import importlib
 import re
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -13,36 +12,31 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
-from wam_description.event import RAISED, Event, Level, fault
+from wam_description.event import Event, Level, fault
 from wam_description.event_text import sentence
-from wam_description.interface import Feed, Interface, declared, is_packaged
+from wam_description.interface import Feed, declared, is_packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
+from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
+from wam_ros.health import problem_of
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.network import take_place
-from wam_ros.parameters import Follower, declare, follow_together
-from wam_ros.ports import Ports, problem_of
-from wam_ros.requests import refusal_of, service_request
+from wam_ros.parameters import Follower, follow_together
+from wam_ros.requests import Request, RequestQueue
 from wam_ros.run import run
-from wam_ros.tolerance import TolerantNode
+from wam_ros.stack_node import StackNode
 from wam_ros.topics import SECOND
 
-OUT_OF_TIME = "out of time"  # on a loaded machine all topics of other nodes are, at once
 
-
-class AdaptedNode(TolerantNode):
+class AdaptedNode(StackNode):
     """A declared node on topics: it converts messages, calls the node, publishes with the input's stamp.
 
     Parameters
@@ -56,61 +50,51 @@ class AdaptedNode(TolerantNode):
     """
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
-        super().__init__(declaration.name, **ros)
-        self._place = take_place(self, declaration.name)
-        owned: str | None = getattr(declaration.node, "owns", None)
-        shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
-        self.node = declaration.make(shared, own)
-        self._worked = 0  # stamp of the last step, ns
-        self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
+        super().__init__(declaration, **ros)
+        shared = self.shared
+        self.node = node = declaration.make(shared, self.own)
+        self.is_first = getattr(node, "high_priority", False)
+        self._declaration, self._checks = declaration, self.interface.checks(declaration)
         self._is_realtime = shared.timing.mode == "realtime"
-        live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
-        if owned:
-            live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
-        follow_together(self, live, self._report_live)
-        followed: Followed | None = getattr(self.node, "follows", None)
-        self._follower: Follower | None = None
-        interface = Interface(shared, started_by_hand=declaration)
-        self._checks = interface.checks(declaration)
-        self._ports = ports = Ports(self, declaration, shared, interface)
-        if owned:
-            ports.live = live_facts(getattr(shared, owned), f"{owned}.")
-        if followed:
-            group = followed.group
-            self._follower = follower = Follower(
-                followed.node,
-                group,
-                getattr(shared, group),
-                self.node.retune,
-                lambda reason: ports.set_problem(f"parameters {group}", problem_of("parameters", reason)),
-                self._report_change,
-            )
-            if followed.node in interface.declarations:  # it is not ready before it has those values
-                ports.waits = lambda: not follower.has_heard
-        self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
-        self._asking = False
-        self._service_clients: dict[tuple[str, Any], Any] = {}  # by name and type
-        self._refused: dict[str, int] = {}
-        self._starts_with_all = getattr(self.node, "starts_with_all", False)
-        # what the stack does not stream comes from, or follows from, a program of the user, who is notified
-        self._commands = {
-            item.topic for item in declaration.taken if item.age == "command" or not interface.is_streamed(item.topic)
-        }
-        self._interface, self._since, self._is_enabled = interface, 0, False
-        self._synchronisers: set[Synchroniser] = set()
+        self._worked = 0  # stamp of the last step, ns
         self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
-        ports.watch_peers(self._take_status, followed.node if followed else "")
-        for topic, feeds in interface.feeds(declaration, self.node).items():
+        self._refused: dict[str, int] = {}
+        self._since, self._is_enabled = 0, False
+        self._requests = RequestQueue(self, self._take_refusal)
+        self._follower = self._follow_parameters()
+        self._synchronisers: set[Synchroniser] = set()
+        for topic, feeds in self.interface.feeds(declaration, node).items():
             self._connect(topic, feeds)
         if self._is_realtime:
-            STEPS.watch(declaration.name, ports.report_long_step)
-        for name in getattr(self.node, "services", ()):
-            self.create_service(Trigger, f"~/{name}", _answering(getattr(self.node, name)))
+            STEPS.watch(declaration.name, self.health.report_long_step)
+        for name in getattr(node, "services", ()):
+            self.create_service(Trigger, f"~/{name}", _answering(getattr(node, name)))
+
+    def _follow_parameters(self) -> Follower | None:
+        """Take live parameters, and those of another node that this one follows."""
+        node, health, shared = self.node, self.health, self.shared
+        live = [(self.own, tune, "")] if (tune := getattr(node, "tune", None)) else []
+        if owned := getattr(node, "owns", None):
+            health.live = live_facts(getattr(shared, owned), f"{owned}.")
+            live.append((getattr(shared, owned), node.retune, f"{owned}."))
+        follow_together(self, live, self._report_live)
+        followed: Followed | None = getattr(node, "follows", None)
+        if followed is None:
+            return None
+        group = followed.group
+        return Follower(
+            followed.node,
+            group,
+            getattr(shared, group),
+            node.retune,
+            lambda reason: health.set_problem(f"parameters {group}", problem_of("parameters", reason)),
+            self._report_change,
+        )
 
     @property
     def done(self) -> bool:
         """Whether the node has finished, with nothing left to publish."""
-        return getattr(self.node, "done", False) and not self._asking and not self._waiting
+        return getattr(self.node, "done", False) and self._requests.is_idle
 
     @property
     def is_failing(self) -> bool:
@@ -122,81 +106,153 @@ class AdaptedNode(TolerantNode):
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
 
-    def raise_priority(self) -> None:
-        """Ask the system to prefer this process."""
-        self._ports.raise_priority(getattr(self.node, "high_priority", False))
-
-    def take_fault(self, reason: str) -> None:
-        """Report what a callback raised."""
-        self._ports.set_problem("exception", problem_of(RAISED, reason))
+    def is_waiting(self) -> bool:
+        """Whether the node still lacks the values of the node that it follows."""
+        follower = self._follower
+        return follower is not None and follower.other in self.interface.declarations and not follower.has_heard
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""
         STEPS.forget(self._declaration.name)
-        self._ports.wait_for_delivery()
         super().destroy_node()
-        self._place.close()
+
+    def end(self) -> None:
+        """Report at once that this node ends, so that an enabled arm is braked before its commands cease."""
+        if self._is_enabled:
+            self.health.set_problem("end", fault("ended", node=self.get_name()))
+
+    # from a message to the step
 
     def _connect(self, topic: str, feeds: Sequence[Feed]) -> None:
         """Subscribe once; all reactions to a message work in the order of their declaration."""
         if not feeds:  # its publisher waits until all its listeners are there
-            self._ports.listen(topic, lambda data: None, raw=True)
+            self.inlets.listen(topic, lambda data: None)
             return
         self._synchronisers.update(feed.synchroniser for feed in feeds)
-        reactions = [(feed, mask(feed.arrays) if len(feeds) > 1 else None) for feed in feeds]
+        puts = [(feed, feed.synchroniser.inlet(topic), mask(feed.arrays) if feeds[1:] else None) for feed in feeds]
+        # what the stack does not stream comes from, or follows from, a program of the user, whom the status informs
+        of_user = not self.interface.is_streamed(topic)
+        of_user |= any(item.age == "command" for item in self._declaration.taken if item.topic == topic)
 
         def take(stamp: int, value: Any) -> None:
-            for feed, masked in reactions:
-                self._take(feed, topic, stamp, masked(value) if masked else value)
+            for feed, put, masked in puts:
+                strays = feed.synchroniser.strays
+                try:
+                    complete = put(stamp, masked(value) if masked else value)
+                except OutOfTime as reason:
+                    # on a loaded machine all topics of other nodes are, at once
+                    raise Refused(str(reason), is_late=not of_user) from None
+                for inputs in complete:
+                    self._step(inputs, feed)
+                if feed.synchroniser.strays != strays:
+                    self.inlets.claims[topic].stray()
 
-        def accepts(stamp: int) -> bool:
-            return any(feed.synchroniser.accepts(topic, stamp) for feed in feeds)
+        first = feeds[0].synchroniser.accepts
+        accepts = partial(first, topic)
+        if feeds[1:]:
+            accepts = lambda stamp: any(feed.synchroniser.accepts(topic, stamp) for feed in feeds)  # noqa: E731
+        self.inlets.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), accepts)
 
-        self._ports.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), accepts)
-
-    def _take(self, feed: Feed, topic: str, stamp: int, value: Any) -> None:
-        """Hand an input to a reaction; what does not fit the time is refused, or counted as a stray message."""
-        synchroniser = feed.synchroniser
-        strays = synchroniser.strays
+    def _step(self, inputs: Inputs, feed: Feed) -> None:
+        """Let the node work, and publish what it returns."""
+        if self._is_realtime and self.peers.absent and getattr(self.node, "starts_with_all", False):
+            return  # in lockstep the driver waits for all
+        self.health.counts["steps"] += 1
+        self._worked, name, began = inputs.stamp, self._declaration.name, time.monotonic()
+        STEPS.begin(name, began)
         try:
-            complete = synchroniser.put(topic, stamp, value)
-        except OutOfTime as reason:
-            raise Refused(str(reason), kind="" if topic in self._commands else OUT_OF_TIME) from None
-        for inputs in complete:
-            self._step(inputs, feed.work)
-            if feed.essential and self._is_realtime:
-                self._watch(synchroniser, feed.essential)
-        if synchroniser.strays != strays:
-            self._ports.claims.stray(topic)
+            try:
+                outputs = feed.work(inputs)
+            finally:
+                if STEPS.end(name, began):
+                    self.health.repeat()
+            self._finish(inputs, outputs)
+        except Exception:
+            self._failing.add(feed.work)
+            raise
+        self._failing.discard(feed.work)
+        if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
+            self._warn_of_slow_step(taken)
+        if feed.essential and self._is_realtime:
+            self._watch(feed)
 
-    def _watch(self, synchroniser: Synchroniser, essential: frozenset[str]) -> None:
+    def _finish(self, inputs: Inputs, outputs: Outputs) -> None:
+        """Report what the step has refused, make its requests, then publish what it returned."""
+        refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
+        for topic, why in refusals.items():  # each message once
+            stamp = inputs.stamp_of(topic)
+            if self._refused.get(topic) != stamp:
+                self.health.refuse(topic, why if isinstance(why, str) else sentence(why), is_reported=True)
+            self._refused[topic] = stamp
+        requests: list[Request] = getattr(self.node, "requests", [])
+        if requests or not self._requests.is_idle:
+            self._requests.add([*requests], lambda: self._publish(inputs.stamp, outputs))
+            requests.clear()
+        else:
+            self._publish(inputs.stamp, outputs)
+
+    def _publish(self, stamp: int, outputs: Outputs) -> None:
+        for topic, value in outputs.items():
+            if topic == STATUS:
+                self._set_status(stamp, value)
+            elif topic not in self.outlets.published:
+                self._declaration.require_declared(outputs)
+            else:
+                check = self._checks.get(topic)
+                self.outlets.publish(topic, stamp, check(value) if check else value)
+        if self.diagnostics.are_due(stamp):
+            if diagnostics := getattr(self.node, "diagnostics", None):
+                self.diagnostics.facts |= diagnostics()
+            self.diagnostics.report(stamp)
+
+    def _set_status(self, stamp: int, status: NodeStatus) -> None:
+        self.health.publish(status)
+        if status.level is Level.ERROR:
+            self.get_logger().error(status.message)
+        elif status.level is Level.WARN:
+            self.get_logger().warning(status.message)
+        elif status.step:
+            self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
+
+    def _warn_of_slow_step(self, taken: float) -> None:
+        is_own = not is_packaged(self._declaration)
+        self.get_logger().warning(
+            f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
+            "brakes if they wait too long: "
+            f"{'let its steps compute less' if is_own else 'the machine is busy, end what else runs on it'}",
+            throttle_duration_sec=NODE_LIMITS.slow_step_reports,
+        )
+
+    def _watch(self, feed: Feed) -> None:
         """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""
-        needed = essential & getattr(self.node, "needs", essential)
-        ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
+        health, needed = self.health, feed.essential & getattr(self.node, "needs", feed.essential)
+        ages = {topic: age for topic, age in feed.synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
-            self._ports.set_problem("inputs", None)
-        elif (
-            not (known := self._ports.problems.get("inputs"))
-            or self._ports.counts["steps"] % NODE_LIMITS.loss_repeated == 0
-        ):
-            lost, stopped = self._interface.silent(ages)  # on a busy machine another node may just have been late
+            health.set_problem("inputs", None)
+        elif (is_new := "inputs" not in health.problems) or health.counts["steps"] % NODE_LIMITS.loss_repeated == 0:
+            lost, stopped = self.interface.silent(ages)  # on a busy machine another node may just have been late
             topics = " and ".join(lost)
             problem = fault("stopped", nodes=", ".join(stopped), topics=topics)
-            if step := self._ports.held_up(stopped):
+            if step := self.peers.held_up(stopped):
                 problem = fault("long_step", step=step, topics=topics)
-            self._ports.set_problem("inputs", problem)
-            if known:
-                self._ports.repeat_status()
+            health.set_problem("inputs", problem)
+            if not is_new:
+                health.repeat()
 
-    def _take_status(self, status: NodeStatus) -> None:
+    # what the other nodes report, live parameters, requests
+
+    def take_status(self, status: NodeStatus) -> None:
         """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""
+        if status.node not in self.peers.names and (self._follower is None or status.node != self._follower.other):
+            return
         if status.node == "driver":
             self._is_enabled = status.mode == "enabled"
-            if status.session and status.session != self._ports.session:
+            if status.session and status.session != self.health.session:
                 for synchroniser in self._synchronisers:
                     synchroniser.follow(status.stamp)
-                awaited = [one.awaited(status.stamp) for one in self._synchronisers]
-                self._ports.follow(status.session, sorted({topic for topics in awaited for topic in topics}))
+                self.inlets.restart()
+                awaited = {topic for one in self._synchronisers for topic in one.awaited(status.stamp)}
+                self.health.follow(status.session, sorted(awaited))
             if status.since != self._since:
                 self._since = status.since
                 for synchroniser in self._synchronisers:
@@ -207,77 +263,10 @@ class AdaptedNode(TolerantNode):
         if take_status and (outputs := take_status(status)):
             self._publish(status.stamp, outputs)
             if getattr(self.node, "done", False):  # nobody may be there to answer its requests
-                self._waiting.clear()
-                self._asking = False
-
-    def end(self) -> None:
-        """Report at once that this node ends, so that an enabled arm is braked before its commands cease."""
-        if self._is_enabled:
-            self._ports.set_problem("end", fault("ended", node=self.get_name()))
-
-    def _step(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
-        ports = self._ports
-        if self._starts_with_all and self._is_realtime and ports.absent:
-            return  # in lockstep the driver waits for all
-        ports.counts["steps"] += 1
-        try:
-            self._work(inputs, work)
-        except Exception:
-            self._failing.add(work)
-            raise
-        self._failing.discard(work)
-
-    def _work(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
-        began = time.monotonic()
-        self._worked = inputs.stamp
-        STEPS.begin(self._declaration.name, began)
-        try:
-            outputs = work(inputs)
-        finally:
-            if STEPS.end(self._declaration.name, began):
-                self._ports.repeat_status()
-        if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
-            is_own = not is_packaged(self._declaration)
-            self.get_logger().warning(
-                f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
-                "brakes if they wait too long: "
-                f"{'let its steps compute less' if is_own else 'the machine is busy, end what else runs on it'}",
-                throttle_duration_sec=NODE_LIMITS.slow_step_reports,
-            )
-        self._report_refusals(inputs)
-        requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
-        if requests or self._asking:
-            self._waiting.extend([*map(self._making, requests), lambda: self._publish(inputs.stamp, outputs)])
-            requests.clear()
-            self._go_on()
-        else:
-            self._publish(inputs.stamp, outputs)
-
-    def _publish(self, stamp: int, outputs: Outputs) -> None:
-        for topic, value in outputs.items():
-            if topic == STATUS:
-                self._set_status(stamp, value)
-            elif topic not in self._outputs:
-                self._declaration.require_declared(outputs)
-            else:
-                check = self._checks.get(topic)
-                self._ports.publish(topic, stamp, check(value) if check else value)
-        if self._ports.report_due(stamp):
-            if diagnostics := getattr(self.node, "diagnostics", None):
-                self._ports.facts |= diagnostics()
-            self._ports.report(stamp)
-
-    def _set_status(self, stamp: int, status: NodeStatus) -> None:
-        self._ports.set_status(status)
-        if status.level is Level.ERROR:
-            self.get_logger().error(status.message)
-        elif status.level is Level.WARN:
-            self.get_logger().warning(status.message)
-        elif status.step:
-            self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
+                self._requests.clear()
 
     def _report_change(self, values: Mapping[str, Any]) -> None:
-        self._ports.report_change(self._worked, values)
+        self.health.report_change(self._worked, values)
 
     def _report_live(self, values: Mapping[str, Any]) -> None:
         """Report live parameters that were set here; with them the node may accept what it follows."""
@@ -285,58 +274,11 @@ class AdaptedNode(TolerantNode):
         if self._follower is not None:
             self._follower.settle()
 
-    def _report_refusals(self, inputs: Inputs) -> None:
-        """Report each refused message once."""
-        refusals: dict[str, str | Event] = getattr(self.node, "refusals", {})
-        for topic, why in refusals.items():
-            stamp = inputs.stamp_of(topic)
-            if self._refused.get(topic) != stamp:
-                self._ports.refusals.add(topic, why if isinstance(why, str) else sentence(why))
-            self._refused[topic] = stamp
-
-    # requests to other nodes
-
-    def _go_on(self) -> None:
-        """Do what waits, up to the next request that has to be answered."""
-        while self._waiting and not self._asking:
-            self._waiting.popleft()()
-
-    def _making(self, request: Call | SetParameters) -> Callable[[], None]:
-        return lambda: self._make(request)
-
-    def _make(self, request: Call | SetParameters) -> None:
-        service, kind, message = service_request(request)
-        client = self._service_clients.get((service, kind))
-        if client is None:
-            client = self._service_clients[service, kind] = self.create_client(kind, service)
-        self._asking = True
-        began, is_reported = time.monotonic(), False
-        timer: Timer
-
-        def ask_when_found() -> None:
-            nonlocal is_reported
-            if not is_reported and time.monotonic() - began > NODE_LIMITS.service_wait:
-                is_reported = True
-                self.get_logger().warning(
-                    f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"
-                )
-            if client.service_is_ready():  # before, the request would be lost
-                timer.cancel()
-                self.destroy_timer(timer)
-                client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result()))
-
-        timer = self.create_timer(0.005, ask_when_found, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    def _answered(self, request: Call | SetParameters, answer: Any) -> None:
-        self._asking = False
-        if refusal := refusal_of(request, answer):
-            if isinstance(request, SetParameters):
-                refusal = f"{request.node} refuses: {refusal}"
-            self._waiting.clear()
-            self.get_logger().error(refusal)
-            if refused := getattr(self.node, "refused", None):
-                self._publish(0, refused(refusal))
-        self._go_on()
+    def _take_refusal(self, refusal: str) -> None:
+        """A request was refused."""
+        self.get_logger().error(refusal)
+        if refused := getattr(self.node, "refused", None):
+            self._publish(0, refused(refusal))
 
 
 def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:

@@ -142,7 +142,8 @@ class Follower:
 
     Attributes
     ----------
-    has_heard : whether any status of the other node has come.
+    other : name of the other node.
+    has_heard : whether any status of it has come.
     """
 
     def __init__(
@@ -154,19 +155,19 @@ class Follower:
         refuse: Callable[[str], None],
         report: Callable[[Mapping[str, Any]], None],
     ) -> None:
-        self._other, self._name, self._used, self._take = other, name, group, take
+        self.other, self._name, self._used, self._take = other, name, group, take
         self._heard, self._problem, self.has_heard = group, "", False
         self._refuse, self._report = refuse, report
 
     def hear(self, status: NodeStatus) -> None:
         """Take the values in the status of a node, where they are new; that of any other node is ignored."""
-        if status.node != self._other:
+        if status.node != self.other:
             return
         self.has_heard = True
         try:
             heard = with_facts(self._heard, f"{self._name}.", status.facts)
         except ParameterError as error:  # no node of ours reports such values
-            self._refuse(f"{self._other} reports {self._name}.* that cannot be read: {_why(error)}")
+            self._refuse(f"{self.other} reports {self._name}.* that cannot be read: {_why(error)}")
             return
         if heard != self._heard:
             self._heard = heard
@@ -182,7 +183,7 @@ class Follower:
             except Exception as error:
                 if not isinstance(error, ParameterError):  # of a node of one's own, which may have taken a part
                     self._used = None
-                self._problem = f"{self._other} uses {self._name}.* that are not accepted here: {_why(error)}"
+                self._problem = f"{self.other} uses {self._name}.* that are not accepted here: {_why(error)}"
             else:
                 before = values(self._used) if self._used is not None else {}
                 self._used, present = self._heard, values(self._heard)

@@ -20,11 +20,11 @@ from wam_description.signals import NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
+from wam_ros.health import ENDED, NODE, PUBLISHED, READY
 from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
-from wam_ros.ports import ENDED, NODE, PUBLISHED, READY
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.remote_parameters import RemoteParameters

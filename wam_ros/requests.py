@@ -1,13 +1,21 @@
 """Requests to services as ROS sends them, and their answers."""
 
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from rcl_interfaces.srv import SetParameters as SetParametersService
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.wiring import Call, SetParameters
+from wam_ros.limits import NODE_LIMITS
+
+Request = Call | SetParameters
 
 
 class ServiceRequest(NamedTuple):
@@ -18,7 +26,7 @@ class ServiceRequest(NamedTuple):
     message: Any
 
 
-def service_request(request: Call | SetParameters) -> ServiceRequest:
+def service_request(request: Request) -> ServiceRequest:
     """What a request to another node is on ROS."""
     if isinstance(request, SetParameters):
         sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
@@ -33,7 +41,7 @@ def switch_request(data: bool | None) -> tuple[Any, Any]:
     return (Trigger, Trigger.Request()) if data is None else (SetBool, SetBool.Request(data=data))
 
 
-def refusal_of(request: Call | SetParameters, answer: Any) -> str:
+def refusal_of(request: Request, answer: Any) -> str:
     """Why a request was refused, '' where it was not."""
     if isinstance(request, SetParameters):
         if len(answer.results) != len(request.values):
@@ -62,3 +70,69 @@ def answer_of(client: Any, message: Any, attempts: int, wait: Callable[[Any], ob
             if future.done():
                 return future.result()
     return None
+
+
+class RequestQueue:
+    """Requests of a node to others, made one after the other; what follows a request waits for its answer.
+
+    Parameters
+    ----------
+    node : that asks.
+    refused : called with the reason where a request is refused; what waits is dropped then.
+    """
+
+    def __init__(self, node: Node, refused: Callable[[str], None]) -> None:
+        self._node, self._refused = node, refused
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
+        self._is_asking = False
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits."""
+        return not self._is_asking and not self._waiting
+
+    def clear(self) -> None:
+        """Forget what waits: nobody may be there to answer."""
+        self._waiting.clear()
+        self._is_asking = False
+
+    def add(self, requests: Iterable[Request], then: Callable[[], None]) -> None:
+        """Make requests, then do something."""
+        self._waiting.extend([*(lambda request=request: self._make(request) for request in requests), then])
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Do what waits, up to the next request that has to be answered."""
+        while self._waiting and not self._is_asking:
+            self._waiting.popleft()()
+
+    def _make(self, request: Request) -> None:
+        service, kind, message = service_request(request)
+        client = self._clients.get((service, kind))
+        if client is None:
+            client = self._clients[service, kind] = self._node.create_client(kind, service)
+        self._is_asking = True
+        began, is_reported = time.monotonic(), False
+        timer: Timer
+
+        def ask_when_found() -> None:
+            nonlocal is_reported
+            if not is_reported and time.monotonic() - began > NODE_LIMITS.service_wait:
+                is_reported = True
+                self._node.get_logger().warning(
+                    f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"
+                )
+            if client.service_is_ready():  # before, the request would be lost
+                timer.cancel()
+                self._node.destroy_timer(timer)
+                client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result()))
+
+        timer = self._node.create_timer(0.005, ask_when_found, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _answered(self, request: Request, answer: Any) -> None:
+        self._is_asking = False
+        if refusal := refusal_of(request, answer):
+            self._waiting.clear()
+            self._refused(f"{request.node} refuses: {refusal}" if isinstance(request, SetParameters) else refusal)
+        self._go_on()

@@ -14,8 +14,8 @@ from wam_description.arm import Servo, Shared
 from wam_description.parameters import ParameterError, fields, listed, values
 from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
+from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status
-from wam_ros.ports import READY
 from wam_ros.testing import Network
 from wam_ros.topics import qos
 
@@ -118,9 +118,9 @@ class Apart(Stack):
     def refusal(self) -> str:
         """Why the driver refuses to release the brakes, once all nodes are connected, also after a fault."""
         node = self.nodes["driver"]
-        self.ros.wait(lambda: node._started and not node._ports.absent, what="all nodes")
+        self.ros.wait(lambda: node._started and not node.peers.absent, what="all nodes")
         self.driver.reset_fault()
-        answer = node._enable(type("Request", (), {"data": True}))
+        answer = node.enable()
         assert not answer.success
         assert self.driver.safety.mode is not Mode.ENABLED
         return str(answer.message)
@@ -138,7 +138,7 @@ class Apart(Stack):
 
     def problem(self) -> str:
         """Why the force loop lets the driver brake."""
-        return str(self.nodes["force_loop"]._ports.problem)
+        return str(self.nodes["force_loop"].health.problem)
 
 
 def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_until_it_is_started_again(
@@ -150,7 +150,7 @@ def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_unt
         "start all nodes with the same configuration"
     )
     stack.restart("gravity")
-    ros.wait(lambda: not stack.nodes["driver"]._ports.problem, what="the same parameters")
+    ros.wait(lambda: not stack.nodes["driver"].health.problem, what="the same parameters")
     stack.enable()
 
 
@@ -161,7 +161,7 @@ def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: Network, tmp_
     stack.nodes["driver"] = make(ros, tmp_path, "driver", "/wam", fewer)
     ros.remove(stack.nodes["gravity"])
     stack.nodes["gravity"] = stack.made("gravity", **HEAVY)
-    ros.wait(lambda: stack.nodes["driver"]._ports.problem, what="the status of gravity")
+    ros.wait(lambda: stack.nodes["driver"].health.problem, what="the status of gravity")
     assert "gravity was started with another arm.payload than the driver" in stack.refusal()
 
 
@@ -171,8 +171,8 @@ def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: Network
     }  # fmt: skip
     stack = Apart(ros, tmp_path, {"force_loop": sensorless})
     driver = stack.nodes["driver"]
-    ros.wait(lambda: driver._ports.problem, what="the status of the force loop")
-    answer = driver._enable(type("Request", (), {"data": True}))
+    ros.wait(lambda: driver.health.problem, what="the status of the force loop")
+    answer = driver.enable()
     assert "force_loop was started with another arm.joint_sensors than the driver" in answer.message
 
 
@@ -212,12 +212,12 @@ def test_a_follower_is_not_ready_before_it_has_heard_the_values_of_the_other_nod
     configured = changed(["velocity_loop", "force_loop"])
     velocity, force = (make(ros, tmp_path, name, "/wam", configured) for name in ("velocity_loop", "force_loop"))
     looks: list[int] = []
-    waits, velocity._ports.waits = force._ports.waits, lambda: True  # it publishes no status
-    force._ports.waits = lambda: looks.append(1) or waits()
+    waits, velocity.is_waiting = force.is_waiting, lambda: True  # it publishes no status
+    force.is_waiting = lambda: looks.append(1) or waits()
     ros.wait(lambda: len(looks) > 2, what="all connections of the force loop")
-    assert not force._ports.ready
-    velocity._ports.waits = lambda: False
-    ros.wait(lambda: force._ports.ready, what="the status of the velocity loop")
+    assert not force.health.is_ready
+    velocity.is_waiting = lambda: False
+    ros.wait(lambda: force.health.is_ready, what="the status of the velocity loop")
 
 
 def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: Network, tmp_path: Path) -> None:
@@ -230,10 +230,10 @@ def test_values_that_cannot_be_read_keep_the_arm_braked_until_they_can_be(ros: N
         forger.publish(diagnostic_status(status, "wam"))
 
     send("[0.8, soft]")
-    ros.wait(lambda: force._ports.problem, what="a problem")
-    assert force._ports.problem.startswith("velocity_loop reports servo.* that cannot be read: JSONDecodeError: ")
+    ros.wait(lambda: force.health.problem, what="a problem")
+    assert force.health.problem.startswith("velocity_loop reports servo.* that cannot be read: JSONDecodeError: ")
     send(str(list(SERVO.integral_gain)))
-    ros.wait(lambda: not force._ports.problem, what="values that can be read")
+    ros.wait(lambda: not force.health.problem, what="values that can be read")
 
 
 def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: Network, tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: 
     ros.wait(lambda: other.get_subscription_count() >= len(SIX), what="listeners")
 
     def send(node: str, text: str) -> None:
-        status = READY._replace(node=node, session=driver._session.number, facts={DIGESTS: text})
+        status = READY._replace(node=node, session=driver.session.number, facts={DIGESTS: text})
         other.publish(diagnostic_status(status, "wam"))
 
     send("stranger", started_with(HEAVY))
@@ -256,6 +256,6 @@ def test_other_parameters_that_appear_while_the_arm_is_enabled_are_a_fault(ros: 
     assert stack.fault.startswith(text)
     assert stack.driver.currents == [0.0] * 4
     assert text in stack.refusal()
-    send("gravity", driver._ports._digests)
-    ros.wait(lambda: not driver._ports.problem, what="the same parameters")
+    send("gravity", driver.health.digests)
+    ros.wait(lambda: not driver.health.problem, what="the same parameters")
     stack.enable()

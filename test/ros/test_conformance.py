@@ -164,10 +164,8 @@ class Broken:
     def __init__(self, **ros: Any) -> None:
         super().__init__(**ros)
         self.create_subscription(JointState, "motor_current_command", self._take_anything, 10)
-        ports = self._ports
-        self._whole_publish, self._whole_status = ports.publish, ports.publish_status
-        ports.publish, ports.publish_status = self._send, self._send_status
-        ports.takes_problem = lambda event: None if self.defect in ("claims", "agreement") else self._trip(event)
+        self._whole_publish, self._whole_status = self.outlets.publish, self.health.publish
+        self.outlets.publish, self.health.publish = self._send, self._send_status
 
     def _send(self, topic: str, stamp: int, value: Any) -> None:
         change = {
@@ -205,26 +203,30 @@ class Broken:
         self._watchdog = {"watchdog": 1e9, "answers": 1e9, "end": 1e9, "repetition": 0.5}.get(self.defect, 0.045)
         super()._run()
 
-    def _enable(self) -> Answer:
+    def enable(self) -> Answer:
         if self.defect == "fault":
             self.safety.reset_fault()
         if self.defect == "silence":
             return self.safety.enable("")
-        answer = super()._enable()
+        answer = super().enable()
         if self.defect == "discard":
             self.hardware.command([1.0] * 4)
         return answer
 
-    def _disable(self) -> Answer:
-        return Answer(True, "braked") if self.defect == "disable" else super()._disable()
+    def brake(self) -> Answer:
+        return Answer(True, "braked") if self.defect == "disable" else super().brake()
 
-    def _trip(self, event: Event | None) -> None:
+    def trip(self, event: Event) -> None:
         if self.defect != "estop":
-            super()._trip(event)
+            super().trip(event)
 
-    def _take_peer(self, status: Any) -> None:
+    def take_problem(self, problem: Event | None) -> None:
+        if self.defect not in ("claims", "agreement"):
+            super().take_problem(problem)
+
+    def take_status(self, status: Any) -> None:
         if self.defect != "peers":
-            super()._take_peer(status)
+            super().take_status(status)
 
 
 def broken_driver(**ros: Any) -> Any:
@@ -239,7 +241,7 @@ def test_a_broken_driver_fails_row_by_row(ros: Network, tmp_path: Path, monkeypa
     driver = bench.driver
 
     def reborn() -> None:
-        driver._session -= 1
+        driver.session.number -= 1
 
     conformance_of_it = Conformance(bench.probe, bench.contract, 1, lambda: None, reborn)
     assert conformance_of_it.row("interface").verdict == OK

@@ -65,20 +65,20 @@ class Stack:
     def enable(self) -> None:
         """Until currents have flowed for a while; a node that was frozen may need several tries."""
         node = self.nodes["driver"]
-        self.ros.wait(lambda: node._started and not node._ports.absent and not self.driver_is_new(), what="all nodes")
+        self.ros.wait(lambda: node._started and not node.peers.absent and not self.driver_is_new(), what="all nodes")
         for _ in range(50):
             self.wait_periods(100)
             self.driver.reset_fault()
-            node._announce()
-            answer = node._enable(type("Request", (), {"data": True}))
-            node._announce()
+            node.announce()
+            answer = node.enable()
+            node.announce()
             self.wait_periods(100)
             if answer.success and not self.fault:
                 return
         pytest.fail(f"not enabled: {answer.message} {self.fault}")
 
     def driver_is_new(self) -> bool:
-        return bool(self.nodes["driver"]._session.silent)
+        return bool(self.nodes["driver"].session.silent)
 
     def freeze(self, name: str) -> int:
         """Let a node do nothing any more, as SIGSTOP does, while its messages wait; the time of the arm then, ns."""
@@ -147,7 +147,7 @@ def test_in_lockstep_a_node_that_runs_and_skips_its_answers_is_named(ros: Networ
     assert "force_loop runs, but did not publish joint_effort_command and joint_velocity_command" in stack.fault
     assert "velocity_loop" not in stack.fault
     stack.driver.reset_fault()
-    answer = stack.nodes["driver"]._enable(type("Request", (), {"data": True}))
+    answer = stack.nodes["driver"].enable()
     assert "force_loop runs, but did not publish" in answer.message
     node._publish = publish
     stack.enable()
@@ -161,7 +161,7 @@ def test_a_forged_status_of_the_driver_does_not_stop_the_arms_time(ros: Network,
     forged = NodeStatus(Level.OK, "braked", "driver", mode="braked", session=999, since=1, stamp=1)
     forger.publish(diagnostic_status(forged, "wam"))
     followers = [node for name, node in stack.nodes.items() if name != "driver"]
-    ros.wait(lambda: all(node._ports.session == 999 for node in followers), what="the forged status")
+    ros.wait(lambda: all(node.health.session == 999 for node in followers), what="the forged status")
     stack.wait_periods(300)
     assert stack.fault == ""
 
@@ -192,19 +192,19 @@ def test_a_second_publisher_is_named_and_the_arm_brakes(topic: str, names: str, 
     for ahead in (0, 5 * MS):
         second.publish(joint_state(stack.driver.stamp + ahead, owners, State([0.5] * 4, [0.5] * 4, [0.5] * 4)))
     other.destroy_publisher(second)
-    ros.wait(lambda: not any(node._ports.problem for node in stack.nodes.values()), what="one publisher each")
+    ros.wait(lambda: not any(node.health.problem for node in stack.nodes.values()), what="one publisher each")
     stack.enable()
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_a_driver_that_starts_again_is_followed_by_all_nodes(mode: str, ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, mode)
-    before = stack.nodes["driver"]._session.number
+    before = stack.nodes["driver"].session.number
     ros.remove(stack.nodes["driver"])
     stack.start_driver()
     stack.enable()
-    assert stack.nodes["driver"]._session.number > before
-    assert all(node._ports.session > before for name, node in stack.nodes.items() if name != "driver")
+    assert stack.nodes["driver"].session.number > before
+    assert all(node.health.session > before for name, node in stack.nodes.items() if name != "driver")
 
 
 class Slow:
@@ -229,19 +229,18 @@ def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     """It reports itself while it computes: from the process of transform to that of the velocity loop."""
     stack = Stack(ros, tmp_path, "realtime")
     slow = make(ros, tmp_path, f"{__name__}:Slow", "/wam", changed([*SIX, f"{__name__}:Slow"], timing__mode="realtime"))
-    published = slow._ports._outlets.published
+    published = slow.outlets.published
     before = published["status"]
     monkeypatch.setattr(Slow, "may_end", lambda: published["status"] > before)
     stack.ros.wait(lambda: published["status"] > before, what="a report from inside the step")
-    assert stack.nodes["velocity_loop"]._ports.held_up(["transform"]).startswith("slow was in a step of ")
+    assert stack.nodes["velocity_loop"].peers.held_up(["transform"]).startswith("slow was in a step of ")
     monkeypatch.setattr(Slow, "may_end", lambda: True)
 
 
 def test_what_a_held_up_node_lacks_is_the_fault_of_the_long_step(ros: Network, tmp_path: Path) -> None:
     stack = Stack(ros, tmp_path, "realtime")
-    ports = stack.nodes["gravity"]._ports
     stack.freeze("transform")
-    ports.report_long_step(LongStep("gravity", 0.7))
+    stack.nodes["gravity"].health.report_long_step(LongStep("gravity", 0.7))
     ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
     assert "gravity was in a step of 0.7 s: " in stack.fault
     assert "transform has stopped" not in stack.fault

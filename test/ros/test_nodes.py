@@ -23,10 +23,10 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State, Wrench
 from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
+from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
-from wam_ros.ports import READY
 from wam_ros.testing import Network, RunningArm, playing
 from wam_ros.topics import DEPTH, qos, stamp_of
 from wam_ros.wire import encoder
@@ -231,8 +231,8 @@ def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: 
     heard = Listener(hand.ros, "/diagnostics")
     hand.enable()
     hand.extra = [message] * 5
-    refusals = hand.node._ports.refusals.counts
-    hand.ros.wait(lambda: refusals["motor_current_command"] == 5, what="refusals")
+    refusals = hand.node.health.counts
+    hand.ros.wait(lambda: refusals["refused on motor_current_command"] == 5, what="refusals")
     hand.wait_periods(5)
     assert hand.driver.safety.mode is Mode.ENABLED
     flowing = [sample.actual for sample in hand.driver.recent]
@@ -247,8 +247,8 @@ def test_a_command_that_answers_no_state_is_refused_in_realtime(stamp: int, live
     live.enable()
     live.is_answering = False
     given = live.driver.stamp + stamp if stamp > 0 else stamp
-    refused = live.node._ports.refusals.counts
-    while refused["motor_current_command"] < 3:
+    refused = live.node.health.counts
+    while refused["refused on motor_current_command"] < 3:
         live.publisher.publish(joint_state(given, MOTORS, State([], [], [3.0] * 4)))
         live.wait_periods(1)
     live.wait_periods(60)
@@ -271,12 +271,12 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
         "/wam/intruder and /wam/velocity_loop publish motor_current_command, which one node alone may; stop all others"
     )
     live.ros.wait(lambda: any(text in m.message and m.level == DiagnosticStatus.ERROR for m in heard.seen["status"]))
-    assert live.node._ports.refusals.counts["motor_current_command"] > 0
+    assert live.node.health.counts["refused on motor_current_command"] > 0
     live.ask("reset_fault")
     assert "which one node alone may" in live.ask("enable", True).message
     other.destroy_publisher(second)
-    live.ros.wait(lambda: live.node._ports._subscriptions["motor_current_command"].get_publisher_count() == 1)
-    live.ros.wait(lambda: not live.node._ports.problem)
+    live.ros.wait(lambda: live.node.inlets.subscriptions["motor_current_command"].get_publisher_count() == 1)
+    live.ros.wait(lambda: not live.node.health.problem)
     live.wait_periods(5)
     live.enable()
 
@@ -343,7 +343,7 @@ def test_where_many_periods_are_late_a_fault_names_the_computer(is_reported: boo
 
 
 def test_where_many_periods_are_late_the_brakes_stay_on(strict: Hand) -> None:
-    strict.ros.wait(lambda: strict.node._ports.ready, what="a driver that is connected")
+    strict.ros.wait(lambda: strict.node.health.is_ready, what="a driver that is connected")
     for _ in range(200):
         strict._clock.advance()
         strict.wait_periods(2)
@@ -357,7 +357,7 @@ def test_in_realtime_the_driver_is_connected_when_its_computer_has_kept_the_peri
     connected: list[int] = []
 
     def note() -> None:
-        if strict.node._ports.ready:
+        if strict.node.health.is_ready:
             connected.append(strict.driver.stamp)
 
     strict.node.create_timer(0.001, note)
@@ -423,7 +423,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
     row = BY_NAME["sim/disturbance"]
     publisher = hand.ros.node("pusher").create_publisher(message_type(row), row.name, qos(row))
     hand.ros.wait(publisher.get_subscription_count)
-    refusals, push = hand.node._ports.refusals.counts, encoder(row, WAM.shared)
+    refusals, push = hand.node.health.counts, encoder(row, WAM.shared)
     zero = (0.0, 0.0, 0.0)
     for k, wrench in enumerate(
         [
@@ -434,7 +434,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
         ]
     ):
         publisher.publish(push(hand.driver.stamp, wrench))
-        hand.ros.wait(lambda k=k: refusals["sim/disturbance"] == k + 1)
+        hand.ros.wait(lambda k=k: refusals["refused on sim/disturbance"] == k + 1)
     assert hand.driver.plant.loads() == []
     publisher.publish(push(hand.driver.stamp, Wrench("outer_link", (0.0, 2.0, 0.0), (0.0, 0.0, 0.6))))
     hand.ros.wait(hand.driver.plant.loads)

@@ -716,7 +716,7 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
         composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
         driver.time.pause(True)
         composition.spin(lambda: time.monotonic() - begin > 0.1)
-        driver._fault(fault("test", reason="two publishers send motor_current_command"))
+        driver.trip(fault("test", reason="two publishers send motor_current_command"))
         ended = composition.wait(lambda ended: bool(ended) or time.monotonic() - begin > LONG)
         assert ended == {"scenario": 1}
         (failure,) = composition.failures
@@ -803,7 +803,7 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=0.2))
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
-        published = composition.nodes["driver"]._ports._outlets.published
+        published = composition.nodes["driver"].outlets.published
 
         def spin_until(is_enough: Callable[[], bool], seconds: float) -> None:
             end = time.monotonic() + seconds

@@ -71,7 +71,7 @@ def test_a_parameter_of_an_unknown_type_is_refused_and_the_node_goes_on(ros: Any
         answer = request(ros, SetParametersAtomically, "gravity/set_parameters_atomically", parameters=wrong).result
         assert not answer.successful
         assert text in answer.reason
-    assert not node._ports.problems.get("exception"), "a wrong request is no fault of the node"
+    assert not node.health.problems.get("exception"), "a wrong request is no fault of the node"
 
 
 @pytest.mark.slow
@@ -113,7 +113,7 @@ def test_no_request_about_parameters_ends_a_node(ros: Any, tmp_path: Path) -> No
             asked = kind.Request(names=chosen)
         future = clients[kind].call_async(asked)
         ros.wait(future.done, what=f"an answer to {asked}")
-    assert not node._ports.problems.get("exception")
+    assert not node.health.problems.get("exception")
 
 
 def test_no_bytes_on_any_topic_end_a_node(ros: Any, tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_no_bytes_on_any_topic_end_a_node(ros: Any, tmp_path: Path) -> None:
             ros.executor.spin_once(timeout_sec=0.001)
     client = sender.create_client(ListParameters, "force_loop/list_parameters")
     ros.wait(client.call_async(ListParameters.Request()).done, what="an answer after all of it")
-    assert not nodes[1]._ports.problems.get("exception")
+    assert not nodes[1].health.problems.get("exception")
     assert not nodes[2].failure
 
 
@@ -200,7 +200,7 @@ def test_the_driver_brakes_by_name_where_a_node_reports_a_fault(name: str, ros: 
     answer = request(ros, SetBool, "driver/enable", data=True)
     assert (answer.success, f"{name}: unexpected ValueError" in answer.message) == (False, True)
     sender.publish(diagnostic_status(NodeStatus(Level.OK, "ready", name), "wam"))
-    ros.wait(lambda: not any(driver._ports.faults.values()))
+    ros.wait(lambda: not any(driver.peers.faults.values()))
 
 
 def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any, tmp_path: Path) -> None:
@@ -216,14 +216,14 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     ros.wait(lambda: "gravity: unexpected AttributeError" in driver.driver.safety.fault, what="a fault by name")
     gravity._exception_time = -NODE_LIMITS.fault_held  # long ago, and no step since
     gravity._look_for_end()
-    assert "unexpected AttributeError" in gravity._ports.problem, "it has not worked since"
+    assert "unexpected AttributeError" in gravity.health.problem, "it has not worked since"
     request(ros, Trigger, "driver/reset_fault")
     assert "gravity: unexpected AttributeError" in request(ros, SetBool, "driver/enable", data=True).message
     gravity.node._body = body
     state.header = header(10_000_000)
     sender.publish(state)
-    ros.wait(lambda: not any(driver._ports.faults.values()), what="the node is well again")
-    assert gravity._ports.counts["steps"] == 2
+    ros.wait(lambda: not any(driver.peers.faults.values()), what="the node is well again")
+    assert gravity.health.counts["steps"] == 2
 
 
 def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
@@ -235,7 +235,7 @@ def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
     ros.wait(lambda: sender.get_subscription_count() == 1)
     for stamp in (5_000_000, 10_000_000):
         sender.publish(JointState(header=header(stamp), name=list(WAM.shared.arm.joints.names), position=[0.0] * 4))
-    ros.wait(lambda: gravity._ports.counts["steps"] == 2)
+    ros.wait(lambda: gravity.health.counts["steps"] == 2)
     told = capfd.readouterr().err
     assert told.count("node gravity: a step took 0.0 s; the other nodes wait for it") == 1
     assert "the machine is busy" in told  # the node is none of the user's
@@ -245,7 +245,7 @@ def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
 def test_a_directory_that_cannot_be_written_is_a_warning_and_no_end(ros: Any, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     driver = make(ros, tmp_path, "driver", ["driver"], driver__post_mortem_directory=str(tmp_path / "file" / "in"))
-    assert "cannot be written" in driver._ports.facts["post_mortem"], "at the start"
+    assert "cannot be written" in driver.diagnostics.facts["post_mortem"], "at the start"
     assert not request(ros, Trigger, "driver/estop").message.startswith("unexpected")
     assert driver.driver.safety.fault == "emergency stop"
 
@@ -256,11 +256,11 @@ def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, cap
     gravity = make(ros, tmp_path, "gravity", ["gravity"])
     capfd.readouterr()
     for k in range(500):
-        gravity._ports.refusals.add("joint_states", f"reason {k} " + "y" * 10_000)
+        gravity.health.refuse("joint_states", f"reason {k} " + "y" * 10_000)
     lines = [line for line in capfd.readouterr().err.splitlines() if "refused" in line]
     assert 1 <= len(lines) <= 3
     assert sum(map(len, lines)) < 3000
-    assert gravity._ports.refusals.counts["joint_states"] == 500
+    assert gravity.health.counts["refused on joint_states"] == 500
 
 
 def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: Any, tmp_path: Path, capfd: Any) -> None:
@@ -268,12 +268,9 @@ def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: An
     capfd.readouterr()
     for topic in ("joint_states", "force_command", "joint_posture_command"):
         for _ in range(10):
-            loop._ports.refusals.add(topic, "stamp 1 ns is ahead", "out of time")
+            loop.health.refuse(topic, "stamp 1 ns is ahead", is_reported=True)
     (line,) = (line for line in capfd.readouterr().err.splitlines() if "refused" in line)
     assert "joint_states: refused: stamp 1 ns is ahead" in line
-    loop._ports.refusals._logged.clear()  # a second later
-    loop._ports.refusals.add("force_command", "stamp 2 ns is ahead", "out of time")
-    assert "(30 more were refused before)" in capfd.readouterr().err
 
 
 def test_control_characters_are_shown_and_not_sent() -> None:

@@ -1,0 +1,227 @@
+"""What every node `driver` has, simulated or real: commands, services, status, and the reasons to brake."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from std_srvs.srv import SetBool, Trigger
+
+from wam_description.agreement import DIGESTS, disagreement
+from wam_description.event import RAISED, Code, Event, Level, fault
+from wam_description.nodes import NODES
+from wam_description.signals import Answer, NodeStatus, State
+from wam_description.status import PAUSED, guidance
+from wam_description.urdf import urdf
+from wam_description.wiring import Declaration
+from wam_driver.safety import Mode, Safety
+from wam_driver.session import Session
+from wam_ros.health import problem_of
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.messages import Refused
+from wam_ros.stack_node import StackNode
+
+PARAMETERS = "parameters of "  # beginning of what a problem concerns, before the name of a node
+TWO_DRIVERS = (
+    "another driver sends motor_states in this namespace; stop it, or give one of the two another namespace "
+    "(-r __ns:=/other) or another ROS_DOMAIN_ID"
+)
+
+
+class ArmDriver(StackNode):
+    """A driver without its motors; what raises NotImplementedError here is what a driver of your own adds.
+
+    Parameters
+    ----------
+    declaration : of the node.
+    ros : context, namespace and so on, as rclpy's Node takes them.
+
+    Attributes
+    ----------
+    safety : state of the brakes.
+    session : that the other nodes follow.
+    lateness : how many periods were late and what to do about it, '' where few were.
+    warnings : what a person should know, though the arm may move.
+    unready : what the arm still lacks before the brakes may be released, '' where nothing.
+    is_paused : whether the time of the arm is stopped.
+    """
+
+    is_first = True
+    safety: Safety
+    lateness = unready = ""
+    warnings: tuple[str, ...] = ()
+    is_paused = False
+
+    def __init__(self, declaration: Declaration, **ros: Any) -> None:
+        super().__init__(declaration, **ros)
+        is_lockstep = self.shared.timing.mode == "lockstep"
+        chain = [name for name, one in self.interface.declarations.items() if one.reactions]
+        self.session = Session(chain, 0 if is_lockstep else int(time.time() * 1e3))  # ms: no driver before had it
+        self._mode, self._answered = Mode.BRAKED, 0  # newest state, ns, that a command has answered
+        self._reported: tuple[Any, ...] = ("",)
+        self._informed: tuple[str, bool, tuple[str, ...]] = ("", True, ())  # mode, are nodes missing, faulty nodes
+        self.inlets.feed("motor_current_command", self._take_currents, "effort")
+        self.serve("enable", SetBool, lambda request: self.enable() if request.data else self.brake())
+        self.serve("estop", Trigger, lambda _: self.estop())
+        self.serve("reset_fault", Trigger, lambda _: self.clear())
+        self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
+        self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # what a driver adds
+
+    @property
+    def stamp(self) -> int:
+        """Time of the present state, ns."""
+        raise NotImplementedError
+
+    def command(self, stamp: int, currents: list[float]) -> None:
+        """Take currents, A, that answer the state of a stamp, ns."""
+        raise NotImplementedError
+
+    def release(self, obstacle: str) -> Answer:
+        """Release the brakes and discard every command before, unless an obstacle is named."""
+        raise NotImplementedError
+
+    def brake(self) -> Answer:
+        """Put on the brakes at once."""
+        raise NotImplementedError
+
+    def clear(self) -> Answer:
+        """Clear a latched fault; the arm stays braked."""
+        raise NotImplementedError
+
+    def trip(self, event: Event) -> None:
+        """Brake and latch a fault, and `announce` it."""
+        raise NotImplementedError
+
+    def obstacle(self) -> str:
+        """What speaks against a release of the brakes, when all else is well; '' where nothing does."""
+        return ""
+
+    # what every driver does
+
+    def serve(self, name: str, kind: Any, answer: Callable[[Any], Answer]) -> None:
+        """Offer a service, which may change the status."""
+
+        def served(request: Any, response: Any) -> Any:
+            response.success, response.message = answer(request)
+            self.announce()
+            return response
+
+        self.create_service(kind, f"~/{name}", served)
+
+    def enable(self) -> Answer:
+        """Release the brakes, unless there is a reason against it."""
+        if self.safety.mode is Mode.ENABLED:
+            return Answer(True, "enabled already: nothing has changed")
+        rival = TWO_DRIVERS if self.count_publishers("motor_states") > 1 else ""
+        faults = "; ".join(f"{node}: {why}" for node, why in self.peers.faulty.items())
+        return self.release(self.health.problem or self.unready or rival or faults or self.obstacle())
+
+    def estop(self) -> Answer:
+        """Stop at once and latch a fault."""
+        self.trip(fault("emergency_stop"))
+        return Answer(True, "fault: emergency stop, brakes on; call reset_fault, then enable")
+
+    def end(self) -> None:
+        """Put on the brakes at once; the others hear of it when the node is destroyed."""
+        self.brake()
+        self.announce()
+
+    def destroy_node(self) -> None:
+        """Put on the brakes and report it."""
+        self.end()
+        super().destroy_node()
+
+    def take_fault(self, reason: str) -> None:
+        """Brake where a callback raised."""
+        if reason:
+            self.trip(fault(RAISED, reason=reason))
+
+    def take_problem(self, problem: Event | None) -> None:
+        """Brake an enabled arm for a problem; a braked one is not enabled while there is one."""
+        if problem and self.safety.mode is Mode.ENABLED:
+            self.trip(problem)
+        self.announce()
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Brake where another node reports a fault, or was started with other shared parameters."""
+        is_peer = status.node in self.peers.names
+        if is_peer or status.node in NODES:  # a node that this bring-up does not list answers all the same
+            reason = disagreement(status.node, self.health.digests, status.facts.get(DIGESTS, ""))
+            self.health.set_problem(PARAMETERS + status.node, problem_of("parameters", reason))
+        if not is_peer:
+            return
+        self._inform()
+        self.session.hear(status)
+        if status.level is Level.ERROR and status.fault:
+            found = [one.values["topic"] for one in status.events if one.code is Code.FAULT and "topic" in one.values]
+            late = f"; {self.lateness}" if self.lateness else ""
+            self.trip(fault("node", node=status.node, fault=status.fault, late=late, topic=next(iter(found), "")))
+
+    def _forget_nodes(self) -> None:
+        """Drop the problem of a node that has ended, or never was, as its status was replayed."""
+        for concerned in [problem for problem in self.health.problems if problem.startswith(PARAMETERS)]:
+            node = concerned.removeprefix(PARAMETERS)
+            if node not in self.peers.names and node not in self.get_node_names():
+                self.health.set_problem(concerned, None)
+
+    def _take_currents(self, stamp: int, command: State) -> None:
+        if not 0 < stamp <= self.stamp:
+            raise Refused(
+                f"stamp {stamp} ns is not that of a state that was sent, newest {self.stamp} ns; "
+                "answer a state with its own stamp"
+            )
+        if stamp <= self._answered:
+            self.inlets.claims["motor_current_command"].stray()
+        self._answered = stamp
+        self.command(stamp, command.effort)
+
+    def report_ready(self) -> None:
+        """All peers are connected."""
+        self.announce()
+
+    def announce(self) -> None:
+        """Publish the status where it has changed."""
+        safety, session = self.safety, self.session
+        if safety.mode is not self._mode:
+            self._mode = safety.mode
+            session.since = self.stamp + self.shared.timing.period_ns
+        problem, warnings = self.health.problem, self.warnings
+        message = f"{safety.mode.value}: {safety.fault or problem or '; '.join(warnings)}".removesuffix(": ")
+        reported = (message, self.health.is_ready, session.number, session.since, self.is_paused)
+        if reported == self._reported:
+            return
+        is_new_fault = bool(safety.fault) and message != self._reported[0]
+        self._reported = reported
+        if is_new_fault:
+            self.get_logger().error(message)
+        self.health.publish(
+            NodeStatus(
+                Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK,
+                message,
+                mode=safety.mode.value,
+                fault=safety.fault,
+                session=session.number,
+                since=session.since,
+                stamp=self.stamp,
+                facts={PAUSED: "paused"} if self.is_paused else {},
+                events=safety.events,
+            )
+        )
+        self._inform()
+        if is_new_fault:
+            self.keep_samples()
+
+    def keep_samples(self) -> None:
+        """Keep what came before a fault, where the driver has it."""
+
+    def _inform(self) -> None:
+        """Print on the console what the driver's state is and what to call next, where that has changed."""
+        mode, absent = self.health.status.mode, self.peers.absent
+        faulty = tuple(self.peers.faulty) if mode == Mode.BRAKED.value else ()
+        state = (mode, bool(absent), faulty)
+        if mode and state != self._informed:
+            before, self._informed = self._informed[0], state
+            is_played = "scenario" in self.shared.nodes
+            self.get_logger().info(guidance(mode, before, absent, faulty, self.get_namespace(), is_played))

@@ -1,0 +1,257 @@
+"""What a node reports: its status, latched, where it changes, and once a second its diagnostics."""
+
+import time
+from collections import Counter
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+
+from wam_bag.printable import printable
+from wam_description.agreement import DIGESTS, digests
+from wam_description.arm import Shared
+from wam_description.event import Event, Level, fault
+from wam_description.event_text import sentence
+from wam_description.parameters import listed
+from wam_description.signals import NodeStatus
+from wam_description.status import AWAITED, BUSY, CHANGES, HELD_UP, diagnosed_name, with_refused
+from wam_description.topics import STATUS
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.long_steps import STEPS, LongStep
+from wam_ros.messages import diagnostic_status
+from wam_ros.outlets import Outlets
+from wam_ros.topics import DIAGNOSTICS, SECOND, header
+
+READY = NodeStatus(Level.OK, "ready", connected=True)
+WAITING = NodeStatus(Level.WARN, "waiting for its peers")
+PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+REFUSED_ON = "refused on "  # key of a count, before the name of a topic
+
+
+def problem_of(cause: str, reason: str) -> Event | None:
+    """Why the driver has to brake, None where there is no reason."""
+    return fault(cause, reason=reason) if reason else None
+
+
+class Health:
+    """The status of one node: what its work reports, with its problems and with the messages that it refuses.
+
+    Parameters
+    ----------
+    node : the ROS node; its `take_problem` is called with a new problem.
+    outlets : of the node.
+    shared : the shared configuration.
+
+    Attributes
+    ----------
+    status : as it was published last.
+    counts : steps, refused messages and whatever else the node counts, for the diagnostics.
+    live : present values of the shared parameters that the node owns, as facts of its status.
+    problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
+    unusable : why messages of a topic are refused, by topic, up to a report before which none was.
+    session : of the driver that this node follows, 0 before it is known.
+    is_ready : whether every expected peer is connected.
+    """
+
+    def __init__(self, node: Any, outlets: Outlets, shared: Shared) -> None:
+        self._node, self._outlets, self._shared = node, outlets, shared
+        self.status = self._plain = WAITING
+        self.counts: Counter[str] = Counter()
+        self.digests = digests(shared)
+        self.live: dict[str, str] = {}
+        self.problems: dict[str, Event] = {}
+        self.unusable: dict[str, str] = {}
+        self._unusable_since: dict[str, str] = {}  # the last report
+        self.session = 0
+        self.is_ready = False
+        self._changes = (-1, 0, {CHANGES: ""})  # stamp of the step before, number of the report and its facts
+        self._repeated = time.monotonic()  # when the status was, on that clock
+
+    # the status
+
+    def publish(self, status: NodeStatus) -> None:
+        """Publish the status of the node's work, where it has changed; a driver's has its problems already."""
+        self._plain = status
+        status = with_refused(status, self.unusable)
+        if self.problems and not status.mode:
+            events = (*status.events, *self.problems.values())
+            status = status._replace(level=Level.ERROR, message=self.problem, fault=self.problem, events=events)
+        status = self._whole(status._replace(session=status.session or self.session))
+        if status != self.status:
+            if self._shared.timing.mode == "lockstep" or status.session != self.status.session:
+                # only the last status is kept: a recording, and a driver that is followed, lack none
+                self._outlets.is_taken(STATUS, NODE_LIMITS.status_echo)
+            self.status = status
+            self._send(status)
+
+    def publish_again(self) -> None:
+        """Publish the status with the present problems and refusals; that the node is ready, where it has none yet."""
+        self.publish(READY if self._plain is WAITING and self.is_ready else self._plain)
+
+    def _whole(self, status: NodeStatus) -> NodeStatus:
+        """A status with what the other nodes compare, and take, of the shared parameters."""
+        facts = {**status.facts, DIGESTS: self.digests, **self.live}
+        return status._replace(node=self._node.get_name(), connected=self.is_ready, facts=facts)
+
+    def _send(self, status: NodeStatus) -> None:
+        self._outlets.send(STATUS, diagnostic_status(status, self._shared.arm.name))
+
+    def repeat(self) -> None:
+        """Publish the present status once more, as a message may be lost on a loaded machine."""
+        self._send(self.status)
+
+    def repeat_taken(self) -> None:
+        """`repeat`, but not over one that is still on its way: replaced, it would be a loss to a recorder.
+
+        One that a frozen node does not take holds up the others no longer than `NODE_LIMITS.status_on_its_way`.
+        """
+        now = time.monotonic()
+        if now - self._repeated > NODE_LIMITS.status_on_its_way or self._outlets.is_taken(STATUS):
+            self._repeated = now
+            self.repeat()
+
+    def report_long_step(self, step: LongStep) -> None:
+        """Publish that this node is inside a long step, which holds up those of its process; from another thread."""
+        self._send(self._with(self.status, {BUSY: str(step), HELD_UP: " ".join(STEPS.nodes)}))
+
+    def follow(self, session: int, awaited: Collection[str]) -> None:
+        """Report that this node follows another session of the driver, and which topics it lacks for its next step."""
+        facts = {AWAITED: " ".join(awaited)} if self.session else {}  # at the start nobody asks
+        self.session = session
+        if self.is_ready:
+            plain = self._plain
+            self.publish(self._with(plain, facts))
+            self._plain = plain
+
+    def report_change(self, stamp: int, values: Mapping[str, Any]) -> None:
+        """Publish live parameters that the node has taken after its step of a stamp, ns: a replay needs both.
+
+        What was taken after one step is reported together, so that only the last message is needed.
+        """
+        texts = {name: str(listed(value)) for name, value in values.items()}
+        after, number, facts = self._changes
+        if stamp != after:
+            number, facts = number + 1, {CHANGES: str(number + 1)}
+        facts |= {f"{self._node.get_name()}:{name}": text for name, text in texts.items()}
+        self._changes = stamp, number, facts
+        self.live |= {name: text for name, text in texts.items() if name in self.live}
+        self.status = self._whole(self.status)
+        self._send(self._with(self.status, facts)._replace(stamp=stamp))
+
+    @staticmethod
+    def _with(status: NodeStatus, facts: Mapping[str, str]) -> NodeStatus:
+        return status._replace(facts={**status.facts, **facts})
+
+    # problems and refusals
+
+    @property
+    def problem(self) -> str:
+        """The first problem that there is in words, '' where there is none."""
+        return next(map(sentence, self.problems.values()), "")
+
+    def set_problem(self, concerned: str, problem: Event | None) -> None:
+        """State in the status, with level ERROR, why the driver has to brake; None where nothing is wrong any more."""
+        if self.problems.get(concerned) == problem:
+            return
+        if problem is None:
+            del self.problems[concerned]
+        else:
+            self.problems[concerned] = problem
+            self._node.get_logger().error(sentence(problem))
+        self._node.take_problem(problem)
+
+    def refuse(self, topic: str, reason: str, is_reported: bool = False) -> None:
+        """Count a refused message; the first of several is logged, and the status has the reason.
+
+        Parameters
+        ----------
+        is_reported : whether the status has it anyway, or leaves it to the others that are late as well; one a second
+            is logged.
+        """
+        self.counts[REFUSED_ON + topic] += 1
+        log, text = self._node.get_logger(), f"{topic}: refused: {printable(reason, NODE_LIMITS.reason_length)}"
+        if is_reported:
+            log.warning(text, throttle_duration_sec=NODE_LIMITS.log_period)
+        elif topic not in self.problems:
+            self._unusable_since[topic] = reason
+            if topic not in self.unusable:
+                self.unusable[topic] = reason
+                log.warning(text)
+                self.publish_again()
+
+    def look_at_refusals(self) -> None:
+        """Once a second: leave out of the status what has not been refused since the last time."""
+        if self.unusable:
+            self.unusable, self._unusable_since = self._unusable_since, {}
+            self.publish_again()
+
+
+class Diagnostics:
+    """The report of one node in /diagnostics, once in a second of the arm's time.
+
+    Parameters
+    ----------
+    node : the ROS node.
+    outlets, health : of the node.
+    shared : the shared configuration.
+
+    Attributes
+    ----------
+    facts : further values.
+    """
+
+    def __init__(self, node: Any, outlets: Outlets, health: Health, shared: Shared) -> None:
+        self._node, self._outlets, self._health, self._arm = node, outlets, health, shared.arm.name
+        self.facts: dict[str, str] = {}
+        self._next = self._last = 0
+        self._refused = 0  # messages by the last report
+        self._steps = self._seconds_without_step = 0
+        if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
+            node.create_timer(1.0, self._report_standstill, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def are_due(self, stamp: int) -> bool:
+        """Whether the next report will be published."""
+        return stamp >= self._next
+
+    def report(self, stamp: int) -> None:
+        """Publish the report where it is due: a warning while messages are refused."""
+        if self.are_due(stamp):
+            self._next = stamp - stamp % SECOND + SECOND
+            self._last = stamp
+            self._report()
+            self._health.look_at_refusals()
+
+    def end(self) -> None:
+        """Report how much was published in all."""
+        self._report(**{ENDED: "yes"})
+
+    def _report(self, **more: str) -> None:
+        refused = sum(count for key, count in self._health.counts.items() if key.startswith(REFUSED_ON))
+        status = self._health.status
+        level = max(status.level, Level.WARN) if refused > self._refused else status.level
+        self._refused = refused
+        self._publish(level, status.message, more)
+
+    def _report_standstill(self) -> None:
+        """Once in a second of the wall clock: report where the node has had nothing to do for long."""
+        health, steps = self._health, self._health.counts["steps"]
+        self._seconds_without_step = 0 if steps != self._steps else self._seconds_without_step + 1
+        self._steps = steps
+        if self._seconds_without_step >= NODE_LIMITS.stale_after:
+            idle = f"no step for {self._seconds_without_step} s"
+            self._publish(Level.STALE, idle if health.is_ready else health.status.message, {})
+
+    def _publish(self, level: Level, text: str, more: Mapping[str, str]) -> None:
+        """Publish a report, with how many messages were published on each topic, this one included."""
+        node, outlets, health = self._node, self._outlets, self._health
+        totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
+        facts = {key: str(count) for key, count in sorted(health.counts.items())}
+        facts |= {NODE: node.get_fully_qualified_name()}
+        facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
+        name = diagnosed_name(node.get_namespace(), node.get_name())
+        status = NodeStatus(
+            level, text, name, health.is_ready, fault=health.status.fault, facts={**facts, **self.facts, **more}
+        )
+        report = DiagnosticArray(header=header(self._last), status=[diagnostic_status(status, self._arm)])
+        outlets.send(DIAGNOSTICS, report)

@@ -1,0 +1,177 @@
+"""What a node takes: subscriptions, each decoded and from one publisher; a message that is refused is reported."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.subscription import Subscription
+
+from wam_description.arm import Shared
+from wam_description.event import Event, fault
+from wam_description.event_text import sentence
+from wam_description.interface import Interface
+from wam_ros.health import Health
+from wam_ros.limits import NODE_LIMITS
+from wam_ros.local_bus import LocalBus
+from wam_ros.messages import Refused, message_type
+from wam_ros.tolerance import TolerantNode
+from wam_ros.topics import listening, topic_name
+from wam_ros.wire import decoder, stamp_of
+
+UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
+
+
+class Claim:
+    """The publishers of one topic that a node takes.
+
+    Two publishers of different nodes are rivals at once.  Two of one node name may be a node that was killed and
+    its successor: ROS forgets the first one only after a while.  They are rivals where both send, so that
+    messages come out of order.
+
+    Parameters
+    ----------
+    node : that takes the topic.
+    topic : name in the table of topics.
+    subscription : of the topic.
+
+    Attributes
+    ----------
+    strays : messages that did not go on from those before, while there were two publishers.
+    """
+
+    def __init__(self, node: TolerantNode, topic: str, subscription: Subscription) -> None:
+        self._node, self._topic, self._subscription = node, topic, subscription
+        self._named: tuple[int, list[str]] = (0, [])  # publishers, and names of their nodes
+        self.strays = 0
+
+    @property
+    def count(self) -> int:
+        """Publishers of the topic."""
+        return int(self._subscription.get_publisher_count())
+
+    def stray(self) -> None:
+        """Count a message that does not go on from those before."""
+        self.strays += self.count > 1
+
+    def rivals(self) -> Event | None:
+        """Which nodes publish the topic, which one alone may publish; None where it is one."""
+        count = self.count
+        if count < 2:
+            self._named, self.strays = (0, []), 0
+            return None
+        names = self._names(count)
+        if len(names) == 1 and self.strays < NODE_LIMITS.strays:
+            return None
+        who = " and ".join(names) if len(names) > 1 else f"{count} nodes named {names[0]}"
+        return fault("claimed", nodes=who, topic=self._topic)
+
+    def _names(self, count: int) -> list[str]:
+        """Full names of the nodes that publish the topic, each once."""
+        if self._named[0] == count:
+            return self._named[1]
+        found = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
+        names = sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found}) or [UNKNOWN]
+        if len(found) == count and not any(UNKNOWN in name for name in names):
+            self._named = count, names
+        return [name if UNKNOWN not in name else "a node without a name" for name in names]
+
+
+class Inlets:
+    """Subscriptions of one node.
+
+    Parameters
+    ----------
+    node : the ROS node.
+    interface : of the bring-up.
+    shared : the shared configuration.
+    health : of the node; it reports what is refused.
+    bus : that carries messages within the process, None where none does.
+
+    Attributes
+    ----------
+    subscriptions : by topic.
+    claims : who publishes each topic that is fed, by topic.
+    """
+
+    def __init__(
+        self, node: TolerantNode, interface: Interface, shared: Shared, health: Health, bus: LocalBus | None
+    ) -> None:
+        self._node, self._interface, self._shared = node, interface, shared
+        self._health, self._bus = health, bus
+        self.subscriptions: dict[str, Subscription] = {}
+        self.claims: dict[str, Claim] = {}
+        node.create_timer(NODE_LIMITS.claim_period, self._look_at_all, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def feed(
+        self,
+        topic: str,
+        take: Callable[[int, Any], None],
+        arrays: str = "",
+        accepts: Callable[[int], bool] = lambda stamp: True,
+    ) -> None:
+        """Subscribe to values.
+
+        Parameters
+        ----------
+        topic : name in the table of topics.
+        take : called with the stamp, ns, and the value; it may raise Refused.
+        arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+        accepts : whether a message of a stamp is of interest; others are not decoded.
+        """
+        decode = decoder(self._interface.topics[topic], self._shared, arrays)
+        problems = self._health.problems
+
+        def receive(data: bytes) -> None:
+            try:
+                # what a second publisher sends does not come by the bus
+                if (topic in problems or (not is_local and claim.count > 1)) and (rivals := self._look(topic)):
+                    raise Refused(sentence(rivals))
+                stamp = stamp_of(data)
+                if accepts(stamp):
+                    take(stamp, decode(data))
+            except Refused as reason:
+                self._health.refuse(topic, str(reason), reason.is_late)
+
+        is_local = self._subscribe(topic, receive)
+        self.claims[topic] = claim = Claim(self._node, topic, self.subscriptions[topic])
+
+    def listen(self, topic: str, take: Callable[[bytes], None]) -> None:
+        """Subscribe to the bytes of messages; `take` may raise Refused."""
+
+        def receive(data: bytes) -> None:
+            try:
+                take(data)
+            except Refused as reason:
+                self._health.refuse(topic, str(reason), reason.is_late)
+
+        self._subscribe(topic, receive)
+
+    def _subscribe(self, topic: str, receive: Callable[[bytes], None]) -> bool:
+        """Subscribe; whether the messages come without the middleware, see `wam_ros.local_bus`."""
+        node, row, bus = self._node, self._interface.topics[topic], self._bus
+        profile, name = listening(row), topic_name(node, row)
+        if not row.latched and self._shared.timing.mode == "realtime":
+            profile.depth = NODE_LIMITS.newest_kept  # a late node works on the newest state
+        is_local = bus is not None and not row.latched and bus.carries(self._interface.publishers(topic))
+        if bus is not None and is_local:
+            bus.subscribe(node.resolve_topic_name(name), node.bearing(receive, f"a message on {topic}"))
+            profile.depth = 1
+        subscription = node.create_subscription(message_type(row), name, receive, profile, raw=True)
+        if is_local:
+            node.leave_unserved(subscription)
+        self.subscriptions[topic] = subscription
+        return is_local
+
+    def _look(self, topic: str) -> Event | None:
+        rivals = self.claims[topic].rivals()
+        self._health.set_problem(topic, rivals)
+        return rivals
+
+    def _look_at_all(self) -> None:
+        for topic in self.claims:
+            self._look(topic)
+
+    def restart(self) -> None:
+        """Forget what came out of order: another session of the driver has begun."""
+        for claim in self.claims.values():
+            claim.strays = 0

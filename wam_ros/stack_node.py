@@ -1,0 +1,159 @@
+"""What every node of the stack is on ROS: a place, parameters, inlets, outlets, health, and the other nodes."""
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+
+from wam_description.event import RAISED, Event
+from wam_description.interface import Interface
+from wam_description.signals import NodeStatus
+from wam_description.status import BUSY, HELD_UP
+from wam_description.topics import STATUS
+from wam_description.wiring import Declaration
+from wam_ros.health import Diagnostics, Health, problem_of
+from wam_ros.inlets import Inlets
+from wam_ros.long_steps import STEPS
+from wam_ros.messages import message_type, read_status
+from wam_ros.network import take_place
+from wam_ros.outlets import Outlets
+from wam_ros.parameters import declare
+from wam_ros.priority import PRIORITY, set_priority
+from wam_ros.tolerance import TolerantNode
+from wam_ros.topics import DIAGNOSTICS
+from wam_ros.wire import deserialized
+
+
+class Peers:
+    """The other nodes of a bring-up, as their statuses report them.
+
+    Parameters
+    ----------
+    names : of these nodes.
+
+    Attributes
+    ----------
+    faults : present fault of each node that has reported, '' where it has none.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._absent = set(names)
+        self.names = frozenset(self._absent)
+        self.faults: dict[str, str] = {}
+        self._busy: dict[str, tuple[str, frozenset[str]]] = {}  # by node in a long step: what, and who waits for it
+
+    @property
+    def absent(self) -> list[str]:
+        """Nodes that have not reported that they are connected."""
+        return sorted(self._absent)
+
+    def hear(self, status: NodeStatus) -> None:
+        """Take the status of one of them."""
+        self.faults[status.node] = status.fault
+        self._busy.pop(status.node, None)
+        if busy := status.facts.get(BUSY):
+            self._busy[status.node] = busy, frozenset(status.facts.get(HELD_UP, "").split())
+        if status.connected:
+            self._absent.discard(status.node)
+
+    @property
+    def faulty(self) -> dict[str, str]:
+        """Present faults by node."""
+        return {node: fault for node, fault in sorted(self.faults.items()) if fault}
+
+    def held_up(self, nodes: Collection[str]) -> str:
+        """The long step of another node, or of one of this process, that holds up these nodes, '' for none."""
+        found = [reason for reason, held in self._busy.values() if not held.isdisjoint(nodes)]
+        if (step := STEPS.recent()) and not STEPS.nodes.isdisjoint(nodes):
+            found.append(str(step))
+        return next(iter(found), "")
+
+
+class StackNode(TolerantNode):
+    """A node on topics; what it does with them is the part of `AdaptedNode`, or of a driver.
+
+    Parameters
+    ----------
+    declaration : of the node.
+    ros : context, namespace and so on, as rclpy's Node takes them.
+
+    Attributes
+    ----------
+    shared, own : parameters.
+    interface : of the bring-up; names which peers to expect.
+    is_first : whether it works in each inner period, and is to be ahead of the other nodes.
+    """
+
+    is_first = False
+
+    def __init__(self, declaration: Declaration, **ros: Any) -> None:
+        super().__init__(declaration.name, **ros)
+        self._place = take_place(self, declaration.name)
+        owned: str | None = getattr(declaration.node, "owns", None)
+        self.shared, self.own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
+        self.interface = Interface(self.shared, started_by_hand=declaration)
+        topics = self.interface.topics
+        rows = [topics[topic] for topic in declaration.outputs if topic in topics]
+        self.outlets = Outlets(self, rows, [topics[STATUS], topics[DIAGNOSTICS]], self.shared)
+        self.health = Health(self, self.outlets, self.shared)
+        self.diagnostics = Diagnostics(self, self.outlets, self.health, self.shared)
+        self.inlets = Inlets(self, self.interface, self.shared, self.health, self.outlets.bus)
+        self.peers = Peers(set(self.interface.names) - {declaration.name})
+        self._status_type = message_type(topics[STATUS])
+        self.inlets.listen(STATUS, self._hear)
+        self._readiness = self.create_timer(0.02, self._look_for_peers, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def raise_priority(self) -> None:
+        """In realtime: ask the system to prefer this process, and report what was granted."""
+        timing = self.shared.timing
+        if timing.mode == "realtime":
+            granted = set_priority(max(timing.fifo_priority - (not self.is_first), 0), timing.niceness)
+            self.diagnostics.facts[PRIORITY] = granted
+            if self.is_first:
+                self.get_logger().info(f"{PRIORITY}: {granted}")
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Take the status of another node of the stack."""
+
+    def take_problem(self, problem: Event | None) -> None:
+        """A problem of this node is new, or one is over where it is None: let the driver see it."""
+        self.health.publish_again()
+
+    def take_fault(self, reason: str) -> None:
+        """Report what a callback raised."""
+        self.health.set_problem("exception", problem_of(RAISED, reason))
+
+    def is_waiting(self) -> bool:
+        """Whether the node waits for something else than its peers before it is ready."""
+        return False
+
+    def _hear(self, data: bytes) -> None:
+        status = read_status(deserialized(data, self._status_type, STATUS))
+        if status.node in self.peers.names:
+            self.peers.hear(status)
+        if status.node != self.get_name():
+            self.take_status(status)
+
+    def _look_for_peers(self) -> None:
+        interface = self.interface
+        for name, subscription in self.inlets.subscriptions.items():
+            if subscription.get_publisher_count() < len(interface.publishers(name)):
+                return
+        for name, count in self.outlets.subscriptions().items():
+            if count < len(interface.subscribers(name)):
+                return
+        if not self.is_waiting():
+            self._readiness.cancel()
+            self.health.is_ready = True
+            self.report_ready()
+
+    def report_ready(self) -> None:
+        """All peers are connected."""
+        self.health.publish_again()
+
+    def destroy_node(self) -> None:
+        """End only when the others have what was published."""
+        self.diagnostics.end()
+        self.outlets.wait_for_delivery()
+        super().destroy_node()
+        self._place.close()
