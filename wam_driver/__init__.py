@@ -2,7 +2,7 @@
 
 - driver: the driver without ROS: commands, watchdog, limits, states; its parameters
 - interface: what every driver of the arm takes and gives
-- driver_node: the driver as a ROS node
+- arm_driver_node: what every node `driver` has, simulated or real; driver_node: the simulated one
 - lockstep, realtime: the two ways in which its time passes
 - pacer: simulated time no faster than the wall clock
 - session: which life of the driver the nodes follow

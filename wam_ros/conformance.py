@@ -3,16 +3,13 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from wam_description.driver_contract import REQUIREMENTS, DriverContract
-from wam_ros.driver_bench import DriverBench, Restart, Untested
-from wam_ros.driver_probe import DriverProbe
+from wam_description.driver_contract import REQUIREMENTS
+from wam_ros.driver_bench import DriverBench, Untested
+from wam_ros.driver_checks import CHECKS
 from wam_ros.limits import CONFORMANCE_LIMITS
-from wam_ros.message_checks import MESSAGE_CHECKS
-from wam_ros.stop_checks import STOP_CHECKS
 
 OK, WRONG, NOT_TESTED = "ok", "WRONG", "not tested"
 ONCE = ("interface", "end", "session")  # a second attempt finds another driver, or none
-CHECKS = MESSAGE_CHECKS | STOP_CHECKS
 
 
 class ConformanceRow(NamedTuple):
@@ -39,22 +36,13 @@ class Conformance:
 
     Parameters
     ----------
-    probe : in the place of the velocity loop.
-    contract : numbers of the arm.
+    bench : in the place of the velocity loop.
     attempts : at each row, as a machine that is busy delays a driver that is right; one in which the test itself was
         held up does not count.
-    end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
     """
 
-    def __init__(
-        self,
-        probe: DriverProbe,
-        contract: DriverContract,
-        attempts: int,
-        end: Restart | None = None,
-        restart: Restart | None = None,
-    ) -> None:
-        self._bench, self._attempts = DriverBench(probe, contract, end, restart), attempts
+    def __init__(self, bench: DriverBench, attempts: int) -> None:
+        self._bench, self._attempts = bench, attempts
 
     def rows(self) -> Iterator[ConformanceRow]:
         """Test every row, each until it is right or there are no more attempts."""
@@ -68,21 +56,21 @@ class Conformance:
 
     def row(self, key: str) -> ConformanceRow:
         """Test one row."""
-        probe = self._bench.probe
+        bench = self._bench
         row = ConformanceRow(key, NOT_TESTED)
         left, held_up, pause = self._attempts, CONFORMANCE_LIMITS.held_up * self._attempts, 0.0
         while left and held_up:
-            probe.longest_pause = 0.0
+            bench.longest_pause = 0.0
             try:
-                found = CHECKS[key](self._bench)
+                found = CHECKS[key](bench)
                 row = ConformanceRow(key, WRONG if found else OK, found)
             except Untested as reason:
                 row = ConformanceRow(key, NOT_TESTED, str(reason))
             finally:
-                probe.be_proper()
+                bench.be_proper()
             if row.verdict == OK or key in ONCE:
                 break
-            pause = probe.longest_pause
+            pause = bench.longest_pause
             left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
         if row.verdict != OK and not held_up:
             row = row._replace(

@@ -3,9 +3,11 @@
 import math
 import statistics
 from collections.abc import Callable
+from typing import Any
 
+from wam_description.arm import Shared
 from wam_description.driver_contract import REPLY, DriverContract
-from wam_ros.driver_probe import Arrived, DriverProbe
+from wam_ros.driver_probe import Arrived, DriverProbe, Spin
 from wam_ros.limits import CONFORMANCE_LIMITS
 
 Restart = Callable[[], None]
@@ -15,46 +17,52 @@ class Untested(Exception):
     """A row cannot be tested; the text states why."""
 
 
-class DriverBench:
-    """What the checks of the rows do with a driver.
+class DriverBench(DriverProbe):
+    """The probe, and what the checks of the rows do with a driver.
 
     Parameters
     ----------
-    probe : in the place of the velocity loop.
-    contract : numbers of the arm.
+    shared : configuration of the arm.
+    share : of the periods in which a state has to come.
+    current : added to the first motor, A, with a changing sign.
+    spin : handles what has arrived, for at most this many seconds.
+    ros : as rclpy's Node takes them.
+
+    Attributes
+    ----------
     end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
     """
 
-    def __init__(
-        self, probe: DriverProbe, contract: DriverContract, end: Restart | None, restart: Restart | None
-    ) -> None:
-        self.probe, self.contract = probe, contract
-        self.end, self.restart = end, restart
+    end: Restart | None = None
+    restart: Restart | None = None
+
+    def __init__(self, shared: Shared, share: float, current: float, spin: Spin, **ros: Any) -> None:
+        super().__init__(shared, current, spin, **ros)
+        self.contract = DriverContract.of(shared, share)
 
     def brake(self) -> None:
         """To braked, from any state."""
-        self.probe.ask("enable", False)
-        self.probe.ask("reset_fault")
+        self.ask("enable", False)
+        self.ask("reset_fault")
 
     def enable(self) -> None:
         """From any state to enabled, with commands that come."""
-        probe = self.probe
         answer = (False, "")
         for _ in range(CONFORMANCE_LIMITS.enable_attempts):
             self.brake()
-            probe.is_answering = True
-            probe.watch(CONFORMANCE_LIMITS.settle)
-            answer = probe.ask("enable", True)
-            if answer[0] and probe.wait(lambda: probe.status.mode == "enabled"):
-                probe.forget()
-                probe.watch(CONFORMANCE_LIMITS.settle)
-                if probe.status.mode == "enabled":
+            self.is_answering = True
+            self.watch(CONFORMANCE_LIMITS.settle)
+            answer = self.ask("enable", True)
+            if answer[0] and self.wait(lambda: self.status.mode == "enabled"):
+                self.forget()
+                self.watch(CONFORMANCE_LIMITS.settle)
+                if self.status.mode == "enabled":
                     return
-        raise Untested(f"the driver cannot be enabled: {answer[1] or probe.status.message or 'no answer'}")
+        raise Untested(f"the driver cannot be enabled: {answer[1] or self.status.message or 'no answer'}")
 
     def states(self) -> list[Arrived]:
         """The states that came."""
-        states = list(self.probe.arrived["motor_states"])
+        states = list(self.arrived["motor_states"])
         if len(states) < 10:
             raise Untested(f"{len(states)} motor_states came")
         return states
@@ -80,7 +88,7 @@ class DriverBench:
 
     def stops(self, after: int, limit: float) -> str:
         """What is wrong with how the current stops, counted from a stamp, ns, that was the last good one."""
-        self.probe.watch(REPLY)
+        self.watch(REPLY)
         late = (self.last_flow() - after) * 1e-9
         if late > limit + 1e-9 * self.contract.outer_period:
             return f"current still flows {late * 1e3:.0f} ms later; allowed: {limit * 1e3:.0f} ms"
@@ -88,58 +96,57 @@ class DriverBench:
 
     def in_mode(self, mode: str) -> str:
         """What is wrong with the mode, '' where it is this one."""
-        probe = self.probe
-        if probe.wait(lambda: probe.status.mode == mode):
+        if self.wait(lambda: self.status.mode == mode):
             return ""
-        return f"status.mode is '{probe.status.mode}'; it has to be '{mode}'"
+        return f"status.mode is '{self.status.mode}'; it has to be '{mode}'"
 
     def compare(self) -> str:
         """What is wrong with the currents that flow, against those commanded."""
-        probe, contract = self.probe, self.contract
+        contract = self.contract
         self.enable()
         differences: list[list[float]] = [[] for _ in contract.motors]
         for _ in range(20):
-            probe.watch(0.01)
-            if not (probe.arrived["motor_states"] and probe.arrived["motor_currents"]):
+            self.watch(0.01)
+            if not (self.arrived["motor_states"] and self.arrived["motor_currents"]):
                 continue
-            flow = self.flow(probe.arrived["motor_states"][-1])
-            sent = list(probe.arrived["motor_currents"][-1].message.effort)
+            flow = self.flow(self.arrived["motor_states"][-1])
+            sent = list(self.arrived["motor_currents"][-1].message.effort)
             if len(flow) != len(contract.motors) or len(sent) != len(contract.motors):
                 return "an effort is missing"
             for i, (by_effort, current) in enumerate(zip(flow, sent, strict=True)):
-                wanted = probe.commanded[i]
+                wanted = self.commanded[i]
                 limit = self.tolerance(wanted, contract.peak[i])
                 worst = max(abs(by_effort - wanted), abs(current - wanted))
                 differences[i].append(worst if worst > limit else 0.0)
-        if probe.status.mode != "enabled":
-            return f"it does not stay enabled: {probe.status.message}"
+        if self.status.mode != "enabled":
+            return f"it does not stay enabled: {self.status.message}"
         for i, found in enumerate(differences):
             if statistics.median(found or [math.inf]):
                 return (
-                    f"{contract.motors[i]}: commanded {probe.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
+                    f"{contract.motors[i]}: commanded {self.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
                     f"effort of motor_states is {flow[i] * contract.torque_constant[i]:.3g} N m"
                 )
         return ""
 
     def bad(self) -> list[float]:
         """Currents that may not flow, A: of the other sign than those that hold the arm up, so that the two differ."""
-        pairs = zip(self.contract.peak, self.probe.carrying, strict=True)
+        pairs = zip(self.contract.peak, self.carrying, strict=True)
         return [-math.copysign(CONFORMANCE_LIMITS.bad_current * peak, carrying) for peak, carrying in pairs]
 
     def bears(self, messages: dict[str, Callable[[int], object]]) -> str:
         """What is wrong with how bad commands after good ones are taken."""
-        probe, bad = self.probe, self.bad()
+        bad = self.bad()
         for what, make in messages.items():
             self.enable()
-            probe.after = [make] * 5
-            probe.wait(lambda: not probe.after)
-            probe.watch(CONFORMANCE_LIMITS.settle)
+            self.after = [make] * 5
+            self.wait(lambda: not self.after)
+            self.watch(CONFORMANCE_LIMITS.settle)
             for state in self.states():
                 if not all(map(math.isfinite, state.message.effort)):
                     return f"{what}: the effort is no longer finite"
                 for i, flow in enumerate(self.flow(state)):
                     if flow * bad[i] > 0.7 * bad[i] ** 2:
                         return f"{what}: its {flow:.3g} A reached {self.contract.motors[i]}"
-            if probe.status.mode != "enabled":
-                return f"{what}: the driver does not stay enabled: {probe.status.message}"
+            if self.status.mode != "enabled":
+                return f"{what}: the driver does not stay enabled: {self.status.message}"
         return ""

@@ -47,6 +47,9 @@ REFUSED = [
     ("identify bag --write own.yaml", "own.yaml exists, and this command did not write it; give a new file"),
     ("identify --excite own.yaml", "own.yaml exists, and this command did not write it; give a new file"),
     ("identify --excite e.txt", "e.txt would be a scenario; give a file that ends in .yaml, .yml"),
+    ("up --config nope", "no configuration 'nope' comes with wam_stack; there are: "),
+    ("model urdf --config /nope/x.yaml", "configuration /nope/x.yaml is not a file; give the path"),
+    ("node elbow", "no node is named 'elbow'; nodes: driver, transform, velocity_loop"),
     ("demo --no-live --name here", "bag bags/here exists already; give another name as --name, or move it away"),
     ("bag record --name here", "bag bags/here exists already; give another name as --name, or move it away"),
 ]  # fmt: skip

@@ -20,7 +20,7 @@ from wam_description.event import Event
 from wam_description.signals import Answer, State
 from wam_ros import conformance
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
-from wam_ros.driver_probe import DriverProbe
+from wam_ros.driver_bench import DriverBench
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.node import make_node
 from wam_ros.testing import Network
@@ -44,8 +44,8 @@ class Bench:
         def spin(seconds: float) -> None:
             ros.executor.spin_once(timeout_sec=seconds)
 
-        self.probe = ros.add(DriverProbe(shared, 0.4, spin, context=ros.context, namespace="/wam"))
-        self.contract = DriverContract.of(shared, SHARE)
+        self.probe = ros.add(DriverBench(shared, SHARE, 0.4, spin, context=ros.context, namespace="/wam"))
+        self.probe.end, self.probe.restart = lambda: ros.remove(self.driver), self.start
         self.start()
 
     def start(self) -> None:
@@ -54,7 +54,7 @@ class Bench:
         )
 
     def conformance(self, attempts: int) -> Conformance:
-        return Conformance(self.probe, self.contract, attempts, lambda: self.ros.remove(self.driver), self.start)
+        return Conformance(self.probe, attempts)
 
 
 def simulated() -> Configuration:
@@ -92,7 +92,7 @@ def test_an_attempt_that_the_machine_held_up_does_not_count(
     pause: float, tries: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     probe: Any = Heldup()
-    tested = Conformance(probe, DriverContract.of(simulated().shared, SHARE), 2)
+    tested = Conformance(probe, 2)
     made = []
 
     def check() -> str:
@@ -146,7 +146,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     ros: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     short = replace(CONFORMANCE_LIMITS, start=0.05, look=0.05, service_wait=0.05)
-    for module in ("driver_probe", "message_checks"):
+    for module in ("driver_probe", "driver_checks"):
         monkeypatch.setattr(f"wam_ros.{module}.CONFORMANCE_LIMITS", short)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(bench.conformance(1).rows())
@@ -243,7 +243,8 @@ def test_a_broken_driver_fails_row_by_row(ros: Network, tmp_path: Path, monkeypa
     def reborn() -> None:
         driver.session.number -= 1
 
-    conformance_of_it = Conformance(bench.probe, bench.contract, 1, lambda: None, reborn)
+    bench.probe.end, bench.probe.restart = lambda: None, reborn
+    conformance_of_it = Conformance(bench.probe, 1)
     assert conformance_of_it.row("interface").verdict == OK
     verdicts = {}
     for key in list(REQUIREMENTS)[1:]:

@@ -22,7 +22,8 @@ from wam_description.parameters import Nothing, ParameterError, build
 from wam_description.signals import ForceCommand, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME, JOINT_STATE, OF_OWN_NODES, TABLE, TOPICS, WRENCH, Topic
-from wam_description.wiring import Call, Input, Outputs, declaration, reaction
+from wam_description.wiring import Call, Input, Outputs, reaction
+from wam_ros import requests
 from wam_ros.testing import RunningArm, playing
 from wam_sim.replay import replay
 from wam_sim.simulation import Simulation
@@ -180,24 +181,6 @@ def test_what_a_node_answers_to_a_status_is_looked_at_in_a_direct_run(
         Simulation(configured.with_values(own), steps, {"damping": Answering}).play()
 
 
-class Misspelt:
-    """Publishes on a topic that is in no table."""
-
-    name, parameters = "misspelt", Nothing
-
-    def __init__(self, shared: Shared, own: Nothing) -> None: ...
-
-    @reaction(Input("joint_states", "position"), outputs=("joint_posture_comand",))
-    def step(self, inputs: Inputs) -> Outputs:
-        return {}
-
-
-def test_a_misspelt_topic_is_refused_with_the_one_that_is_meant(configured: Configuration) -> None:
-    text = r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class"
-    with pytest.raises(ParameterError, match=text):
-        Interface(configured.shared, {"misspelt": Misspelt})
-
-
 @pytest.mark.parametrize(
     ("row", "text"),
     [
@@ -243,19 +226,6 @@ def test_lockstep_waits_for_a_topic_only_where_the_configured_nodes_stream_it(co
     assert Interface(without).is_streamed("motor_effort_command")
 
 
-@pytest.mark.parametrize(
-    ("entry", "text"),
-    [
-        ("gravitation", "no node is named 'gravitation'; nodes: driver, transform"),
-        ("no_such_package:Class", "check that 'no_such_package' is installed or on PYTHONPATH"),
-        ("impedance:ImpedanceParameters", "is no node: name and parameters"),
-    ],
-)
-def test_a_node_that_is_none_is_refused_by_name(entry: str, text: str, configured: Configuration) -> None:
-    with pytest.raises(ParameterError, match=text):
-        declared(entry)
-
-
 class Raising(Echo):
     def __init__(self, shared: Shared, own: Nothing) -> None:
         raise KeyError("stiff\nness")
@@ -273,35 +243,28 @@ def test_a_controller_whose_constructor_raises_is_named_with_its_line(
     assert "\n" not in text
 
 
-def test_a_module_that_raises_at_its_import_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "broken_module.py").write_text("gain = 1 +\n")
-    with pytest.raises(ParameterError, match=r"node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"):
-        declared("broken_module:Any")
+IMPORTS = "from wam_description.wiring import Input, reaction\nclass Other:\n    "
+STEP = "\n    def step(self, inputs): ...\nclass Mine: ...\n"
+NO_NODES = [
+    ("gravitation", "", "no node is named 'gravitation'; nodes: driver, transform"),
+    ("no_such_package:Class", "", "check that 'no_such_package' is installed or on PYTHONPATH"),
+    ("impedance:ImpedanceParameters", "", "is no node: name and parameters"),
+    ("broken_module:Any", "gain = 1 +\n", "node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"),
+    # the faulty one, though another class of the module is configured
+    ("no_outputs:Mine", f'{IMPORTS}@reaction(Input("q")){STEP}', r"'no_outputs:Mine' .* TypeError: .*no_outputs\.py:3"),
+    ("odd:Mine", f'{IMPORTS}@reaction(Input("q", "p"), outputs=()){STEP}', r"'odd:Mine' .* TypeError: .*odd\.py:3"),
+]
 
 
-def test_a_reaction_without_outputs_is_named_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The faulty one, though another class of the module is configured; also where a check of an input refuses."""
-    lines = "from wam_description.wiring import Input, reaction\nclass Other:\n    "
-    for name, faulty in (
-        ("no_outputs", '@reaction(Input("joint_states"))'),
-        ("odd", '@reaction(Input("q", "p"), outputs=())'),
-    ):
-        (tmp_path / f"{name}.py").write_text(f"{lines}{faulty}\n    def step(self, inputs): ...\nclass Mine: ...\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        with pytest.raises(ParameterError, match=rf"node '{name}:Mine' cannot be imported: TypeError: .*{name}\.py:3"):
-            declared(f"{name}:Mine")
-
-
-def test_an_output_of_a_reaction_that_declares_none_is_refused_with_what_to_write() -> None:
-    class Forgot(Echo):
-        @reaction(Input("gravity_effort", "effort"), outputs=())
-        def step(self, inputs: Inputs) -> Outputs:
-            return {"echo": None}
-
-    text = r"its reactions declare nothing; write outputs=\('echo',\) in @reaction"
-    with pytest.raises(ValueError, match=text):
-        declaration(Forgot).require_declared({"echo": None})
+@pytest.mark.parametrize(("entry", "module", "text"), NO_NODES, ids=[row[0] for row in NO_NODES])
+def test_a_node_that_is_none_is_refused_by_name_and_line(
+    entry: str, module: str, text: str, configured: Configuration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if module:
+        (tmp_path / f"{entry.partition(':')[0]}.py").write_text(module)
+        monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ParameterError, match=text):
+        declared(entry)
 
 
 def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(configured: Configuration) -> None:
@@ -319,19 +282,6 @@ def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(config
     assert "joint2 is to be at 9 rad; allowed: " in loop.refusals["joint_posture_command"]
 
 
-def test_a_topic_that_is_in_no_table_is_refused(configured: Configuration) -> None:
-    class Lost(Echo):
-        name, topics = "lost", ()
-
-        @reaction(Input("gravity_effort", "effort"), outputs=("nowhere",))
-        def step(self, inputs: Inputs) -> Outputs:
-            return {}
-
-    assert declaration(Lost).outputs == ("nowhere",)
-    with pytest.raises(ParameterError, match="node 'lost' names the topic 'nowhere'"):
-        Interface(configured.shared, {"lost": Lost})
-
-
 def test_a_fault_of_the_driver_ends_the_task_in_the_simulation_too(configured: Configuration, tmp_path: Path) -> None:
     run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
     while run.driver.stamp < 150_000_000:
@@ -340,32 +290,60 @@ def test_a_fault_of_the_driver_ends_the_task_in_the_simulation_too(configured: C
     assert run.play() == "the driver stopped in step 'push': emergency stop"
 
 
-def test_two_nodes_that_publish_one_command_are_refused(configured: Configuration) -> None:
-    both = dataclasses.replace(configured.shared, nodes=(*configured.shared.nodes, "force_loop"))
-    with pytest.raises(ParameterError, match="'joint_velocity_command' has 2 publishers, impedance, force_loop"):
-        Interface(both)
-    twice = dataclasses.replace(
-        configured.shared, nodes=("driver", "gravity", "wam_control.velocity.gravity_node:GravityNode")
-    )
-    with pytest.raises(ParameterError, match="two nodes of the configuration are named 'gravity'"):
-        Interface(twice)
+def publishing(topic: str) -> Any:
+    """A node that declares a topic."""
+
+    class Lost(Echo):
+        name, topics = "lost", ()
+
+        @reaction(Input("gravity_effort", "effort"), outputs=(topic,))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    return Lost
 
 
-def test_a_subclass_keeps_the_reactions_of_its_parent() -> None:
-    class Louder(Echo):
-        name = "louder"
-
-    assert declaration(Louder).reactions == declaration(Echo).reactions
+GRAVITY = "wam_control.velocity.gravity_node:GravityNode"
 
 
-def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(configured: Configuration, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("more", "own", "text"),
+    [
+        (("force_loop",), {}, "'joint_velocity_command' has 2 publishers, impedance, force_loop"),
+        ((GRAVITY,), {}, "two nodes of the configuration are named 'gravity'"),
+        ((), {"lost": publishing("nowhere")}, "node 'lost' names the topic 'nowhere'"),
+        (
+            (),
+            {"lost": publishing("joint_posture_comand")},
+            r"'joint_posture_comand', .*did you mean 'joint_posture_command'\? topics = \(Topic\(...\),\) on the class",
+        ),
+    ],
+)
+def test_nodes_that_do_not_fit_together_are_refused(
+    more: tuple[str, ...], own: dict[str, Any], text: str, configured: Configuration
+) -> None:
+    shared = dataclasses.replace(configured.shared, nodes=(*configured.shared.nodes, *more))
+    with pytest.raises(ParameterError, match=text):
+        Interface(shared, own)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "text"),
+    [
+        (("echo",), "node 'echo' returned the topic 'ecko'; its reactions declare echo"),
+        ((), r"its reactions declare nothing; write outputs=\('ecko',\) in @reaction"),
+    ],
+)
+def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(
+    outputs: tuple[str, ...], text: str, configured: Configuration, tmp_path: Path
+) -> None:
     class Typing(Echo):
-        @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+        @reaction(Input("gravity_effort", "effort"), outputs=outputs)
         def step(self, inputs: Inputs) -> Outputs:
             return {"ecko": inputs["gravity_effort"]}
 
     run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Typing})
-    with pytest.raises(ValueError, match="node 'echo' returned the topic 'ecko'; its reactions declare echo"):
+    with pytest.raises(ValueError, match=text):
         run.play()
 
 
@@ -396,24 +374,6 @@ def test_the_nodes_of_the_stack_read_no_array_that_they_do_not_declare(
     assert plain.play() == masked.play() == ""
     is_same = repr(plain.rows) == repr(masked.rows)  # not in the assertion: pytest would compare the texts for minutes
     assert is_same
-
-
-def test_currents_that_are_not_finite_are_refused_by_name(configured: Configuration, tmp_path: Path) -> None:
-    class Broken:
-        name, parameters = "velocity_loop", Nothing
-
-        def __init__(self, shared: Shared, own: Nothing) -> None: ...
-
-        @reaction(Input("motor_states"), outputs=("motor_current_command",))
-        def step(self, inputs: Inputs) -> Outputs:
-            return {"motor_current_command": State([], [], [float("nan")] * 4)}
-
-    steps = load(tmp_path / "script.yaml", configured.shared)
-    own = {name: value for name, value in configured.sections.items() if name != "velocity_loop"}
-    run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
-    text = r"node 'velocity_loop' returned an unusable motor_current_command: effort of motor1 is nan; send finite"
-    with pytest.raises(UnusableOutput, match=text):
-        run.play()
 
 
 @pytest.mark.parametrize("velocity", [None, State([], [], []), State([], [0.1] * 4, [])])
@@ -517,23 +477,6 @@ def test_an_output_that_no_other_node_takes_is_refused_where_it_holds_no_numbers
     assert text in str(refusal.value)
 
 
-def test_a_controller_that_returns_nothing_is_named_in_the_simulation_too(configured: Configuration) -> None:
-    class Silent(Careless):
-        name = "silent"
-
-        @reaction(Input("joint_states", "position"), outputs=("joint_velocity_command", "joint_effort_command"))
-        def step(self, inputs: Inputs) -> Outputs:
-            return {}
-
-    with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
-    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.3)]
-    run = Simulation(with_own, steps, {"silent": Silent})
-    run.play()
-    fault = run.driver.safety.fault
-    assert fault.startswith("command stale"), fault
-    assert "silent runs, but did not publish joint_effort_command and joint_velocity_command: let each of" in fault
-
-
 def without(configuration: Configuration, node: str) -> Configuration:
     """The same nodes but one."""
     return configuration.with_values({"nodes": [name for name in configuration.shared.nodes if name != node]})
@@ -617,37 +560,12 @@ def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_t
     assert run.driver.safety.fault in failure
 
 
-@pytest.mark.slow
-def test_a_run_whose_scenario_gets_nothing_ends_with_the_node_that_is_the_reason() -> None:
-    class Silent:
-        name, parameters = "my_transform", Nothing
-
-        def __init__(self, shared: Shared, own: Nothing) -> None: ...
-
-        @reaction(Input("motor_states", "position"), outputs=("joint_states",), thinned=True)
-        def step(self, inputs: Inputs) -> Outputs:
-            return {}
-
-    wam = Configuration.load(packaged("wam"))
-    run = Simulation(without(wam, "transform"), [ScenarioStep("wait", 0.3)], {"my_transform": Silent})
-    text = "the scenario gets no joint_states for .*; my_transform runs, but did not publish joint_states: let each"
-    with pytest.raises(ValueError, match=text):
-        run.play()
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        (State([], [], [NAN] * 4), "unusable joint_effort_command: effort of joint1 is nan; send finite numbers"),
-        (State([], [], [0.0] * 3), "unusable joint_effort_command: effort has 3 values; send 4, one for each of"),
-    ],
-)
 def test_over_topics_the_fault_names_the_node_and_its_unusable_output(
-    given: State, text: str, arm: RunningArm, monkeypatch: pytest.MonkeyPatch
+    arm: RunningArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Careless, "given", given)
+    monkeypatch.setattr(Careless, "given", State([], [], [NAN] * 4))
     fault = arm.start(Careless, nodes=INNER_NODES).run_until_fault()
-    assert fault.startswith(f"careless: {text}")
+    assert fault.startswith("careless: unusable joint_effort_command: effort of joint1 is nan; send finite numbers")
 
 
 def test_an_array_in_the_place_of_another_argument_of_an_input_is_refused() -> None:
@@ -749,9 +667,7 @@ def test_a_list_of_another_length_is_refused_by_name(configured: Configuration) 
 def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
     configured: Configuration, arm: RunningArm, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    from wam_ros import node as adapter
-
-    monkeypatch.setattr(adapter, "NODE_LIMITS", replace(adapter.NODE_LIMITS, service_wait=0.0))
+    monkeypatch.setattr(requests, "NODE_LIMITS", replace(requests.NODE_LIMITS, service_wait=0.0))
     said: list[str] = []
     arm.start(Requesting, configuration=configured)
     arm.run_until(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))

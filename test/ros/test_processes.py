@@ -14,19 +14,22 @@ from typing import Any
 
 import pytest
 from conftest import LONG, soon
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
 
 from wam_bag.bag import read
-from wam_cli.main import COMMANDS, main
+from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
 from wam_description.event import fault
 from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
-from wam_ros.bring_up import Processes
+from wam_ros.bring_up import Composition, Processes
 from wam_ros.limits import CALL_LIMITS, PROCESS_LIMITS
 from wam_ros.process_signals import HELD_UP as HELD_UP_BY
-from wam_ros.process_signals import bound_leaving, leaving
+from wam_ros.process_signals import LISTENER_GONE, bound_leaving, leaving
 from wam_ros.topics import qos
 
 ROOT = Path(__file__).parents[2]
@@ -120,9 +123,6 @@ def statuses(folder: Path, node: str) -> list[str]:
 
 def enable(ros: Any, stack: Stack) -> None:
     """Release the brakes, and wait until the driver's status has come: it is latched, and the next one replaces it."""
-    from diagnostic_msgs.msg import DiagnosticStatus
-    from std_srvs.srv import SetBool
-
     node = ros.node("asker")
     seen: list[str] = []
     node.create_subscription(
@@ -334,21 +334,6 @@ def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> No
     assert call("disable")[0] == 0
 
 
-def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, domain_id: int) -> None:
-    path = tmp_path / "mine.yaml"
-    path.write_text(packaged("wam").read_text().replace("nodes: [driver,", "nodes: [drver,"))
-    done = subprocess.run(
-        [sys.executable, "-m", "wam_cli.main", "up", "--config", str(path)],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=LONG,
-    )
-    assert done.returncode == 1
-    assert "no node is named 'drver'; nodes: driver, transform" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
 def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
     stack = started("-m", "wam_cli.main", "demo", "--no-live", "--real-time-factor", "0", "--name", "stopped")
     wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
@@ -368,14 +353,24 @@ def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: P
     assert (bag / "metadata.yaml").is_file(), "the recorder closed its bag"
 
 
-def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, domain_id: int) -> None:
-    stack = up(started, "--processes")
-    (victim,) = (pid for pid in stack.alive() if b"velocity_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
+GROUP = "transform or gravity or force_loop or contact_estimator"
+
+
+@pytest.mark.parametrize(
+    ("options", "killed", "named"),
+    [(("--processes",), b"velocity_loop", "velocity_loop"), (("--realtime", *BOLD), b"force_loop", GROUP)],
+    ids=["node", "group"],
+)
+def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(
+    options: tuple[str, ...], killed: bytes, named: str, started: Any, tmp_path: Path, domain_id: int
+) -> None:
+    stack = up(started, *options)
+    (victim,) = (pid for pid in stack.alive() if killed in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(victim, signal.SIGKILL)
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.alive() == []
-    errors = [line for line in stack.said().splitlines() if "rror" in line]
-    cause = "error: node velocity_loop was ended from outside by SIGKILL; the system does that where memory is short"
+    errors = [line for line in stack.said().splitlines() if line.startswith("error: ")]
+    cause = f"error: node {named} was ended from outside by SIGKILL; the system does that where memory is short"
     assert errors[0] == f"{cause}; all others are stopped now", "the cause comes first"
     assert errors[-1] == f"{cause}; all others were stopped"
     assert stack.process.returncode == 9
@@ -445,19 +440,6 @@ def test_signals_while_a_program_ends_do_not_change_how_it_ends(program: str, ro
     assert "Traceback" not in stack.said()
 
 
-def test_a_group_that_loses_its_process_is_named_and_takes_the_stack_with_it(
-    started: Any, tmp_path: Path, domain_id: int
-) -> None:
-    stack = up(started, "--realtime", *BOLD)
-    (victim,) = (pid for pid in stack.alive() if b"force_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
-    os.kill(victim, signal.SIGKILL)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
-    assert stack.alive() == []
-    group = "transform or gravity or force_loop or contact_estimator"
-    assert f"node {group} was ended from outside by SIGKILL" in stack.said()
-    assert statuses(tmp_path, "driver")[-1] == "braked"
-
-
 @pytest.mark.parametrize("name", ["driver", "velocity_loop"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: Any, started: Any) -> None:
@@ -471,12 +453,6 @@ def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: A
 
 
 def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any) -> None:
-    from diagnostic_msgs.msg import DiagnosticStatus
-    from sensor_msgs.msg import JointState
-
-    from wam_description.topics import BY_NAME
-    from wam_ros.topics import qos
-
     said: list[str] = []
     states: list[Any] = []
     listener = ros.node("listener")
@@ -516,18 +492,6 @@ def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
     return (code if isinstance(code, int) else 1, output.out, output.err if isinstance(code, int) else str(code))
 
 
-SUBCOMMANDS = tuple(COMMANDS)
-
-
-@pytest.mark.parametrize("subcommand", [None, *SUBCOMMANDS])
-def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys: Any) -> None:
-    code, out, _ = command(capsys, *filter(None, [subcommand, "--help"]))
-    assert code == 0
-    assert out.startswith(f"usage: wam {subcommand or ''}".rstrip())
-    if subcommand is None:
-        assert all(name in out for name in SUBCOMMANDS)
-
-
 @pytest.mark.slow
 def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> None:
     begin = [sys.executable, "-m", "wam_cli.main", "evaluate", "contact", "--seeds", "1"]
@@ -557,31 +521,6 @@ def test_a_reader_who_has_had_enough_is_no_error() -> None:
     )
     os.close(write)
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (["up", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
-        (["node", "driver", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
-        (["demo", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
-        (["model", "urdf", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
-        (["node", "elbow"], "no node is named 'elbow'; nodes: driver, transform, velocity_loop"),
-    ],
-)
-def test_what_does_not_exist_is_said_in_one_line(arguments: list[str], text: str, capsys: Any) -> None:
-    code, out, err = command(capsys, *arguments)
-    assert code == 1
-    assert err.startswith(f"wam {arguments[0]}: {text}")
-    assert err.count("\n") == 1
-    assert out == ""
-
-
-@pytest.mark.parametrize("arguments", [["dmeo"], ["up", "--fast"], ["model", "sdf"], ["up", "extra"]])
-def test_a_wrong_command_line_shows_the_usage(arguments: list[str], capsys: Any) -> None:
-    code, _, err = command(capsys, *arguments)
-    assert code == 2
-    assert err.startswith("usage: wam")
 
 
 @pytest.mark.parametrize(
@@ -621,8 +560,6 @@ class Echo:
 def test_record_takes_mode_and_nodes_from_the_running_stack(
     mode: str, started: Any, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wam_ros.bring_up import Composition
-
     (tmp_path / "own_echo.py").write_text(OWN)
     monkeypatch.syspath_prepend(tmp_path)
     configured = Configuration.load(packaged("wam")).with_nodes("own_echo:Echo").with_values({"timing.mode": mode})
@@ -660,17 +597,7 @@ def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) 
     assert "--set timing.mode has no effect here: the running stack has its own" in err
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("form", ["urdf", "mjcf"])
-def test_model_is_written_to_standard_output(form: str, capsys: Any) -> None:
-    code, out, _ = command(capsys, "model", form)
-    assert code == 0
-    assert {"urdf": "<robot", "mjcf": "<mujoco"}[form] in out
-
-
 def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
-    from wam_ros.bring_up import Composition
-
     script = tmp_path / "script.yaml"
     script.write_text("steps: [{name: wait, seconds: 0.05}, {name: release, seconds: 100.0, request: enable}]")
     configured = Configuration.load(packaged("wam")).with_values(
@@ -689,23 +616,7 @@ def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, doma
         assert "refused: no motor_current_command comes in; start velocity_loop" in scenario.failure
 
 
-def test_a_composition_in_lockstep_can_be_left_at_any_moment(domain_id: int) -> None:
-    from wam_ros.bring_up import Composition
-
-    configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
-    begin = time.monotonic()
-    with Composition(configured, domain_id=domain_id) as composition:
-        driver: Any = composition.nodes["driver"]
-        composition.spin(lambda: driver.driver.stamp > 50_000_000 or time.monotonic() - begin > LONG)
-        assert driver.driver.stamp > 50_000_000
-        begin = time.monotonic()
-        composition.spin(lambda: time.monotonic() - begin > 0.2)
-        assert time.monotonic() - begin < soon()
-
-
 def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, domain_id: int) -> None:
-    from wam_ros.bring_up import Composition
-
     script = tmp_path / "script.yaml"
     script.write_text("steps: [{name: wait, seconds: 100.0}]")
     base = Configuration.load(packaged("wam"))
@@ -746,8 +657,6 @@ run({"sender": Sender})
 def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
     listener_gone: bool, started: Any, domain_id: int
 ) -> None:
-    from wam_ros.process_signals import LISTENER_GONE
-
     stack = started("-c", REPORT_THE_DELIVERY)
     wait(lambda: "made" in stack.said() or stack.process.poll() is not None, "the node")
     assert stack.process.poll() is None, stack.said()
@@ -762,8 +671,6 @@ def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
 def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
     number: signal.Signals, is_announced: bool, recording: Processes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wam_ros.process_signals import LISTENER_GONE
-
     sent: list[int] = []
     monkeypatch.setattr(subprocess.Popen, "send_signal", lambda process, number: sent.append(number))
     os.kill(pid_of(recording, "recorder"), number)
@@ -775,8 +682,6 @@ def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
 def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wam_ros.bring_up import Composition
-
     patience = 4.0  # s; each of the six nodes would wait as long
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=patience))
     configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
@@ -798,8 +703,6 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
     started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is the only one that is kept: replaced before it is taken, it is a message that a recording lacks."""
-    from wam_ros.bring_up import Composition
-
     monkeypatch.setattr("wam_ros.run.PROCESS_LIMITS", replace(PROCESS_LIMITS, delivery=0.2))
     configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ["driver"]})
     with Composition(configured, domain_id=domain_id) as composition:
@@ -826,8 +729,6 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
 
 
 def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
-    from std_srvs.srv import Trigger
-
     script = tmp_path / "script.yaml"
     script.write_text("steps: [{name: wait, seconds: 100.0}]")
     stack = started("-m", "wam_cli.main", "up", "--realtime", "--scenario", str(script), *BOLD)

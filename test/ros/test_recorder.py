@@ -36,7 +36,6 @@ from std_msgs.msg import Bool, String
 
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
-from wam_bag.cdr import stamp_reader
 from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_description.agreement import DIGESTS, digests
@@ -82,6 +81,32 @@ def state(stamp: int, value: float) -> JointState:
 
 def received(node: RecorderNode, topic: str) -> int:
     return sum(count.received for count in node.recorder.counts() if count.topic == topic)
+
+
+def sending(ros: Any, count: int, node: RecorderNode | None = None, step: int = 1) -> Any:
+    """A publisher of the driver that has sent so many motor states, which the recorder has received."""
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    before = received(node, "/wam/motor_states") if node else 0
+    for k in range(1, count + 1):
+        sender.publish(state(k * step, 0.5))
+    ros.wait(lambda: node is None or received(node, "/wam/motor_states") == before + count)
+    return sender
+
+
+def machine(folder: Path, *topics: str, mode: str = "lockstep", arm: str = "/wam") -> Recorder:
+    """A recorder of topics, by their full names, without ROS."""
+    rows = {name: BY_NAME[name if name in BY_NAME else name.removeprefix("/wam/")] for name in topics}
+    offered = {name: qos(row) for name, row in rows.items()}
+    return Recorder(BagWriter(folder / "bag"), rows, mode, offered, lambda name: {"1": "driver"}, arm)
+
+
+def listening(ros: Any) -> list[Any]:
+    """Statuses, as they come."""
+    states: list[Any] = []
+    row = BY_NAME["status"]
+    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    return states
 
 
 @contextlib.contextmanager
@@ -161,17 +186,9 @@ def test_only_the_topics_that_were_chosen_are_in_the_bag(ros: Any, tmp_path: Pat
         assert {c.topic: c.msgcount for c in reader.connections} == {"/wam/motor_states": 10, "/clock": 0}
 
 
-def test_a_topic_that_does_not_exist_is_refused(ros: Any, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="parameter 'topics' names 'motor_state'; allowed: \\*, "):
-        recorder(ros, tmp_path, topics=["motor_state"])
-
-
 def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
     node = recorder(ros, tmp_path)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(matched(sender))
-    sender.publish(state(0, 0.0))
-    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    sender = sending(ros, 1, node)
     for k in range(1500):  # nobody spins: the reader keeps the last 1000
         sender.publish(state(k, 0.0))
     ros.wait(lambda: received(node, "/wam/motor_states") == 1001)
@@ -194,24 +211,13 @@ def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any
     assert message.data == "<robot/>"
 
 
-def test_it_records_on_the_single_threaded_executor_too(ros: Any, tmp_path: Path) -> None:
-    ros.executor.shutdown()
-    ros.executor = SingleThreadedExecutor(context=ros.context)
+@pytest.mark.parametrize("is_single_threaded", [True, False])
+def test_what_has_arrived_when_it_is_stopped_is_recorded(is_single_threaded: bool, ros: Any, tmp_path: Path) -> None:
+    if is_single_threaded:
+        ros.executor.shutdown()
+        ros.executor = SingleThreadedExecutor(context=ros.context)
     node = recorder(ros, tmp_path)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(matched(sender))
-    for k in range(20):
-        sender.publish(state(k, 0.0))
-    ros.wait(lambda: received(node, "/wam/motor_states") == 20)
-    assert {c.dropped for c in node.recorder.counts()} == {0}
-
-
-def test_what_has_arrived_when_it_is_stopped_is_recorded(ros: Any, tmp_path: Path) -> None:
-    node = recorder(ros, tmp_path)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(matched(sender))
-    for k in range(200):
-        sender.publish(state(k, 0.0))
+    sending(ros, 200)
     ros.remove(node)
     assert len(read(tmp_path / "bag").topics["/wam/motor_states"].log_time_ns) == 200
 
@@ -250,10 +256,7 @@ def test_lockstep_times_are_those_of_the_messages(ros: Any, tmp_path: Path) -> N
 
 
 def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any, tmp_path: Path) -> None:
-    states: list[Any] = []
-    listener = ros.node("listener")
-    row = BY_NAME["status"]
-    listener.create_subscription(message_type(row), "status", states.append, qos(row))
+    states = listening(ros)
     node = recorder(ros, tmp_path, nodes=("gravity", "recorder"))
     ros.wait(lambda: node.count_subscribers("/wam/status") == 2)
     other = Node(
@@ -280,13 +283,9 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
-    sender = publisher(ros.node("driver"), "motor_states")
     with recorder_process(ros, tmp_path) as process:
-        ros.wait(matched(sender))
-        for k in range(1, 501):
-            sender.publish(state(k, 0.0))
-        file = tmp_path / "bag" / "bag_0.mcap"
-        ros.wait(lambda: len(recovered(file)) >= 500)
+        sending(ros, 500)
+        ros.wait(lambda: len(recovered(tmp_path / "bag" / "bag_0.mcap")) >= 500)
         process.send_signal(stop)
         _, said = process.communicate(timeout=LONG)
         assert process.returncode == 0, said
@@ -296,10 +295,8 @@ def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, st
 
 
 def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Path) -> None:
-    sender = publisher(ros.node("driver"), "motor_states")
-    file = tmp_path / "bag" / "bag_0.mcap"
     with recorder_process(ros, tmp_path) as process:
-        ros.wait(matched(sender))
+        sender = sending(ros, 0)
         sent: list[int] = []
 
         def send() -> bool:
@@ -311,7 +308,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Pat
         killed = time.time_ns()
         process.kill()
         process.wait()
-    found = [m for m in recovered(file) if m.publish_time >= sent[0] - 1_000_000]
+    found = [m for m in recovered(tmp_path / "bag" / "bag_0.mcap") if m.publish_time >= sent[0] - 1_000_000]
     states = [m for m in found if len(m.data) > 60 and m.publish_time <= killed]
     assert len([t for t in sent if t < killed - 1_000_000_000]) >= 100
     assert states[-1].publish_time > killed - 1_000_000_000
@@ -328,6 +325,8 @@ def test_a_bag_that_cannot_be_made_stops_the_node_before_it_starts(ros: Any, tmp
         recorder(ros, tmp_path)
     with pytest.raises(ParameterError, match="without directories"):
         recorder(ros, tmp_path, name="../bag")
+    with pytest.raises(ParameterError, match="parameter 'topics' names 'motor_state'; allowed: \\*, "):
+        recorder(ros, tmp_path, topics=["motor_state"])
 
 
 def by_hand(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
@@ -490,41 +489,29 @@ def test_what_a_restarted_node_published_before_it_was_connected_is_not_lost(ros
     assert (found.received + found.missed, found.dropped) == (4 + 8, 0)
 
 
-def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
-    def data(name: str) -> bytes:
-        message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=name)])
-        return bytes(serialize_message(message))
+def diagnostics(name: str, stamp: int) -> bytes:
+    message = DiagnosticArray(header=header(stamp, "abc"), status=[DiagnosticStatus(name=name)])
+    return bytes(serialize_message(message))
 
-    row = BY_NAME["/diagnostics"]
-    with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
-        for number in (1, 2, 3):
-            machine.receive(row.name, data("driver: timing"), 0, 0, number)
-        for number in (1, 9):
-            machine.receive(row.name, data("wam: gravity"), 0, 0, number)
-        assert {c.publisher: (c.received, c.dropped) for c in machine.counts()} == {
-            "driver": (3, 0),
-            "gravity": (2, 7),
-        }
+
+def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
+    found = machine(tmp_path, "/diagnostics")
+    for name, numbers in (("driver: timing", (1, 2, 3)), ("wam: gravity", (1, 9))):
+        for number in numbers:
+            found.receive("/diagnostics", diagnostics(name, 5), 0, 0, number)
+    counts = {c.publisher: (c.received, c.dropped) for c in found.counts()}
+    assert counts == {"driver": (3, 0), "gravity": (2, 7)}
 
 
 def test_the_times_of_a_lockstep_recording_are_not_those_of_another_arm(tmp_path: Path) -> None:
-    def diagnostics(name: str, stamp: int) -> bytes:
-        message = DiagnosticArray(header=header(stamp, ""), status=[DiagnosticStatus(name=name)])
-        return bytes(serialize_message(message))
-
-    rows = [BY_NAME["/diagnostics"], BY_NAME["motor_states"]]
-    with BagWriter(tmp_path / "bag") as bag:
-        profiles = {row.name: qos(row) for row in rows}
-        machine = Recorder(
-            bag, {row.name: row for row in rows}, "lockstep", profiles, lambda name: {"1": "driver"}, "/left"
-        )
-        machine.receive("/diagnostics", diagnostics("right: driver", 1_795_558_389_219_000_000), 0, 0, 7)
-        machine.receive("motor_states", bytes(serialize_message(state(5_000_000, 0.1))), 0, 0, 1)
-        machine.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
-        machine.receive("/diagnostics", diagnostics("right: gravity", 1_795_558_390_219_000_000), 0, 0, 30)
-        machine.receive("motor_states", bytes(serialize_message(state(7_000_000, 0.1))), 0, 0, 2)
-        assert machine.dropped() == 0
+    found = machine(tmp_path, "/diagnostics", "motor_states", arm="/left")
+    found.receive("/diagnostics", diagnostics("right: driver", 1_795_558_389_219_000_000), 0, 0, 7)
+    found.receive("motor_states", bytes(serialize_message(state(5_000_000, 0.1))), 0, 0, 1)
+    found.receive("/diagnostics", diagnostics("left: driver", 6_000_000), 0, 0, 1)
+    found.receive("/diagnostics", diagnostics("right: gravity", 1_795_558_390_219_000_000), 0, 0, 30)
+    found.receive("motor_states", bytes(serialize_message(state(7_000_000, 0.1))), 0, 0, 2)
+    assert found.dropped() == 0
+    found.finish()
     times = sorted(message.log_time for message in recovered(next((tmp_path / "bag").glob("*.mcap"))))
     assert times[-1] == 7_000_000
     assert len(times) == 5
@@ -537,34 +524,20 @@ def fill_disk(bag: BagWriter) -> None:
 
 
 def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
-    row = BY_NAME["contact/in_contact"]
-    bag = BagWriter(tmp_path / "bag")
-    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: {}, "/wam")
-    machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
-    assert not machine.failure
+    found = machine(tmp_path, "/wam/contact/in_contact", mode="realtime")
+    bag = found._bag
+    found.receive("/wam/contact/in_contact", b"\0\1\0\0\1", 1, 1, 1)
+    assert not found.failure
     fill_disk(bag)
     bag._writer._chunk_size = 1
     for number in (2, 3):
-        machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
-    machine.finish()
+        found.receive("/wam/contact/in_contact", b"\0\1\0\0\1", 1, 1, number)
+    found.finish()
     stopped = f"recording into {tmp_path / 'bag'} has stopped: the disk is full (No space left on device)"
-    assert machine.failure.startswith(stopped)
-    assert "free some space" in machine.failure
-    assert machine.lost_at_disk == 2
+    assert found.failure.startswith(stopped)
+    assert "free some space" in found.failure
+    assert found.lost_at_disk == 2
     assert bag.closed
-
-
-def test_a_node_whose_disk_is_full_says_so_in_its_status(ros: Any, tmp_path: Path) -> None:
-    states: list[Any] = []
-    row = BY_NAME["status"]
-    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
-    node = recorder(ros, tmp_path)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
-    fill_disk(node.bag)
-    sender.publish(state(1, 0.0))
-    ros.wait(lambda: any(said.level == said.ERROR and "No space left" in said.message for said in states))
-    assert "No space left" in node.failure
 
 
 def report(node: str, ended: bool, arm: str = "wam", **published: int) -> DiagnosticArray:
@@ -601,11 +574,8 @@ def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_pa
 
 def test_what_is_on_its_way_at_the_end_is_waited_for(ros: Any, tmp_path: Path) -> None:
     node = recorder(ros, tmp_path)
-    states = publisher(ros.node("driver"), "motor_states")
-    ros.wait(matched(states))
     node.recorder.announce("driver", "/wam/motor_states", 1)
-    states.publish(state(1, 0.0))
-    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    states = sending(ros, 1, node)
     node.recorder.announce("driver", "/wam/motor_states", 2)
     late = threading.Timer(0.2, lambda: states.publish(state(2, 0.0)))
     late.start()
@@ -679,55 +649,58 @@ def test_a_gap_of_a_second_life_is_not_closed_by_numbers_of_the_first() -> None:
 
 def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:
     """The stack runs on while the recorder stops: the last total is older than the last messages."""
-    row, name = BY_NAME["motor_states"], "/wam/motor_states"
-    with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {name: row}, "lockstep", {name: qos(row)}, lambda name: {"1": "driver"}, "/wam")
-        data = bytes(serialize_message(state(1, 0.0)))
-        for number in range(6000, 8000):
-            machine.receive(name, data, 0, 0, number)
-            if number in (6500, 7500):
-                machine.announce("driver", name, number - 3)
-        assert machine.lost_at_end() == 0
-        machine.announce("driver", name, 8010)
-        assert machine.lost_at_end() == 11
+    name = "/wam/motor_states"
+    found = machine(tmp_path, name)
+    data = bytes(serialize_message(state(1, 0.0)))
+    for number in range(6000, 8000):
+        found.receive(name, data, 0, 0, number)
+        if number in (6500, 7500):
+            found.announce("driver", name, number - 3)
+    assert found.lost_at_end() == 0
+    found.announce("driver", name, 8010)
+    assert found.lost_at_end() == 11
 
 
-@pytest.mark.parametrize("required", [False, True])
-@pytest.mark.parametrize("change", ["deleted", "moved"])
-def test_a_bag_that_vanishes_is_told_at_once_and_is_a_fault_if_it_was_required(
-    change: str, required: bool, ros: Any, tmp_path: Path
+@pytest.mark.parametrize(
+    ("change", "required", "text"),
+    [
+        ("deleted", True, "bag_0.mcap is gone (No such file or directory): it was deleted or moved"),
+        ("moved", False, "bag_0.mcap is gone (No such file or directory): it was deleted or moved"),
+        ("full", False, "No space left"),
+    ],
+)
+def test_a_bag_that_cannot_be_written_any_more_is_reported_at_once_and_is_a_fault_if_it_was_required(
+    change: str, required: bool, text: str, ros: Any, tmp_path: Path
 ) -> None:
-    states: list[Any] = []
-    row = BY_NAME["status"]
-    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    states = listening(ros)
     node = recorder(ros, tmp_path, required=required)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
-    sender.publish(state(1, 0.0))
-    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    sender = sending(ros, 1, node)
+    ros.wait(lambda: node.count_subscribers("/wam/status") == 2)
     node.recorder.flush()
     if change == "deleted":
         shutil.rmtree(tmp_path / "bag")
-    else:
+    elif change == "moved":
         (tmp_path / "bag").rename(tmp_path / "elsewhere")
+    else:
+        fill_disk(node.bag)
+        sender.publish(state(2, 0.0))
     begin = time.monotonic()
     ros.wait(lambda: any(said.level == said.ERROR for said in states), what="an error in the status")
     assert time.monotonic() - begin < soon()
     (said,) = (said for said in states if said.level == said.ERROR)
-    assert "bag_0.mcap is gone (No such file or directory): it was deleted or moved" in said.message
+    assert text in said.message
+    assert text in node.failure
     assert read_status(said).fault == (said.message if required else "")
     if change == "moved":  # what was recorded before is whole
         assert len(read(tmp_path / "elsewhere").topics["/wam/motor_states"].stamp_ns) <= 1
 
 
 def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
-    row = BY_NAME["status"]
-    with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: {}, "/wam")
-        for k in range(300):
-            status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
-            machine.receive(row.name, bytes(serialize_message(status)), 0, 0, 1)
-        counts = machine.counts()
+    found = machine(tmp_path, "status")
+    for k in range(300):
+        status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
+        found.receive("status", bytes(serialize_message(status)), 0, 0, 1)
+    counts = found.counts()
     assert len(counts) <= 64
     assert max(len(count.publisher) for count in counts) < 300
     assert "\x1b" not in counts[0].publisher
@@ -737,25 +710,21 @@ def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
 def test_no_bytes_on_any_topic_end_the_recorder(tmp_path: Path) -> None:
     chance = random.Random(20261120)
     rows = list(BY_NAME.values())
-    with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: {}, "/wam")
-        for k in range(5000):
-            row = chance.choice(rows)
-            data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))
-            for _ in range(chance.randrange(6)):
-                data[chance.randrange(len(data))] = chance.choice([0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)])
-            machine.receive(row.name, bytes(data[: chance.randrange(len(data) + 1)]), k, k, k)
-        assert not machine.failure
+    found = machine(tmp_path, *BY_NAME)
+    for k in range(5000):
+        row = chance.choice(rows)
+        data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))
+        for _ in range(chance.randrange(6)):
+            data[chance.randrange(len(data))] = chance.choice([0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)])
+        found.receive(row.name, bytes(data[: chance.randrange(len(data) + 1)]), k, k, k)
+    found.finish()
+    assert not found.failure
     assert sum(read(tmp_path / "bag", may_lack=True, topics=[]).counts.values()) == 5000
 
 
 def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: Path) -> None:
     node = recorder(ros, tmp_path, mode="lockstep", split_time=0.1)
-    sender = publisher(ros.node("driver"), "motor_states")
-    ros.wait(matched(sender))
-    for k in range(1, 301):
-        sender.publish(state(k * 1_000_000, 0.5))
-    ros.wait(lambda: received(node, "/wam/motor_states") == 300)
+    sending(ros, 300, node, step=1_000_000)
     ros.remove(node)
     names = [f"bag_{i}.mcap" for i in range(3)]
     assert sorted(path.name for path in (tmp_path / "bag").glob("*.mcap")) == names
@@ -785,13 +754,10 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, m
 
 
 def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
-    states, push = BY_NAME["motor_states"], BY_NAME["sim/disturbance"]
-    names = {"/wam/motor_states": states, "/wam/sim/disturbance": push}
-    offered = {name: qos(row) for name, row in names.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), names, "lockstep", offered, lambda name: {}, "/wam")
-    machine.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
-    machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
-    machine.finish()
+    found = machine(tmp_path, "/wam/motor_states", "/wam/sim/disturbance")
+    found.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
+    found.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
+    found.finish()
     assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
 
 
@@ -800,15 +766,13 @@ def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
     number: int, begin: int, tmp_path: Path
 ) -> None:
     """Its duration, and with that its rates, would count from the start of the run."""
-    rows = {f"/wam/{name}": BY_NAME[name] for name in ("robot_description", "status", "motor_states")}
-    offered = {name: qos(row) for name, row in rows.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
-    machine.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
-    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
+    found = machine(tmp_path, "/wam/robot_description", "/wam/status", "/wam/motor_states")
+    found.receive("/wam/robot_description", serialize_message(String(data="<robot/>")), 1, 1, 1)
+    found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 3)
     for k in range(3):
-        machine.receive("/wam/motor_states", serialize_message(state(6_000_000_000 + k, 0.0)), 1, 1, number + k)
-    machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 4)
-    machine.finish()
+        found.receive("/wam/motor_states", serialize_message(state(6_000_000_000 + k, 0.0)), 1, 1, number + k)
+    found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, 4)
+    found.finish()
     topics = read(tmp_path / "bag").topics
     assert topics["/wam/robot_description"].log_time_ns.tolist() == [begin]
     assert topics["/wam/status"].log_time_ns.tolist() == [begin, begin]
@@ -817,22 +781,9 @@ def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
 
 
 def test_a_run_without_a_stamp_is_recorded_at_its_start(tmp_path: Path) -> None:
-    rows = {f"/wam/{name}": BY_NAME[name] for name in ("status", "motor_states")}
-    offered = {name: qos(row) for name, row in rows.items()}
-    machine = Recorder(BagWriter(tmp_path / "bag"), rows, "lockstep", offered, lambda name: {"1": "driver"}, "/wam")
+    found = machine(tmp_path, "/wam/status", "/wam/motor_states")
     for number in range(1, 2001):  # the arm is paused
-        machine.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
-    machine.finish()
+        found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
+    found.finish()
     assert set(read(tmp_path / "bag").topics["/wam/status"].log_time_ns.tolist()) == {0}
     assert contents(tmp_path / "bag").topics["/wam/status"].messages == 2000
-
-
-def test_topics_without_a_stamp_are_taken_first(ros: Any, tmp_path: Path) -> None:
-    """Or the stamp that gives a status its time comes in the next round, where both are sent while a round is on."""
-    node = recorder(ros, tmp_path)
-    stamped = [
-        stamp_reader(BY_NAME.get(name, BY_NAME[name.removeprefix("/wam/")]).type)(bytes([1] * 100)) is not None
-        for name in node._inlets
-    ]
-    assert stamped == sorted(stamped)
-    assert set(stamped) == {True, False}

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 
 from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
 from wam_description.configuration import Configuration
-from wam_description.driver_contract import DriverContract
 from wam_description.interface import declared
 from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.interface import BusParameters
@@ -15,7 +14,7 @@ from wam_driver.bus.lines import line_of
 from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
-from wam_ros.driver_probe import DriverProbe
+from wam_ros.driver_bench import DriverBench
 from wam_ros.network import require_places
 from wam_ros.run import Connection
 
@@ -77,12 +76,12 @@ def run(given: argparse.Namespace) -> int:
     print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
-    with connected(given.namespace, configuration, given.current) as probe:
+    with connected(given.namespace, configuration, given.share, given.current) as bench:
         driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
         try:
-            control = (driver.stop, driver.start) if driver else (None, None)
-            contract = DriverContract.of(configuration.shared, given.share)
-            for row in Conformance(probe, contract, given.attempts, *control).rows():
+            if driver:
+                bench.end, bench.restart = driver.stop, driver.start
+            for row in Conformance(bench, given.attempts).rows():
                 counts[row.verdict] += 1
                 print(row.text)
                 sys.stdout.flush()
@@ -128,18 +127,19 @@ def on_bus(configuration: Configuration, bus: str) -> Configuration:
 
 
 @contextmanager
-def connected(where: str, configuration: Configuration, current: float) -> Iterator[DriverProbe]:
-    """A probe on the network of the driver."""
+def connected(where: str, configuration: Configuration, share: float, current: float) -> Iterator[DriverBench]:
+    """A bench on the network of the driver."""
     connection = Connection()
     try:
-        probe = DriverProbe(
+        bench = DriverBench(
             configuration.shared,
+            share,
             current,
             lambda seconds: connection.executor.spin_once(timeout_sec=seconds),
             context=connection.context,
             namespace=where,
         )
-        connection.add(probe)
-        yield probe
+        connection.add(bench)
+        yield bench
     finally:
         connection.close()
