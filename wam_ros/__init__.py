@@ -10,7 +10,7 @@
 - local_bus: messages between nodes of one process, without the middleware
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - requests: requests to services and their answers; call: one request from a shell
-- recorder, recorder_node, recorder_interface: every topic into a bag
+- recorder, recorder_node, recorder_interface: every topic into a bag; recorded_stack: whether that is one run
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - long_steps: a node that holds up the others of its process
 - processors: those that the processes of one lockstep keep to

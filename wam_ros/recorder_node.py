@@ -11,11 +11,9 @@ from rclpy.clock_type import ClockType
 from rclpy.serialization import deserialize_message
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
-from wam_description.agreement import DIGESTS, difference
-from wam_description.arm import Shared
 from wam_description.event import Level
 from wam_description.interface import Interface
-from wam_description.parameters import ParameterError, fields, values
+from wam_description.parameters import ParameterError, values
 from wam_description.signals import NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
@@ -25,13 +23,11 @@ from wam_ros.limits import RECORDER_LIMITS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
+from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
-from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, qos, topic_name
-
-_SHARED = frozenset(field.name for field in fields(Shared))
 
 
 class Silence:
@@ -65,7 +61,6 @@ class RecorderNode(TolerantNode):
         require_name(self, "recorder")
         shared, own = declare(self, RecorderParameters)
         self._own_parameters = {**values(shared), **values(own)}
-        self._mode, self._listed = shared.timing.mode, frozenset(shared.nodes)
         self._arm = shared.arm.name
         self._required = own.required
         name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
@@ -91,7 +86,7 @@ class RecorderNode(TolerantNode):
         self._ends_last = own_name in interface.names  # one that was started by hand may end before the others
         self._unfinished = set(self._nodes) if self._ends_last else set()  # nodes without a final count
         self._expected = {name: len([one for one in found if one != own_name]) for name, found in publishers.items()}
-        self.parameters_of_nodes = RemoteParameters(self, [name for name in interface.names if name != own_name])
+        self.stack = RecordedStack(self, shared, self._nodes, str(self.bag.path))
         self._status = self.create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
         diagnostics = BY_NAME["/diagnostics"]
         self._diagnostics = self.create_publisher(DiagnosticArray, diagnostics.name, qos(diagnostics))
@@ -99,13 +94,6 @@ class RecorderNode(TolerantNode):
         self._attached = ""
         self._dropped = 0
         self._failed = False
-        self._differing: dict[
-            str, str
-        ] = {}  # how each node runs otherwise than this recorder takes it to, '' if it does not
-        self._digests: dict[str, str] = {}  # of the shared parameters with which each node ran first
-        self._lives: dict[str, str] = {}  # the node of each writer of a status that was seen
-        self._again: dict[str, RemoteParameters] = {}  # those of nodes that were started again
-        self._two_runs = ""  # which node was started again with others
         self._silence = Silence()  # of others, recorded or not
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain, clock=steady)
@@ -127,13 +115,7 @@ class RecorderNode(TolerantNode):
     @property
     def failure(self) -> str:
         """Why the bag is incomplete or has wrong times, '' if neither."""
-        return self.recorder.failure or self._wrong or self._two_runs or self._empty
-
-    @property
-    def _wrong(self) -> str:
-        """How nodes run otherwise than this recorder takes them to, and what to do."""
-        listed = "; ".join(filter(None, self._differing.values()))
-        return listed and f"{listed}; start the recorder with 'wam bag record', which takes both from the running stack"
+        return self.recorder.failure or self.stack.failure or self._empty
 
     @property
     def _empty(self) -> str:
@@ -173,43 +155,11 @@ class RecorderNode(TolerantNode):
                 self._unfinished.add(node)
 
     def _take_status(self, data: bytes) -> None:
-        """Report a node that was started again with other shared parameters: the bag has two runs then."""
         try:
             status = read_status(deserialize_message(data, DiagnosticStatus))
         except Exception:  # rclpy raises its own kinds for bytes that are no such message
             return
-        given = status.facts.get(DIGESTS, "")
-        if not given or status.node not in self._nodes or self._two_runs:
-            return
-        if found := difference(self._digests.setdefault(status.node, given), given):
-            self._report_two_runs(status.node, found)
-
-    @property
-    def restarted(self) -> list[str]:
-        """Nodes that were started again and whose parameters have been requested."""
-        return list(self._again)
-
-    def _look_for_restarts(self) -> None:
-        """Ask a node that was started again for its own parameters, and report others than those in the bag."""
-        for writer, node in self._writers(self._status_name).items():
-            if writer not in self._lives and node in self._lives.values() and node in self.parameters_of_nodes.found:
-                self._again[node] = RemoteParameters(self, [node])
-            self._lives[writer] = node
-        for node, again in list(self._again.items()):
-            again.ask()
-            if node in again.found:
-                del self._again[node]
-                before, after = self.parameters_of_nodes.found[node], again.found[node]
-                others = sorted(name for name in before.keys() - _SHARED if str(before[name]) != str(after.get(name)))
-                if others and not self._two_runs:
-                    self._report_two_runs(node, ", ".join(others))
-
-    def _report_two_runs(self, node: str, others: str) -> None:
-        self._two_runs = (
-            f"node {node} was started again, with another {others}, and {self.bag.path} has both runs; "
-            "record each with a recorder of its own"
-        )
-        self.get_logger().error(self._two_runs)
+        self.stack.hear(status)
 
     def _writers(self, name: str) -> dict[str, str]:
         """The present publishers of a topic: the node of each, with its namespace if it has another, by identity."""
@@ -224,10 +174,8 @@ class RecorderNode(TolerantNode):
         self.recorder.flush()
         self._warn()
         self._look_for_messages()
-        self.parameters_of_nodes.ask()
-        self._compare()
-        self._look_for_restarts()
-        if self.ready or self.parameters_of_nodes.missing or self._unmatched():
+        self.stack.attend(self._writers(self._status_name))
+        if self.ready or self.stack.parameters.missing or self._unmatched():
             return
         self._attach_parameters()  # now, so that a killed recorder leaves them
         if not self.recorder.failure:  # a scenario starts when all are ready
@@ -251,19 +199,6 @@ class RecorderNode(TolerantNode):
             self._dropped = dropped
             so_far = (count._replace(lost_at_end=0) for count in self.recorder.counts())  # it may still come
             self.get_logger().warning(f"the recorder was too slow: {summary(so_far)}")
-
-    def _compare(self) -> None:
-        """Report each node of the stack that has another mode or list of nodes than this recorder was given."""
-        for node, given in self.parameters_of_nodes.found.items():
-            if node in self._differing:
-                continue
-            mode, listed = given.get("timing.mode", self._mode), frozenset(given.get("nodes", self._listed))
-            others = listed.symmetric_difference(self._listed) - {RecorderInterface.name}
-            found = [f"node {node} runs in {mode}, and this recorder in {self._mode}"] * (mode != self._mode)
-            found += [f"node {node} and this recorder do not both have {', '.join(sorted(others))}"] * bool(others)
-            self._differing[node] = "; ".join(found)
-            if found:
-                self.get_logger().error(self._wrong)
 
     def _look_for_messages(self) -> None:
         """Report once that nothing comes, to a recorder that was started by hand and may wait for nobody."""
@@ -318,7 +253,7 @@ class RecorderNode(TolerantNode):
 
     def _attach_parameters(self) -> None:
         """Attach the known parameters, if these are more than were attached before."""
-        found = self.parameters_of_nodes.found
+        found = self.stack.parameters.found
         parameters = {self.resolve_service_name(node): given for node, given in found.items()}
         parameters[self.get_fully_qualified_name()] = self._own_parameters
         text = parameter_text(parameters)

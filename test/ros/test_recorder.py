@@ -267,7 +267,7 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
         automatically_declare_parameters_from_overrides=True,
     )
     ros.add(other)
-    ros.wait(lambda: not node.parameters_of_nodes.missing)
+    ros.wait(lambda: not node.stack.parameters.missing)
     node.attend()
     assert not node.ready, "ready before the topics of gravity were there"
     kept = [publisher(other, topic) for topic in ("gravity_effort", "status", "/diagnostics")]
@@ -352,7 +352,7 @@ def test_a_recorder_reports_a_stack_that_runs_otherwise_than_its_own_parameters(
     states = publisher(driver, "motor_states")
     ros.wait(matched(states))
     states.publish(state(1, 0.0))
-    ros.wait(lambda: received(node, "/wam/motor_states") and "driver" in node.parameters_of_nodes.found)
+    ros.wait(lambda: received(node, "/wam/motor_states") and "driver" in node.stack.parameters.found)
     node.attend()
     advice = "; start the recorder with 'wam bag record', which takes both from the running stack"
     assert node.failure == (difference and difference + advice)
@@ -403,10 +403,10 @@ def test_a_node_that_is_started_again_with_another_parameter_of_its_own_is_named
         status = publisher(gravity, "status")
         ros.wait(matched(status))
         status.publish(diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam"))
-        ros.wait(lambda: not node.parameters_of_nodes.missing)
+        ros.wait(lambda: not node.stack.parameters.missing)
         node.attend()
-        assert node.restarted == ["gravity"] * life
-        ros.wait(lambda: not node.restarted, what="its parameters")
+        assert node.stack.restarted == ["gravity"] * life
+        ros.wait(lambda: not node.stack.restarted, what="its parameters")
         ros.remove(gravity)
     begin = "node gravity was started again, with another gain, and "
     assert node.failure.startswith(begin) if again == 2.0 else node.failure == ""
