@@ -7,28 +7,27 @@ benchmarks/README.md shows the gain.
 """
 
 from collections.abc import Callable
-from functools import cache, lru_cache, partial
-from itertools import chain, product
+from functools import partial
+from itertools import product
 from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Bool, String
 
+from wam_bag import value_messages
 from wam_bag.cdr import Pattern, first_stamp
+from wam_bag.value_messages import Encode, joint_states, points, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
 from wam_description.signals import Point, State, Table, Wrench
-from wam_description.topics import BOOL, JOINT_STATE, POINT, STRING, TABLE, TIME, TRAJECTORY, WRENCH, Topic
+from wam_description.topics import JOINT_STATE, TABLE, TRAJECTORY, WRENCH, Topic
 from wam_description.wiring import mask
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.markers import contact_markers
 from wam_ros.messages import Refused, message_type, most_rows, reader
 
-_NO_HEADER = ((0, 0), "")  # stamp and frame
-_FLOAT64 = 8  # sensor_msgs/PointField
 _STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
-Encode = Callable[[int, Any], bytes]
+MARKERS = "visualization_msgs/msg/MarkerArray"
 Decode = Callable[[bytes], Any]
 Numbers = list[tuple[float, ...]]
 
@@ -46,22 +45,12 @@ def encoder(topic: Topic, shared: Shared) -> Encode:
     TypeError
         where no step can return a value for a topic of this type.
     """
-    names, clock = owners(topic, shared.arm), Pattern(TIME, _NO_HEADER[:1])
-    encoders: dict[str, Encode] = {
-        JOINT_STATE: lambda stamp, value: _state(names, tuple(map(len, value))).pack(stamp, *value),
-        WRENCH: lambda stamp, value: _wrench(value.frame).pack(stamp, (*value.force, *value.torque)),
-        POINT: lambda stamp, value: _point(value.frame).pack(stamp, value.position),
-        TABLE: lambda stamp, value: _packed_table(topic.columns, stamp, value),
-        TIME: lambda stamp, value: clock.pack(stamp),
-        BOOL: lambda stamp, value: bytes(serialize_message(Bool(data=bool(value)))),
-        STRING: lambda stamp, value: bytes(serialize_message(String(data=value))),
-        "visualization_msgs/msg/MarkerArray": lambda stamp, value: bytes(
-            serialize_message(contact_markers(stamp, value))
-        ),
-    }
-    if topic.type not in encoders:
+    found = value_messages.encoder(topic.type, owners(topic, shared.arm), topic.columns)
+    if found is None and topic.type == MARKERS:
+        return lambda stamp, value: bytes(serialize_message(contact_markers(stamp, value)))
+    if found is None:
         raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the output of a step")
-    return encoders[topic.type]
+    return found
 
 
 def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
@@ -124,34 +113,6 @@ def _repeated(decode: Decode) -> Decode:
     return take
 
 
-@cache
-def _state(names: tuple[str, ...], counts: tuple[int, ...]) -> Pattern:
-    return Pattern(JOINT_STATE, (_NO_HEADER, names, *((0.0,) * count for count in counts)))
-
-
-@cache
-def _wrench(frame: str) -> Pattern:
-    return Pattern(WRENCH, (((0, 0), frame), ((0.0,) * 3, (0.0,) * 3)))
-
-
-@cache
-def _point(frame: str) -> Pattern:
-    return Pattern(POINT, (((0, 0), frame), (0.0,) * 3))
-
-
-@lru_cache(maxsize=256)
-def _table(columns: tuple[str, ...], frame: str, rows: int) -> Pattern:
-    fields = [(name, 8 * i, _FLOAT64, 1) for i, name in enumerate(columns)]
-    step = 8 * len(columns)
-    return Pattern(
-        TABLE, (((0, 0), frame), 1, rows, fields, False, step, step * rows, bytes(step * rows), False), "data"
-    )
-
-
-def _packed_table(columns: tuple[str, ...], stamp: int, value: Table) -> bytes:
-    return _table(columns, value.frame, len(value.rows)).pack(stamp, tuple(chain.from_iterable(value.rows)))
-
-
 def _finder(topic: Topic, arm: Arm) -> Decode:
     """What finds the value in a message of a known layout, None in any other; the newest layout is tried first."""
     if topic.type == TABLE:
@@ -159,11 +120,11 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
     known: list[tuple[Pattern, Callable[[Numbers], Any]]]
     if topic.type == JOINT_STATE:
         names = owners(topic, arm)
-        known = [(_state(names, counts), _as_state) for counts in product((len(names), 0), repeat=3)]
+        known = [(joint_states(names, counts), _as_state) for counts in product((len(names), 0), repeat=3)]
     elif topic.type == WRENCH:
-        known = [(_wrench(frame), partial(_as_wrench, frame)) for frame in frames(arm)]
+        known = [(wrenches(frame), partial(_as_wrench, frame)) for frame in frames(arm)]
     else:
-        known = [(_point(frame), partial(_as_point, frame)) for frame in frames(arm)]
+        known = [(points(frame), partial(_as_point, frame)) for frame in frames(arm)]
 
     def find(data: bytes) -> Any:
         for i, (pattern, value_of) in enumerate(known):
@@ -193,9 +154,9 @@ def _as_point(frame: str, numbers: Numbers) -> Point:
 
 def _find_table(columns: tuple[str, ...], frames: tuple[str, ...], most: int, data: bytes) -> Table | None:
     for frame in frames:
-        count = (len(data) - _table(columns, frame, 0).size) // (8 * len(columns))
+        count = (len(data) - tables(columns, frame, 0).size) // (8 * len(columns))
         if 0 <= count <= most:
-            numbers = _table(columns, frame, count).numbers(data)
+            numbers = tables(columns, frame, count).numbers(data)
             if numbers is not None:
                 return Table(frame, tuple(zip(*[iter(numbers[0])] * len(columns), strict=True)))
     return None

@@ -1,6 +1,5 @@
 """A simulation recorded into a bag, as the recorder node does it in lockstep, without ROS."""
 
-import struct
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,22 +10,22 @@ from wam_bag.cdr import encoded
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_bag.losses import RECORDING
 from wam_bag.metadata import INFINITE
+from wam_bag.value_messages import TIME, Encode, encoder
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration
+from wam_description.defects import owners
 from wam_description.interface import Interface, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import pairs
-from wam_description.topics import BOOL, JOINT_STATE, POINT, STATUS, STRING, TABLE, WRENCH, Topic
+from wam_description.topics import STATUS, Topic
 from wam_description.urdf import urdf
 from wam_description.yaml_text import parameter_text
 from wam_sim.simulation import Simulation
 
 DESCRIPTION: Final = "robot_description"
-DOUBLE: Final = 8  # FLOAT64 of a PointField
 DEPTH: Final = 1000
 PLAYER: Final = "scenario"  # the node
-Values = Callable[[int, Any], Sequence[Any]]
 
 
 def record(
@@ -86,16 +85,16 @@ class _Recording:
         self._driver: NodeStatus | None = None
         interface = Interface(shared)
         for topic in interface.topics.values():
-            values = _values_of(topic, shared)
-            if values is not None and (senders := interface.publishers(topic.name)):
+            encode = encoder(topic.type, owners(topic, shared.arm), topic.columns)
+            if encode is not None and topic.type != TIME and (senders := interface.publishers(topic.name)):
                 bag.add_topic(self._full(topic.name), topic.type, _qos(topic))
                 if topic.name != DESCRIPTION:
-                    simulation.listen(topic.name, self._writer(topic, values, senders[0]))
+                    simulation.listen(topic.name, self._writer(topic, encode, senders[0]))
         self._status = interface.topics[STATUS]
         bag.add_topic(self._full(STATUS), self._status.type, _qos(self._status))
         for node in simulation.nodes:
             simulation.listen(STATUS, self._status_writer(node), node)
-        self._write(DESCRIPTION, interface.topics[DESCRIPTION].type, 0, [urdf(shared.arm)], "driver")
+        self._write(DESCRIPTION, encoded(interface.topics[DESCRIPTION].type, [urdf(shared.arm)]), 0, "driver")
 
     def watch_driver(self) -> None:
         """Record the driver's status where it has changed."""
@@ -115,8 +114,8 @@ class _Recording:
     def _full(self, topic: str) -> str:
         return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
 
-    def _writer(self, topic: Topic, values: Values, sender: str) -> Callable[[int, Any], None]:
-        return lambda stamp, value: self._write(topic.name, topic.type, stamp, values(stamp, value), sender)
+    def _writer(self, topic: Topic, encode: Encode, sender: str) -> Callable[[int, Any], None]:
+        return lambda stamp, value: self._write(topic.name, encode(stamp, value), stamp, sender)
 
     def _status_writer(self, node: str) -> Callable[[int, Any], None]:
         return lambda _, status: self._write_status(status, node)
@@ -125,12 +124,12 @@ class _Recording:
         status = status._replace(node=node, connected=True, session=1)
         facts = pairs(status)
         fields = [status.level, node, status.message, self._arm.name, facts]
-        self._write(STATUS, self._status.type, self._simulation.driver.stamp, fields, node)
+        self._write(STATUS, encoded(self._status.type, fields), self._simulation.driver.stamp, node)
 
-    def _write(self, topic: str, kind: str, stamp: int, fields: Sequence[Any], sender: str) -> None:
+    def _write(self, topic: str, data: bytes, stamp: int, sender: str) -> None:
         name = self._full(topic)
         self._counts[name, sender] += 1
-        self._bag.write(name, encoded(kind, fields), stamp, stamp, self._counts[name, sender])
+        self._bag.write(name, data, stamp, stamp, self._counts[name, sender])
 
 
 def _parameters(configuration: Configuration, namespace: str) -> str:
@@ -153,30 +152,3 @@ def _qos(topic: Topic) -> Mapping[str, Any]:
         "liveliness_lease_duration": dict(INFINITE),
         "avoid_ros_namespace_conventions": False,
     }
-
-
-def _values_of(topic: Topic, shared: Shared) -> Values | None:
-    """The fields of a message of a topic, None of a type that is not recorded here."""
-    names = shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names
-    columns = topic.columns
-    fields = [(name, DOUBLE * i, DOUBLE, 1) for i, name in enumerate(columns)]
-
-    def table(stamp: int, value: Any) -> Sequence[Any]:
-        rows = value.rows
-        data = b"".join(struct.pack(f"<{len(row)}d", *row) for row in rows)
-        step = DOUBLE * len(columns)
-        return _header(stamp, value.frame), 1, len(rows), fields, False, step, step * len(rows), data, False
-
-    by_type: dict[str, Values] = {
-        JOINT_STATE: lambda stamp, value: (_header(stamp), names, value.position, value.velocity, value.effort),
-        WRENCH: lambda stamp, value: (_header(stamp, value.frame), (value.force, value.torque)),
-        POINT: lambda stamp, value: (_header(stamp, value.frame), value.position),
-        TABLE: table,
-        BOOL: lambda stamp, value: [bool(value)],
-        STRING: lambda stamp, value: [value],
-    }
-    return by_type.get(topic.type)
-
-
-def _header(stamp: int, frame: str = "") -> tuple[tuple[int, int], str]:
-    return divmod(stamp, 1_000_000_000), frame
