@@ -19,7 +19,7 @@ from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
-from wam_ros.parameters import follow
+from wam_ros.parameters import follow_together
 
 
 class DriverNode(ArmDriver):
@@ -31,7 +31,7 @@ class DriverNode(ArmDriver):
         timing, interface = shared.timing, self.interface
         self.driver = Driver(shared, own)
         self.safety = self.driver.safety
-        follow(self, own, lambda new: self.driver.set_effects(new.effects))
+        follow_together(self, [(own, lambda new: self.driver.set_effects(new.effects), "")])
         self._directory = own.post_mortem_directory
         self._started = timing.mode == "realtime"
         self.inlets.feed("sim/disturbance", self._take_push)

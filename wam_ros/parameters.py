@@ -80,18 +80,6 @@ def descriptor(field: Field) -> ParameterDescriptor:
     return result
 
 
-def follow(node: Node, own: T, take: Any, prefix: str = "") -> None:
-    """Let the live parameters change while the node runs, as a set.
-
-    Parameters
-    ----------
-    own : the present parameter object.
-    take : called with the new parameter object; it may raise ParameterError to refuse the set.
-    prefix : what the names of these parameters begin with.
-    """
-    follow_together(node, [(own, take, prefix)])
-
-
 def follow_together(
     node: Node, parts: Sequence[tuple[Any, Any, str]], report: Callable[[Mapping[str, Any]], None] = lambda values: None
 ) -> None:
@@ -99,7 +87,8 @@ def follow_together(
 
     Parameters
     ----------
-    parts : own, take and prefix of each part, as `follow` takes them.
+    parts : of each part the present parameter object; what is called with the new one, which may raise
+        ParameterError to refuse the set; and what the names of its parameters begin with.
     report : called with the values that have been taken, by name.
     """
     present = [own for own, _, _ in parts]
