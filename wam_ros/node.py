@@ -147,11 +147,9 @@ class AdaptedNode(StackNode):
                 if feed.synchroniser.strays != strays:
                     self.inlets.claims[topic].stray()
 
-        first = feeds[0].synchroniser.accepts
-        accepts = partial(first, topic)
-        if feeds[1:]:
-            accepts = lambda stamp: any(feed.synchroniser.accepts(topic, stamp) for feed in feeds)  # noqa: E731
-        self.inlets.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), accepts)
+        accepts = [partial(feed.synchroniser.accepts, topic) for feed in feeds]
+        is_taken = accepts[0] if len(accepts) == 1 else lambda stamp: any(each(stamp) for each in accepts)
+        self.inlets.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), is_taken)
 
     def _step(self, inputs: Inputs, feed: Feed) -> None:
         """Let the node work, and publish what it returns."""

@@ -11,6 +11,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
+from wam_bag.value_messages import Encode
 from wam_description.configuration import Configuration
 from wam_description.event import CAUSE, RAISED
 from wam_description.interface import Interface
@@ -20,7 +21,7 @@ from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type, read_status
 from wam_ros.requests import answer_of, switch_request
 from wam_ros.topics import NAMESPACE, listening, qos
-from wam_ros.wire import Encode, encoder, stamp_of
+from wam_ros.wire import encoder, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves
 from wam_studies.faults.trials import FAULTS, FaultTrial
