@@ -16,10 +16,10 @@ from wam_description.urdf import urdf
 from wam_description.wiring import Declaration
 from wam_driver.safety import Mode, Safety
 from wam_driver.session import Session
+from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.messages import Refused
-from wam_ros.stack_node import StackNode
 
 PARAMETERS = "parameters of "  # beginning of what a problem concerns, before the name of a node
 TWO_DRIVERS = (

@@ -1,7 +1,7 @@
 """ROS around the nodes of the stack: the adapter, messages, parameters, recorder and bring-up.
 
 - node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
-- stack_node: what every node of the stack is on ROS, a driver too, and the other nodes as it hears of them
+- connections: what every node of the stack has on ROS, a driver too, and the other nodes as it hears of them
 - inlets: its subscriptions, from one publisher each; outlets: its publishers, and copies of them for a viewer
 - health: its status, problems, refusals and diagnostics
 - tolerance: a node that goes on when a callback raises, and reports it as a fault

@@ -21,7 +21,7 @@ from wam_ros.wire import decoder, stamp_of
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
 
 
-class Claim:
+class PublisherClaim:
     """The publishers of one topic that a node takes.
 
     Two publishers of different nodes are rivals at once.  Two of one node name may be a node that was killed and
@@ -99,7 +99,7 @@ class Inlets:
         self._node, self._interface, self._shared = node, interface, shared
         self._health, self._bus = health, bus
         self.subscriptions: dict[str, Subscription] = {}
-        self.claims: dict[str, Claim] = {}
+        self.claims: dict[str, PublisherClaim] = {}
         node.create_timer(NODE_LIMITS.claim_period, self._look_at_all, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def feed(
@@ -133,7 +133,7 @@ class Inlets:
                 self._health.refuse(topic, str(reason), reason.is_late)
 
         is_local = self._subscribe(topic, receive)
-        self.claims[topic] = claim = Claim(self._node, topic, self.subscriptions[topic])
+        self.claims[topic] = claim = PublisherClaim(self._node, topic, self.subscriptions[topic])
 
     def listen(self, topic: str, take: Callable[[bytes], None]) -> None:
         """Subscribe to the bytes of messages; `take` may raise Refused."""

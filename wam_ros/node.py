@@ -25,6 +25,7 @@ from wam_description.signals import NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
+from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS
@@ -32,7 +33,6 @@ from wam_ros.messages import Refused
 from wam_ros.parameters import Follower, follow_together
 from wam_ros.requests import Request, RequestQueue
 from wam_ros.run import run
-from wam_ros.stack_node import StackNode
 from wam_ros.topics import SECOND
 
 

@@ -34,7 +34,7 @@ class RemoteParameters:
 
     @property
     def names(self) -> frozenset[str]:
-        """Nodes that are asked."""
+        """The nodes."""
         return frozenset(self._clients)
 
     @property

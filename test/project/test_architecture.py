@@ -89,8 +89,8 @@ def is_ros(target: str) -> bool:
 def refusal(name: str, target: str) -> str | None:
     """Why the module may not import the target, None where it may."""
     own, top = name.split(".")[0], target.split(".")[0]
-    if is_node(target):
-        return "a node is imported by its entry in the table of nodes only"
+    if is_node(target) and not (is_node(name) and own == top):  # a driver builds on what all drivers have
+        return "a node is imported by its entry in the table of nodes, or by a node of its package"
     if is_ros(target) and not is_node(name) and own not in KNOW_ROS:
         return "only nodes, wam_ros and what runs them know ROS"
     allowed = {own, *ARROWS[own], *(["wam_ros"] if is_node(name) else [])}
