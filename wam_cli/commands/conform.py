@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -97,7 +98,7 @@ def _listen(configuration: Configuration, seconds: float) -> int:
     if "interface" not in configuration.sections.get("driver", {}):
         raise ValueError("--dry-run is for a driver on a bus; give its configuration, as --config barrett-wam4-bus")
     own = configuration.node("driver", BusParameters)
-    line = line_of(configuration.shared, own)
+    line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
     print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
     try:
         print(*heard(line, seconds), sep="\n")

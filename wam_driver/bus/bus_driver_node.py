@@ -96,7 +96,7 @@ class BusDriver(ArmDriver):
         """The motors: those of the production WAM on its bus."""
         arm, timing = shared.arm, shared.timing
         home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        line = line_of(shared, own)
+        line = line_of(shared, own, time.perf_counter, time.sleep)
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
         return ArmBus(line, arm.motors.torque_constant, home, timing.period)

@@ -1,6 +1,6 @@
 """The bus that the parameters of a driver name: one of python-can, or the simulated one."""
 
-import time
+from collections.abc import Callable
 
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
@@ -12,15 +12,17 @@ from wam_driver.plant import Plant
 SIMULATED = "simulated"
 
 
-def line_of(shared: Shared, own: BusParameters) -> Line:
-    """The line to the bus of a driver.
+def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep: Callable[[float], None]) -> Line:
+    """The line to the bus of a driver; a real one uses the clock, s, and waits.
 
     Raises
     ------
     ParameterError
         where python-can is not installed, or cannot open the bus.
     """
-    return simulated_line(shared, own, int(own.channel)) if own.interface == SIMULATED else _real_line(own)
+    if own.interface == SIMULATED:
+        return simulated_line(shared, own, int(own.channel))
+    return _real_line(own, now, sleep)
 
 
 def simulated_line(shared: Shared, own: BusParameters, version: int, is_homed: bool = True) -> Line:
@@ -30,7 +32,7 @@ def simulated_line(shared: Shared, own: BusParameters, version: int, is_homed: b
     return SimulatedBus(arm, plant, timing.substep, version, is_homed)
 
 
-def _real_line(own: BusParameters) -> Line:
+def _real_line(own: BusParameters, now: Callable[[], float], sleep: Callable[[float], None]) -> Line:
     try:
         import can
 
@@ -39,4 +41,4 @@ def _real_line(own: BusParameters) -> Line:
         raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
     except (can.CanError, OSError, ValueError) as error:
         raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, time.perf_counter, time.sleep)
+    return CanLine(bus, now, sleep)
