@@ -73,8 +73,8 @@ endef
 bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of one run
 	@$(PY) benchmarks/bench.py $(ARGS)
 
-soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/reliability.md
-	@$(VENV)/bin/wam evaluate soak --seconds $(SOAK_SECONDS) --write docs/reliability.md $(ARGS)
+soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/safety.md
+	@$(VENV)/bin/wam evaluate soak --seconds $(SOAK_SECONDS) --write docs/safety.md $(ARGS)
 
 docs: $(STAMPS)/docs $(INSTALLED)  ## regenerate the pages of docs/, build the site docs/_build/html; ARGS="--pages" for text only
 	@$(PY) docs/generate.py $(ARGS)

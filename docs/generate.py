@@ -18,7 +18,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from wam_analysis.findings.analysis import analyse
 from wam_analysis.table import markdown
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.task.scenario import STEP_KEYS
@@ -26,7 +25,6 @@ from wam_control.velocity.dither import Dither
 from wam_control.velocity.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Shared, Timing
 from wam_description.configuration import Configuration
-from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
 from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
@@ -41,7 +39,7 @@ from wam_studies.contact import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers
 from wam_studies.figures.catalogue import table as figures_table
-from wam_studies.figures.panels import Panels, distances, draw_panels
+from wam_studies.figures.panels import Panels, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant import table as plant_table
@@ -61,6 +59,7 @@ CONFIGURATION = ROOT / "config" / "wam.yaml"
 SAMPLES = ROOT / "bags" / "sample"
 CLAIMS = ROOT / "docs" / "thesis.yaml"
 WRITES_PICTURES = __name__ == "__main__"
+LISTED = 4  # elements of a list in the table of parameters
 CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -130,12 +129,21 @@ def steps(configuration: Configuration) -> str:
 
 
 def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
-    """One row for each parameter of a class."""
+    """One row for each parameter of a class; a star marks one that can be set while the node runs."""
     for field in fields(cls):
-        kind = f"list of {field.kind.__name__}" if field.is_array else field.kind.__name__
-        value = "as in arm" if field.derived and field.name not in given else number(given[field.name])
-        live = "yes" if field.live else ""
-        yield [f"`{field.name}`", kind, field.unit, field.allowed, live, field.doc, f"`{value}`" if value else "empty"]
+        value = "as in arm" if field.derived and field.name not in given else short(given[field.name])
+        allowed = f"{field.allowed} {field.unit}".strip() or field.kind.__name__
+        yield [f"`{field.name}`{'*' * field.live}", f"`{value}`" if value else "empty", allowed, field.doc]
+
+
+def short(value: Any) -> str:
+    """A value as text; of equal elements the first one, of a long list the first ones."""
+    if isinstance(value, (tuple, list)) and len(value) > 1:
+        if len(set(value)) == 1:
+            return f"{number(value[0])} each"
+        if len(value) > LISTED:
+            return f"{number(value[:2])} ... ({len(value)})"
+    return number(value)
 
 
 def parameters_of(node: str) -> type:
@@ -146,39 +154,13 @@ def parameters_of(node: str) -> type:
 
 def parameters(configuration: Configuration) -> str:
     """Every parameter of every node."""
-    head = ["parameter", "type", "unit", "allowed", "live", "meaning", "in config/wam.yaml"]
+    head = ["parameter", "in `wam`", "allowed", "meaning"]
     shared = list(parameter_rows(Shared, configuration.sections["/**"]))
     parts = ["## Shared by all nodes, section `/**`\n", markdown(head, shared)]
     for node in NODES:
         rows = list(parameter_rows(parameters_of(node), configuration.sections[node]))
         parts += [f"## `{node}`\n", markdown(head, rows) if rows else "None of its own.\n"]
     return "\n".join(parts)
-
-
-# constants
-
-
-def constants(rows: Sequence[Constant]) -> str:
-    """A part of the table of constants."""
-    head = ["", "meaning", "value", "unit", "SI", "from", "parameter", "remark"]
-    return markdown(head, [constant_row(row) for row in rows])
-
-
-def constant_row(row: Constant) -> list[str]:
-    """One constant, as printed and in SI units."""
-    value = number(row.value)
-    converted = ", ".join(f"{v:.5g}" for v in row.si)
-    index = f" [{', '.join(map(str, row.index))}]" if row.index else ""
-    return [
-        row.symbol,
-        row.meaning,
-        value,
-        row.unit,
-        converted if row.si != (row.value if isinstance(row.value, tuple) else (row.value,)) else "",
-        row.source if row.mark == "thesis" else "assumed",
-        f"`{row.parameter}`{index}" if row.parameter else "",
-        row.reason or row.erratum,
-    ]
 
 
 # equations
@@ -222,22 +204,21 @@ def names_in(function: ast.FunctionDef) -> set[str]:
 
 
 def equations() -> str:
-    """Every numbered equation: content, correction, functions and their tests."""
+    """Every numbered equation: section, content, functions and a test of them; a star marks a correction."""
     citing_, using = citing(), tests_by_function()
-    head = ["", "section", "content", "correction of the print", "function", "test"]
+    head = ["", "section", "content", "function", "test"]
     return markdown(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
 
 
 def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequence[str]]) -> list[str]:
-    """One equation; of its tests the first three."""
-    tests = dict.fromkeys(test for name in names for test in using.get(name.split(".")[1], []))
+    """One equation with the first of its tests."""
+    tests = [test for name in names for test in using.get(name.split(".")[1], [])]
     return [
-        f"({row.number})",
+        f"({row.number}){'*' * bool(row.correction)}",
         row.section,
         row.content,
-        row.correction,
         row.reason or ", ".join(f"`{name}`" for name in names),
-        ", ".join(f"`{test}`" for test in list(tests)[:3]),
+        f"`{tests[0].partition('.')[2]}`" if tests else "",
     ]
 
 
@@ -277,9 +258,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "parameters": lambda: parameters(configuration),
         "steps": lambda: steps(configuration),
         "driver contract": driver_contract,
-        "constants of the arm, printed": lambda: constants(ARM_PRINTED),
-        "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
-        "constants of the testbed": lambda: constants(TESTBED),
         "plant": lambda: plant_table.table(plant_study()),
         "resting pushes": resting_pushes,
         "steps of a scenario": lambda: markdown(
@@ -298,36 +276,20 @@ def blocks() -> dict[str, Callable[[], str]]:
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},
-        "claims, count": lambda: claims.count(itertools.chain(*claims.load(CLAIMS).values())),
-        **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
-        "verdict of the demonstration": verdict,
-        "verdicts of the samples": verdicts_of_samples,
+        "claims, count": lambda: claims.count(claims.load(CLAIMS)),
+        "claims, not shown": lambda: claims.not_shown(itertools.chain(*claims.load(CLAIMS).values())),
+        "verdict of the demonstration": partial(verdict, "demo.txt"),
+        "verdict of barrett-wam7": partial(verdict, "barrett-demo.txt"),
         "joints of barrett-wam7": joints_of_today,
         "motors of barrett-wam7": motors_of_today,
-        "demonstration of barrett-wam7": lambda: (
-            f"```text\n{(ROOT / 'docs' / 'barrett-demo.txt').read_text(encoding='utf-8')}```\n"
-        ),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
 
 
-def claims_of(rows: tuple[claims.Claim, ...]) -> str:
-    """Items of a chapter, with the distances that figures and effects have now."""
-    found = {name: max(distances(panels).values(), default=math.nan) for name, panels in found_figures().items()}
-    return claims.table(rows, {"figure": found, "effect": plant_study()})
-
-
-def verdict() -> str:
-    """The verdict of the demonstration, as `wam demo` prints it."""
-    _, head, rest = (ROOT / "docs" / "demo.txt").read_text(encoding="utf-8").partition("Result,")
+def verdict(file: str) -> str:
+    """The verdict of a demonstration, as `wam demo` prints it."""
+    _, head, rest = (ROOT / "docs" / file).read_text(encoding="utf-8").partition("Result,")
     return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
-
-
-def verdicts_of_samples() -> str:
-    """The first lines of `wam analyse` on each sample."""
-    found = {bag.name: analyse(bag, lambda doing: None).sections[0].sentences for bag in sorted(SAMPLES.iterdir())}
-    rows = [[f"`{name}`", what, *(line.partition(": ")[2] for line in rest)] for name, (what, *rest) in found.items()]
-    return markdown(["sample", "what it is", "wrong", "shows"], rows)
 
 
 @cache
@@ -380,8 +342,7 @@ def draw_tasks() -> None:
 
 def driver_contract() -> str:
     """The rows that `wam conform` tests."""
-    rows = [[f"`{key}`", row.text, row.advice] for key, row in REQUIREMENTS.items()]
-    return markdown(["row", "a driver", "if it does not"], rows)
+    return markdown(["row", "a driver"], [[f"`{key}`", row.text] for key, row in REQUIREMENTS.items()])
 
 
 @cache
@@ -391,9 +352,8 @@ def pushes() -> tuple[resting_push.RestingPush, ...]:
 
 
 def resting_pushes() -> str:
-    """The estimates of the pushes at rest, of each size with each kind of sensing."""
-    head = ["sensing", "push", "detected after 0.4 s", "detected after 2 s", "force after 0.4 s", "force after 2 s"]
-    head += ["its stated sd", "on the outer link", "position error", "its stated sd"]
+    """The estimates of the pushes at rest after 2 s, of each size with each kind of sensing."""
+    head = ["sensing", "push", "detected", "estimated force", "on the outer link", "position error"]
     rows = []
     for (sensing, newtons), group in itertools.groupby(pushes(), key=lambda row: (row.sensing, row.newtons)):
         found = list(group)
@@ -404,14 +364,10 @@ def resting_pushes() -> str:
             [
                 sensing,
                 f"{newtons:g} N",
-                f"{sum(row.early > 0.0 for row in found)} of {len(found)}",
                 f"{len(late)} of {len(found)}",
-                between([row.early for row in found if row.early], "N"),
                 between([row.late for row in found if row.late], "N"),
-                between([estimate.hypotheses[0].force_sd for estimate in late], "N"),
                 f"{sum(estimate.link == 'outer_link' for estimate in late)} of {len(late)}",
                 f"up to {max(errors):.1f} cm" if errors else "–",
-                between([100.0 * estimate.position_sd for estimate in known], "cm"),
             ]
         )
     return markdown(head, rows)

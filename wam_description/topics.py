@@ -238,7 +238,7 @@ TOPICS: Final = (
         TABLE,
         "outer",
         "forces, velocities, positions and impedances along chosen axes, the first with priority, one row each; no row: "
-        "no task; float64 columns: see docs/task-frame.md",
+        "no task; float64 columns: see docs/tasks.md",
         columns=TASK_COLUMNS,
     ),
     Topic(
@@ -246,7 +246,7 @@ TOPICS: Final = (
         TABLE,
         "display",
         "how well each axis of the task is measured and done, in the order of `task_command`; float64 columns: see "
-        "docs/task-frame.md",
+        "docs/tasks.md",
         columns=TASK_AXIS_COLUMNS,
     ),
     Topic(

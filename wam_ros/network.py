@@ -3,7 +3,7 @@
 The stack moves an arm, and ROS has no passwords: a program that reaches its services releases the brakes.  So every
 program of ours is limited to this machine before it starts ROS, whatever the shell has set: a sourced ROS
 sets ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET by itself, and with LOCALHOST another machine that names this one in
-ROS_STATIC_PEERS still gets in.  See docs/network.md.
+ROS_STATIC_PEERS still gets in.  See docs/ros.md.
 """
 
 import os

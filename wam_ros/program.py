@@ -13,7 +13,7 @@ def main() -> None:
     except ModuleNotFoundError as error:
         raise SystemExit(
             f"error: the Python package '{error.name}' is missing; install it (pinocchio is 'pin' for pip), or put its "
-            "folder on PYTHONPATH: see docs/install.md"
+            "folder on PYTHONPATH: see docs/tutorial.md"
         ) from None
     finally:
         ignore_signals()

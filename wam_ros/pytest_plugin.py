@@ -1,4 +1,4 @@
-"""Fixtures of the test kit for pytest; see docs/test-your-node.md.  ROS is imported when a fixture is used."""
+"""Fixtures of the test kit for pytest; see docs/own-node.md.  ROS is imported when a fixture is used."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,6 +1,6 @@
 """The test kit: the stack in the process of a test, on the simulated arm, in a ROS domain of its own.
 
-`wam_ros.pytest_plugin` has its fixtures; docs/test-your-node.md shows it.
+`wam_ros.pytest_plugin` has its fixtures; docs/own-node.md shows it.
 """
 
 import fcntl

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from wam_studies.harness import Measurement
-from wam_studies.scores import rows_table
+from wam_studies.scores import required_table, rows_table
 
 LISTED = 40  # failed cases
 END = "<!-- end of what is written -->"
@@ -33,13 +33,14 @@ def report(measured: Measurement, command: str) -> str:
     return "\n".join(filter(None, parts))
 
 
-def block(measured: Measurement, command: str, repeats: str, picture: str = "") -> str:
-    """What is written into a page: when and how it was measured, the picture, and the tables.
+def block(measured: Measurement, command: str, picture: str = "") -> str:
+    """What is written into a page: when and how it was measured, the picture, and what is required.
+
+    All tables and each failed case are in `report`.
 
     Parameters
     ----------
     command : that writes this.
-    repeats : as the command of `report`.
     picture : its path relative to the page, '' for none.
     """
     count = len(measured.total)
@@ -50,13 +51,22 @@ def block(measured: Measurement, command: str, repeats: str, picture: str = "") 
     shown = f"![{measured.study.title}]({picture})" if picture else ""
     missed = measured.scores.missed
     verdict = f"Missed: {'; '.join(missed)}." if missed else "Every required value is met."
-    return "\n\n".join(filter(None, [head, shown, verdict, report(measured, repeats)]))
+    return "\n\n".join(filter(None, [head, shown, verdict, required_table(measured.scores.rows)]))
 
 
 def section_of(file: Path, name: str) -> str:
     """What a section of the page holds, '' where there is no page."""
     page = file.read_text(encoding="utf-8") if file.exists() else ""
     return page.partition(f"<!-- written: {name} -->\n")[2].partition(END)[0]
+
+
+def kept_rows(text: str) -> dict[str, list[str]]:
+    """Cells of each row of the tables in a section, by the first one, without the heads."""
+    lines = [line for line in text.splitlines() if line[:2] == "| "]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    rules = [i for i, row in enumerate(rows) if row[0].startswith("---")]
+    heads = {i - 1 for i in rules}
+    return {row[0]: row for i, row in enumerate(rows) if i not in heads and i not in rules}
 
 
 def with_section(file: Path, name: str, text: str, title: str = "") -> str:

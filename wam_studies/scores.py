@@ -212,6 +212,18 @@ def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]]) -> str
     return markdown(head, lines)
 
 
+def required_table(rows: Sequence[Row]) -> str:
+    """Quantities with a required value or a target, of all seeds, in Markdown."""
+    lines = []
+    for row in rows:
+        if row.required != ANY or row.target != ANY:
+            target = f"target {bound_text(row.target, row.scale)}"
+            bound = target if row.required == ANY else bound_text(row.required, row.scale)
+            value, span, _, verdict = row.cells
+            lines.append([f"{row.name}, {row.unit}" if row.unit else row.name, bound, value, span, verdict])
+    return markdown(["quantity", "required", "found", "95 %", ""], lines)
+
+
 def holds(value: float, bound: Bound) -> bool:
     """Whether a value is allowed, apart from rounding."""
     low, high = bound

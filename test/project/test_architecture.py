@@ -1,4 +1,4 @@
-"""The arrows of docs/architecture.md hold in every import of every module, lazy ones too."""
+"""The arrows of docs/concepts.md hold in every import of every module, lazy ones too."""
 
 import ast
 import sys

@@ -317,7 +317,7 @@ def test_a_block_that_does_not_end_is_ended_with_its_children_and_named(tmp_path
 
 
 def test_a_block_is_named_by_its_line() -> None:
-    page = ROOT / "docs" / "sweep.md"
+    page = ROOT / "docs" / "bags.md"
     lines = page.read_text(encoding="utf-8").splitlines()
     for block in blocks_of(page):
         assert lines[int(block.where.partition(":")[2])].startswith(block.code.splitlines()[0])

@@ -377,32 +377,22 @@ def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) 
 # the page
 
 
-def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(f"# Title\n<!-- written: creep -->\nold\n{END}\nafter\n")
-    picture = tmp_path / "result.png"
+def test_the_page_gets_a_row_and_the_picture_of_each_experiment_and_keeps_the_others(tmp_path: Path) -> None:
+    page, picture = tmp_path / "page.md", tmp_path / "result.png"
+    page.write_text(f"# Title\n<!-- written: experiments -->\n{END}\nafter\n")
     picture.write_bytes(b"picture")
-    experiment = load("creep")
-    panels = [Panel("creep", "x", "y", [])]
-    write(page, [(experiment, Result([Comparison("q", 1.0, 1.01, "N", 0.02)], panels, ("a \\d remark",)), picture)])
+    rows = [Comparison(name, 1.0, value, "N", 0.02) for name, value in (("far", 1.0), ("q", 1.01))]
+    for name, panels in (("creep", [Panel("creep", "x", "y", [])]), ("efficiency", []), ("efficiency", [])):
+        write(page, [(load(name), Result(rows, panels), picture)])
     text = page.read_text()
-    assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
-    assert "- a \\d remark" in text
-    assert "old" not in text
+    for name in ("creep", "efficiency"):
+        assert text.count(f"| `{name}` | 2 of 2 | q, N | 1 | 1.01 | +1.00 % | 2.00 % |") == 1
+    assert text.count("(page/creep.png)") == 1
+    assert "efficiency.png" not in text
     assert text.endswith(f"{END}\nafter\n")
     assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
-
-
-def test_a_new_experiment_gets_a_section_at_the_end_of_the_page(tmp_path: Path) -> None:
-    page, picture = tmp_path / "page.md", tmp_path / "result.png"
-    page.write_text("# Title\n")
-    picture.write_bytes(b"picture")
-    result = Result([Comparison("q", 1.0, 1.01, "N", 0.02)], [])
-    for _ in range(2):
-        write(page, [(load("creep"), result, picture)])
-    text = page.read_text()
-    assert text.startswith("# Title\n\n## Creep of cables")
-    assert text.count("<!-- written: creep -->") == text.count("| q | 1 | 1.01 |") == 1
+    write(page, [(load("creep"), Result([*rows, Comparison("off", 1.0, 1.03, "N", 0.02)], []), picture)])
+    assert "| `creep` | 2 of 3 MISSED | off, N | 1 | 1.03 | +3.00 % | 2.00 % MISSED |" in page.read_text()
 
 
 def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
@@ -435,7 +425,7 @@ def test_an_experiment_without_curves_has_no_picture(
     mine, page = tmp_path / "mine.yaml", tmp_path / "page.md"
     creep = (root / "config" / "experiments" / "creep.yaml").read_text()
     mine.write_text(creep.replace("evaluation: cables.creeping", "evaluation: my_laboratory_without_curves:steps"))
-    page.write_text("# Title\n")
+    page.write_text(f"# Title\n<!-- written: experiments -->\n{END}\n")
     bag = str(root / "bags" / "sample" / "creep")
     assert run_command(str(mine), "--evaluate", bag, "--directory", str(tmp_path), "--write", str(page)) == 0
     assert "picture" not in capfd.readouterr().out
@@ -445,10 +435,11 @@ def test_an_experiment_without_curves_has_no_picture(
 
 def test_documentation_shows_every_experiment() -> None:
     docs = Path(__file__).resolve().parents[2] / "docs"
+    text = section_of(docs / "experiments.md", "experiments")
+    assert "MISSED" not in text
     for name in names():
-        block = section_of(docs / "experiments.md", name)
-        assert "| predicted | measured |" in block, name
-        assert "MISSED" not in block, name
+        assert f"| `{name}` |" in text
+        assert f"(experiments/{name}.png)" in text
         assert (docs / "experiments" / f"{name}.png").is_file()
 
 

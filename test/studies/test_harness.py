@@ -118,7 +118,7 @@ def test_a_missed_value_and_each_failed_case_with_its_command_are_printed() -> N
 
 def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
     file = tmp_path / "page.md"
-    text = block(measured(), "wam evaluate square --write page.md", "wam evaluate square", "page/square.png")
+    text = block(measured(), "wam evaluate square --write page.md", "page/square.png")
     file.write_text(with_section(file, "square", text, "Squares"))
     assert file.read_text().startswith("# Squares\n")
     file.write_text(file.read_text() + "\n## Method\n\nBy hand.\n")
@@ -129,6 +129,8 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
         with_section(file, "other", "")
     for words in ("`wam evaluate square --write page.md`: 6 cases", "![squares](page/square.png)", "Every required"):
         assert words in text
+    assert "| largest, m | 5 |" in text
+    assert "## Numbers" not in text
 
 
 def test_an_option_that_is_too_small_is_refused() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, table, unresolved
+from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, not_shown, unresolved
 
 ROOT = Path(__file__).resolve().parents[2]
 CLAIMS = [claim for rows in load(ROOT / "docs" / "thesis.yaml").values() for claim in rows]
@@ -116,13 +116,10 @@ def test_every_distance_that_an_item_gives_is_that_of_something_it_shows() -> No
         assert claim.status is not Status.PLANT or of_plant, claim
 
 
-def test_the_table_has_links_and_distances_and_no_tests() -> None:
-    shown = ("figure a", "experiment e", "test test_a.test_b", "docs/a.md")
-    claim = Claim("5.2", "text", Status.PLANT, "plant with law: {figure a}", shown)
-    text = table([claim], {"figure": {"a": 0.0212}})
-    assert "plant with law: 2.1 %" in text
-    assert "figure [a](figures.md); experiment [e](experiments.md); tests; `docs/a.md`" in text
-    assert "test_b" not in text
-    assert "| plant | 1 |" in count([claim])
-    with pytest.raises(KeyError):
-        table([claim], {"figure": {}})
+def test_the_tables_have_the_counts_of_each_chapter_and_what_is_not_shown() -> None:
+    shown = Claim("5.2", "text", Status.PLANT, "plant with law: {figure a}", ("figure a",))
+    missing = Claim("5.3", "other", Status.NOT_SHOWN, open="why")
+    assert "| One | 1 | 0 | 0 | 1 |\n| all | 1 | 0 | 0 | 1 |" in count({"One": [shown, missing]})
+    text = not_shown([shown, missing])
+    assert "| 5.3 | other | why |" in text
+    assert "5.2" not in text

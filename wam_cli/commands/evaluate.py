@@ -152,5 +152,5 @@ def _write(given: argparse.Namespace, measured: Measurement) -> None:
     repeats = _words(given, study)
     numbers = " ".join(map(str, given.seeds))
     command = f"{repeats} --seeds {numbers}" + (f" --cases {given.cases}" if given.cases else "") + f" --write {page}"
-    text = block(measured, command, repeats, shown)
+    text = block(measured, command, shown)
     page.write_text(with_section(page, given.part, text, study.title), encoding="utf-8")

@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ctrl-c", type=COUNT, metavar="COUNT", help="instead: interrupt so many demonstrations at random moments"
     )
-    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/reliability.md")
+    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/safety.md")
     take_configuration(parser)
 
 
@@ -44,7 +44,7 @@ def run(given: argparse.Namespace) -> int:
         if given.ctrl_c is not None:
             command += f" --ctrl-c {given.ctrl_c}"
         text = faults_section(results, command, section_of(given.write, section))
-        given.write.write_text(with_section(given.write, section, text, "Reliability"), encoding="utf-8")
+        given.write.write_text(with_section(given.write, section, text, "What was tried"), encoding="utf-8")
     return 1 if any(result.escaped for result in results) else 0
 
 

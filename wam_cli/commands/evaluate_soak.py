@@ -14,7 +14,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=bounded(float, 2.0, unit="s"), default=600.0, help="of the arm's time, default 600"
     )
-    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/reliability.md")
+    parser.add_argument("--write", type=PAGE, help="page to update, for example docs/safety.md")
     take_configuration(parser)
 
 
@@ -24,7 +24,7 @@ def run(given: argparse.Namespace) -> int:
     text = found.section(f"wam evaluate soak --seconds {given.seconds:g}")
     print(text)
     if given.write:
-        given.write.write_text(with_section(given.write, "soak", text, "Reliability"), encoding="utf-8")
+        given.write.write_text(with_section(given.write, "soak", text, "What was tried"), encoding="utf-8")
     for reason in found.missed:
         print(reason, file=sys.stderr)
     return 1 if found.missed else 0

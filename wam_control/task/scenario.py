@@ -25,23 +25,18 @@ from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; needed",
     "seconds": "s of the arm's time, at most where the step waits for a contact; needed",
-    "posture": "rad, an angle for each joint, at which the command is at the end of the step; the arm is behind it by "
-    "0.01 rad after 2 s with the packaged `posture_gain`, by more after a quicker step or with a lower gain: give the "
-    "step after it some time",
-    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad through which the arm goes; `times`, s, may be "
-    "left out",
+    "posture": "rad, an angle for each joint at the end of the step; the arm arrives a little later",
+    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` may be left out",
     "tip": "`[x, y, z]`, m in the base frame, to which the tool goes along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position}`: N on the world in `base` or in the frame of a link; "
-    "`contact_position`, m along the link, may be left out and pins it",
-    "task": "`{frame, axes: [...]}`, see [task frame](task-frame.md)",
+    "`contact_position`, m along the link, pins it and may be left out",
+    "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "N m, a torque for each joint",
-    "until_force": "N; the step ends when a contact of this force is detected, and the scenario fails where none is",
+    "until_force": "N; the step ends when a contact of this force is detected; none is a failure",
     "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
-    " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. It lasts for "
-    "one outer period at least. A push of several steps is given in each",
-    "request": "`enable` or `disable` at the start of the step; the scenario fails where a step commands an arm that "
-    "nobody has enabled",
+    " in its frame, s from the start of the step; without `begin` and `end` for the whole step",
+    "request": "`enable` or `disable` at the start of the step",
     "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have

@@ -1,10 +1,11 @@
-"""The results as text: the table, the list of escapes, and the page docs/reliability.md."""
+"""The results as text: the table, the list of escapes, and the page docs/safety.md."""
 
 import math
 from collections.abc import Sequence
 
 from wam_analysis.table import markdown, plain
 from wam_studies.faults.trials import KindResult
+from wam_studies.page import kept_rows
 
 HEAD = (
     "kind",
@@ -59,8 +60,6 @@ def report(results: Sequence[KindResult]) -> str:
 
 def faults_section(results: Sequence[KindResult], command: str, before: str) -> str:
     """A section of the page on faults: the kinds that were played, then the rows of others in the text `before` it."""
-    rows = _rows(results)
-    played = {HEAD[0], *(row[0] for row in rows)}
-    table = [[cell.strip() for cell in line.strip("| ").split("|")] for line in before.splitlines() if line[:2] == "| "]
-    rows += [row for row in table if row[0] not in played and not row[0].startswith("---")]
-    return "\n".join([f"Written by `{command}`, kind by kind.", "", markdown(HEAD, rows).rstrip()])
+    rows = {row[0]: row for row in _rows(results)}
+    rows |= {name: row for name, row in kept_rows(before).items() if name not in rows}
+    return "\n".join([f"Written by `{command}`, kind by kind.", "", markdown(HEAD, list(rows.values())).rstrip()])

@@ -51,7 +51,7 @@ class Soak(NamedTuple):
         return [*found, *self.losses]
 
     def section(self, command: str) -> str:
-        """The section of docs/reliability.md."""
+        """The section of docs/safety.md."""
         growth = f"{self.early:.0f} MB after a tenth of the run, {self.late:.0f} MB at its end"
         lost = " ".join(self.losses) or "none"
         return (

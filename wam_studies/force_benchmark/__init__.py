@@ -1,4 +1,4 @@
-"""The benchmark of force control (`wam evaluate force`), from random tasks to the page docs/force-benchmark.md.
+"""The benchmark of force control (`wam evaluate force`), from random tasks to the page docs/force.md.
 
 tasks          what is commanded on what: pose, surface, force, ramp, feedback and model mismatch, drawn from a seed
 surfaces       the plane or rod of a task: where it is, and whether the arm is clear of it at the start

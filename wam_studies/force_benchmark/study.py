@@ -35,7 +35,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     """Tasks, each drawn from the seed and its number alone."""
 
     title: ClassVar[str] = "force control on random surfaces in random poses"
-    page: ClassVar[str] = "docs/force-benchmark.md"
+    page: ClassVar[str] = "docs/force.md"
     seeds: ClassVar[tuple[int, ...]] = (1,)
     count: ClassVar[int | None] = 100
 

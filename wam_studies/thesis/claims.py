@@ -3,7 +3,7 @@
 import importlib
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,6 @@ from wam_studies.figures.catalogue import FIGURES
 from wam_studies.plant.table import EFFECTS
 
 PLACE = re.compile(r"\{(figure|effect) ([^}]+)\}")
-PAGES = {"experiment": "experiments.md", "task": "tasks.md", "figure": "figures.md", "effect": "plant.md"}
 
 
 class Status(StrEnum):
@@ -115,43 +114,15 @@ def _importable(name: str) -> bool:
         return False
 
 
-def count(claims: Iterable[Claim]) -> str:
-    """How many items have each status, as Markdown."""
-    found = Counter(claim.status for claim in claims)
-    rows = [(status.value, str(found[status])) for status in Status]
-    return markdown(("status", "items"), [*rows, ("all", str(found.total()))])
+def count(chapters: Mapping[str, Sequence[Claim]]) -> str:
+    """How many items of each chapter have each status, as Markdown."""
+    found = {title: Counter(claim.status for claim in rows) for title, rows in chapters.items()}
+    found["all"] = Counter(claim.status for rows in chapters.values() for claim in rows)
+    rows = [(title, *(str(own[status]) for status in Status)) for title, own in found.items()]
+    return markdown(("chapter", *(status.value for status in Status)), rows)
 
 
-def table(claims: Iterable[Claim], measured: Mapping[str, Mapping[str, float]]) -> str:
-    """Items as Markdown.
-
-    Parameters
-    ----------
-    claims : of a chapter.
-    measured : the greatest distance of each figure and of each effect.
-
-    Raises
-    ------
-    KeyError
-        for a place of a name that has no distance.
-    """
-    head = ("section", "claimed", "status", "agreement", "shown by", "not shown")
-    rows = []
-    for c in claims:
-        agreement = PLACE.sub(lambda place: _percent(measured[place[1]][place[2]]), c.agreement)
-        rows.append((c.section, c.claim, c.status, agreement, _links(c), c.open))
-    return markdown(head, rows)
-
-
-def _links(claim: Claim) -> str:
-    """Links to what shows an item; names of tests are not of interest to a reader."""
-    named = dict.fromkeys("tests" if name.startswith("test ") else name for name in claim.shown)
-    cells = (reference.partition(" ") for reference in named)
-    return "; ".join(
-        f"{kind} [{name}]({PAGES[kind]})" if kind in PAGES else "tests" if kind == "tests" else f"`{kind}`"
-        for kind, _, name in cells
-    )
-
-
-def _percent(distance: float) -> str:
-    return "below 0.01 %" if distance < 1e-4 else f"{100.0 * distance:.2g} %"
+def not_shown(claims: Iterable[Claim]) -> str:
+    """The items that nothing shows, with the reason, as Markdown."""
+    rows = [(claim.section, claim.claim, claim.open) for claim in claims if claim.status is Status.NOT_SHOWN]
+    return markdown(("section", "claimed", "why it is not shown"), rows)

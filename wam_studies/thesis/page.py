@@ -4,13 +4,17 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from wam_studies.page import END, section_of, with_section
+from wam_analysis.table import markdown
+from wam_studies.page import kept_rows, section_of, with_section
 from wam_studies.thesis.definition import Experiment
-from wam_studies.thesis.rows import Result, markdown
+from wam_studies.thesis.rows import PAGE_HEAD, Result, summary
+
+SECTION = "experiments"
+HEAD = ("experiment", "within bounds", "nearest to its bound", *PAGE_HEAD[1:])
 
 
 def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> None:
-    """Write results into the sections of a page; a new experiment gets one at the end.
+    """Write a row and a picture of each experiment into a page; those of others stay.
 
     Parameters
     ----------
@@ -19,19 +23,15 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
     """
     folder = page.with_suffix("")
     folder.mkdir(exist_ok=True)
+    before = section_of(page, SECTION)
+    rows = kept_rows(before)
+    pictures = {line.rpartition("/")[2]: line for line in before.splitlines() if line.startswith("![")}
     for experiment, result, picture in results:
-        parts = [markdown(result.rows), "\n".join(f"- {remark}" for remark in result.remarks)]
+        name = f"`{experiment.name}`"
+        rows[name] = [name, *summary(result.rows)]
         if result.panels:
-            parts.append(f"![{experiment.title}]({folder.name}/{experiment.name}.png)")
+            shown = f"{folder.name}/{experiment.name}.png)"
+            pictures[shown.rpartition("/")[2]] = f"![{experiment.title}]({shown}"
             shutil.copyfile(picture, folder / f"{experiment.name}.png")
-        if not section_of(page, experiment.name):
-            _append(page, experiment)
-        text = with_section(page, experiment.name, "\n" + "\n\n".join(filter(None, map(str.strip, parts))))
-        page.write_text(text, encoding="utf-8")
-
-
-def _append(page: Path, experiment: Experiment) -> None:
-    """Give a new experiment a section at the end."""
-    before = page.read_text(encoding="utf-8").rstrip()
-    section = f"## {experiment.title}\n\n<!-- written: {experiment.name} -->\n\n{END}\n"
-    page.write_text(f"{before}\n\n{section}", encoding="utf-8")
+    text = "\n\n".join([markdown(HEAD, list(rows.values())).rstrip(), *pictures.values()])
+    page.write_text(with_section(page, SECTION, f"\n{text}", SECTION), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from operator import attrgetter
 from typing import NamedTuple, SupportsFloat
 
 from wam_analysis import table
@@ -45,6 +46,13 @@ class Comparison(NamedTuple):
             return self.predicted == self.measured
         return abs(self.deviation) <= self.bound
 
+    @property
+    def nearness(self) -> float:
+        """Deviation per bound: 1 at the bound, -1 without a claim or for texts that agree."""
+        if not self.agrees:
+            return math.inf
+        return abs(self.deviation) / self.bound if self.bound > 0.0 and self.deviation == self.deviation else -1.0
+
 
 def near(
     quantity: str,
@@ -81,6 +89,9 @@ class Result(NamedTuple):
         return all(row.agrees for row in self.rows)
 
 
+NOTHING = "-"  # no prediction
+NEARNESS = attrgetter("nearness")
+PAGE_HEAD = ("quantity", "predicted", "measured", "deviation", "bound")
 HEAD = ("quantity", "predicted", "measured", "unit", "deviation", "bound", "equation", "")
 
 
@@ -104,12 +115,27 @@ def plain(rows: Iterable[Comparison]) -> str:
 
 
 def markdown(rows: Iterable[Comparison]) -> str:
-    """The rows as a table of Markdown."""
-    return table.markdown(HEAD, map(cells, rows))
+    """The rows that have a prediction as a table of Markdown."""
+    return table.markdown(PAGE_HEAD, [_page_cells(row) for row in rows if _value(row.predicted) != NOTHING])
+
+
+def _page_cells(row: Comparison) -> tuple[str, ...]:
+    """The texts of a row in the order of `PAGE_HEAD`."""
+    quantity, predicted, measured, unit, deviation, bound, _, verdict = cells(row)
+    name = f"{quantity}, {unit}" if unit else quantity
+    return name, predicted, measured, deviation, f"{bound} MISSED" if verdict == "MISSED" else bound
+
+
+def summary(rows: Sequence[Comparison]) -> tuple[str, ...]:
+    """How many rows agree, and the cells of the row that is nearest to its bound, in the order of `PAGE_HEAD`."""
+    claimed = [row for row in rows if not math.isnan(row.bound)]
+    agreeing = sum(row.agrees for row in claimed)
+    verdict = f"{agreeing} of {len(claimed)}" + (" MISSED" if agreeing < len(claimed) else "")
+    return verdict, *_page_cells(max(claimed, key=NEARNESS))
 
 
 def _value(value: float | str) -> str:
-    return value if isinstance(value, str) else "-" if math.isnan(value) else f"{value:.4g}"
+    return value if isinstance(value, str) else NOTHING if math.isnan(value) else f"{value:.4g}"
 
 
 def _deviation(row: Comparison, value: float, sign: str) -> str:
