@@ -77,6 +77,8 @@ class ListedContact(NamedTuple):
     before, after : what cuts it off there.
     true : the true link, 'none' where nothing was touched, '' where the true contact was not recorded.
     true_position, true_force : m and N; of that link, in the same time.
+    latency : s from the start of the true contact to this detection, below zero if the contact was reported before; NaN
+        where it cannot be known.
     """
 
     step: str
@@ -88,6 +90,7 @@ class ListedContact(NamedTuple):
     true: str
     true_position: float
     true_force: float
+    latency: float = NAN
 
     @property
     def position_error(self) -> float:
@@ -144,7 +147,34 @@ def listed_contacts(traces: Traces, certainty: Certainty, steps: Sequence[Record
     """
     bounds = [step.begin for step in steps] or _other_commands(traces)
     rows = cut_at(traces.stamp, contacts_by_link(traces.stamp, traces.estimated), bounds)
-    return tuple(_listed(traces, certainty, steps, begin, end) for begin, end in rows)
+    detected = list(_detections(traces))
+    listed = (_listed(traces, certainty, steps, begin, end) for begin, end in rows)
+    return tuple(
+        one._replace(latency=next((late for row, late in detected if begin <= row < end), NAN))
+        for one, (begin, end) in zip(listed, rows, strict=True)
+    )
+
+
+def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
+    """Row in which each true contact was detected, and the latency, s.
+
+    It is not known where the contact was there before its recording began, while the estimate is missing, and where
+    that of the contact before goes on.
+    """
+    estimated, last = traces.estimated, 0
+    for begin, end in contacts_by_link(traces.stamp, traces.true):
+        before, last = last, end
+        seen = np.flatnonzero(estimated.acts[begin:end])
+        if cut_ends(traces.true, begin, end)[0] is not CutBy.NOTHING or not len(seen):
+            continue
+        row = begin + int(seen[0])
+        if row == begin:
+            free = np.flatnonzero(~estimated.acts[:begin])
+            row = int(free[-1]) + 1 if len(free) else 0
+            if before and row < before:
+                continue
+        if np.all(estimated.is_known[begin : row + 1]):
+            yield row, float(traces.stamp[row] - traces.stamp[begin]) / 1e9
 
 
 def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[MissedContact, ...]:

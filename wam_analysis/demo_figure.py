@@ -14,7 +14,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
-from wam_analysis.contact_comparison import StepContact
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.demo_traces import ForceSignal, Numbers
 from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, STYLE, TRUE
@@ -229,9 +228,9 @@ def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c
     for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.estimated, ESTIMATED, 1.0)):
         position = np.where(signal.acts, 100.0 * signal.position, np.nan)
         axes.plot(time, position, color=colour, lw=width, zorder=4)
-    for touch in summary.touches:
-        if touch.is_lower_bound:
-            middle = _middle(summary, touch)
+    for contact in summary.contacts:
+        if contact.estimate.is_lower_bound:
+            middle = (contact.begin + contact.end) / 2.0 - (_zero(summary) - traces.zero) / 1e9
             axes.text(
                 middle, 0.07 * length, "not\nobservable", ha="center", fontsize=7.5, color=ESTIMATED, linespacing=0.95
             )
@@ -247,10 +246,10 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
         first = int(summary.traces.stamp[0]) if len(summary.traces.stamp) else zero
         begin = max(first - zero, 0) / 1e9  # a recording may begin later than its scenario
         axes.set_xlim(begin, max((summary.steps[-1].end - zero) / 1e9, begin + 1e-3))
-    middles = [(touch.begin + touch.end) // 2 for touch in summary.touches]
-    touched = [step for step in summary.steps if any(step.begin <= middle < step.end for middle in middles)]
-    busy = {step.begin: "#e7f0f7" for step in touched}
-    busy |= {step.begin: "#faeee2" for step in summary.steps for press in summary.presses if press.end == step.end}
+    touched = {contact.step for contact in (*summary.contacts, *summary.missed)}
+    busy = {step.begin: "#e7f0f7" for step in summary.steps if step.name in touched}
+    pressed = [step for step in summary.steps if any(step.begin < one.end <= step.end for one in summary.holds)]
+    busy |= {step.begin: "#faeee2" for step in pressed}
     for step in summary.steps:
         begin, end = (step.begin - zero) / 1e9, (step.end - zero) / 1e9
         axes.axvspan(begin, end, facecolor=busy.get(step.begin, "white"), edgecolor="none", zorder=0)
@@ -259,7 +258,7 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _middle(summary: DemoSummary, step: RecordedStep | StepContact) -> float:
+def _middle(summary: DemoSummary, step: RecordedStep) -> float:
     return ((step.begin + step.end) / 2.0 - _zero(summary)) / 1e9
 
 

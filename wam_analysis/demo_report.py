@@ -10,19 +10,21 @@ import numpy as np
 
 from wam_analysis.contact_list import NOT_ESTIMATED
 from wam_analysis.demo_figure import save
-from wam_analysis.demo_summary import DemoSummary, LoopReport, failure_of, summary_of
+from wam_analysis.demo_summary import DemoSummary, LoopReport
 from wam_analysis.demo_traces import TOPICS_READ
+from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.contact import contact_doubts, contact_numbers
 from wam_analysis.findings.finding import Finding
-from wam_analysis.findings.steps import VerdictResult, step_findings, step_sentences, verdict
+from wam_analysis.findings.force import press_findings
+from wam_analysis.findings.held_force import Theory
+from wam_analysis.findings.steps import VerdictResult, verdict
 from wam_analysis.findings.text import table_lines
 from wam_analysis.recorded import recorded_arm
-from wam_analysis.thresholds import LAYOUT, TOUCH
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import BagError, read
 from wam_bag.errors import command
 from wam_description.event import Code
-from wam_sim.reactions import sentences, within
-from wam_sim.recording import recorded_run
+from wam_sim.reactions import STEADY, sentences, within
 
 
 class DemoReport(NamedTuple):
@@ -50,9 +52,8 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
         if the bag cannot be read or holds no demonstration; then nothing is written.
     """
     bag = Path(bag)
-    run = recorded_run(read(bag, TOPICS_READ, may_lack=True), namespace)
-    summary = summary_of(run)
-    if not summary.steps:
+    recording = analysed_run(read(bag, TOPICS_READ, may_lack=True), namespace)
+    if not recording.summary.steps:
         raise BagError(
             f"{bag} is not a recording of the demonstration: it has no step of a scenario; "
             f"{command('wam analyse', bag)} analyses any recording, {command('wam bag info', bag)} lists its topics"
@@ -60,48 +61,51 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
     notes: tuple[str, ...] = ()
     if picture is not None:
         try:
-            notes = save(picture, summary, recorded_arm(run.parameters))
+            notes = save(picture, recording.summary, recorded_arm(recording.run.parameters))
         except OSError as error:
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
-    wrong = [str(answer) for answer in verdict(summary) if answer.result is VerdictResult.NO]
-    failed = [f"FAILED: {why}" for why in [failure_of(run)] if why]
-    return DemoReport("\n".join([text(summary, notes), "", *files]), (*failed, *wrong))
+    wrong = [str(answer) for answer in verdict(recording) if answer.result is VerdictResult.NO]
+    failed = [f"FAILED: {why}" for why in [recording.failure] if why]
+    return DemoReport("\n".join([text(recording, notes), "", *files]), (*failed, *wrong))
 
 
 def reaction_report(bag: Path) -> str:
     """What was not simply obeyed in a recording, by step, and contacts that were too hard; '' if nothing."""
-    return reaction_text(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True))))
-
-
-def reaction_text(summary: DemoSummary) -> str:
-    """The same of a summary."""
+    summary = analysed_run(read(bag, TOPICS_READ, may_lack=True)).summary
     hard = [line for sentence in summary.unplanned.sentences for line in _wrapped(f"  {sentence}", "    ")]
     return "\n".join([*_reactions(summary), *([""] if hard else []), *hard])
 
 
-def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
+def text(recording: AnalysedRun, notes: Sequence[str] = ()) -> str:
     """The report without the names of files.
 
     Parameters
     ----------
-    summary : of the bag.
-    notes : to be added to those of the summary.
+    recording : of the bag.
+    notes : to be added to those of its summary.
     """
+    summary = recording.summary
+    forces = [one for held in recording.held for one in press_findings(held, Theory())]
+    short = [one.hold.name for one in recording.held if one.hold.is_short]
     lines = [line for lost in summary.lost for line in _wrapped(f"INCOMPLETE: {lost}")]
     lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
     worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
-    lines += ["", worst, *(f"  {answer}" for answer in verdict(summary))]
+    lines += ["", worst, *(f"  {answer}" for answer in verdict(recording))]
     lines += [
         "",
-        *_titled("Forces and contacts of each step", tuple(step_findings(summary)), "no pressing step was recorded"),
-        *(line for one in step_sentences(summary) for line in _wrapped(f"  {one}", "    ")),
+        *_titled("Commanded forces", tuple(forces), "none was recorded"),
+        *(_wrapped(f"  Less than {STEADY:g} s, no steady state: {', '.join(short)}.", "    ") if short else ()),
         *_reactions(summary),
         "",
         *_titled("Estimated contacts, medians over each", tuple(contact_numbers(summary)), _no_contact(summary)),
     ]
-    sentences = (*_contact_steps(summary), *contact_doubts(summary), *_uncompared(summary))
-    for sentence in (*sentences, *(one.sentence for one in summary.missed), *summary.unplanned.sentences):
+    for sentence in (
+        *_contact_steps(summary),
+        *contact_doubts(summary),
+        *(one.sentence for one in summary.missed),
+        *summary.unplanned.sentences,
+    ):
         lines += _wrapped(f"  {sentence}", "    ")
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
@@ -143,13 +147,6 @@ def _contact_steps(summary: DemoSummary) -> list[str]:
     """In which step each estimated contact was."""
     named = [f"{number} {contact.step}" for number, contact in enumerate(summary.contacts, 1) if contact.step]
     return [f"In the steps: {', '.join(named)}."] if named else []
-
-
-def _uncompared(summary: DemoSummary) -> list[str]:
-    """How many true contacts the table lacks."""
-    number = summary.uncompared
-    contacts = "1 true contact is" if number == 1 else f"{number} true contacts are"
-    return [f"{contacts} shorter than {1e-9 * TOUCH.bounce:g} s and not compared."] if number else []
 
 
 def _false_contacts(summary: DemoSummary) -> str:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.command_gaps import command_gaps
-from wam_analysis.contact_comparison import StepContact, compared_contacts, uncompared_contacts
 from wam_analysis.contact_list import (
     ListedContact,
     MissedContact,
@@ -17,57 +16,19 @@ from wam_analysis.contact_list import (
     missed_contacts,
 )
 from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
+from wam_analysis.holds import Hold, holds_of
 from wam_analysis.measures.runs import runs
-from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
-from wam_analysis.task_forces import TaskForce, measured_force, task_forces, tasks_of
+from wam_analysis.task_forces import TaskForce, task_forces, tasks_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import CUT, RECORDING, losses
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
-from wam_sim.reactions import SETTLING_TIME, STEADY, RecordedReaction, steady_begin, watched_times, within
+from wam_sim.reactions import SETTLING_TIME, RecordedReaction, steady_begin, watched_times
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
-
-
-class SteadyPress(NamedTuple):
-    """A pressing step in its steady state: means along the commanded force, N; NaN if unknown, or without one.
-
-    Attributes
-    ----------
-    commanded_for : s in this step.
-    ripple : half of the range of the true force.
-    positions : what the same torques are at the configured, at the estimated and at the true position.
-    reactions : what the force loop did meanwhile instead of what was commanded, in the whole step.
-    """
-
-    step: str
-    begin: int
-    end: int
-    commanded: float
-    true: float
-    ripple: float
-    measured: float
-    estimated: float
-    commanded_for: float
-    positions: PressPositions = NOWHERE
-    reactions: tuple[RecordedReaction, ...] = ()
-
-    @property
-    def is_short(self) -> bool:
-        """Whether the force was commanded too briefly for a steady state."""
-        return self.commanded_for < STEADY
-
-    @property
-    def is_refused(self) -> bool:
-        """Whether the force was not controlled in the steady state."""
-        return any(one.holds and one.end > self.begin for one in self.reactions)
-
-    def error(self, force: float) -> float:
-        """Deviation from the commanded force, in per cent of it."""
-        return 100.0 * (force - self.commanded) / self.commanded
 
 
 class LoopReport(NamedTuple):
@@ -109,10 +70,10 @@ class DemoSummary(NamedTuple):
     tasks : forces that tasks command.
     torques : begin and end of each time in which a task commands the same joint torques and motions, ns.
     settling_times : of the force loop, s, and since when it had each, ns; NaN where it was not recorded.
+    holds : the constant forces that were commanded.
     contacts : all that were estimated.
     missed : true contacts that were not.
     unplanned : contacts without a command of a force, harder than allowed.
-    uncompared : number of the true contacts that are in none of the touches, as they are too short.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
@@ -131,12 +92,10 @@ class DemoSummary(NamedTuple):
     tasks: tuple[TaskForce, ...]
     torques: tuple[tuple[int, int], ...]
     settling_times: tuple[tuple[int, float], ...]
-    presses: tuple[SteadyPress, ...]
-    touches: tuple[StepContact, ...]
+    holds: tuple[Hold, ...]
     contacts: tuple[ListedContact, ...]
     missed: tuple[MissedContact, ...]
     unplanned: UnplannedContacts
-    uncompared: int
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
     longest_false_contact: float
@@ -181,16 +140,14 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
     reactions = tuple(_with_forces(one, traces) for one in run.reactions(_end(traces, steps)))
-    presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
+    holds = holds_of(run, steps, tasks, traces, reactions)
     certainty = certainty_of(run, traces)
-    held = {press.step for press in presses if press.is_refused}
     blind = _blind(run, traces)
     if np.any(blind & traces.true.acts):
         notes.append(
             "contacts under the brakes are not compared: the motors, which alone are observed, sense none then"
         )
     seen = traces._replace(true=traces.true.unknown(blind), push=traces.push.unknown(blind))
-    touches = compared_contacts(seen, certainty, steps, held)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
@@ -205,12 +162,10 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         tasks=tuple(tasks),
         torques=tuple(watched_times(tasks_of(run), without_forces=True)),
         settling_times=_settling_times(run),
-        presses=presses,
-        touches=touches,
+        holds=holds,
         contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(seen, steps),
         unplanned=unplanned_contacts(run, traces, steps, gaps),
-        uncompared=uncompared_contacts(seen, touches),
         reactions=reactions,
         false_contact=int(np.sum(false)) * traces.period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * traces.period,
@@ -220,7 +175,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         dropped=dropped,
         gone=lost.gone,
         lost=(*lost.sentences(bag.first_ns), *(gap.sentence(traces.zero) for gap in gaps)),
-        moment=_moment(run, traces, presses),
+        moment=_moment(run, traces, holds),
         notes=(*notes, *(one.sentence for one in run.refused), *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
 
@@ -281,63 +236,6 @@ def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:
     return max([int(stamp) for stamp in traces.stamp[-1:]] + [step.end for step in steps[-1:]], default=0)
 
 
-def _presses(
-    run: RecordedRun,
-    traces: Traces,
-    tasks: Sequence[TaskForce],
-    step: RecordedStep,
-    reactions: Sequence[RecordedReaction],
-) -> list[SteadyPress]:
-    """The forces of a step: the commanded one, or each one of a task that commands several."""
-    during = within(reactions, step.begin, step.end)
-    begin = steady_begin(step)
-    presses = [_press(run, traces, step, begin)]
-    for task in tasks:
-        if not task.is_only and task.begin < step.end and task.end > begin:
-            name, size = f"{step.name}, axis {task.number + 1}", float(np.linalg.norm(task.force))
-            since, until = max(step.begin, task.begin), min(step.end, task.end)
-            _, measured = measured_force(run, task.number, max(begin, task.begin), until)
-            seconds = (until - since) / 1e9
-            presses.append(SteadyPress(name, begin, step.end, size, NAN, NAN, _mean(measured), NAN, seconds))
-    return [_steady(press)._replace(reactions=during) for press in presses if press]
-
-
-def _steady(press: SteadyPress) -> SteadyPress:
-    """Without forces where there is no steady state."""
-    if not press.is_short:
-        return press
-    return press._replace(true=NAN, ripple=NAN, measured=NAN, estimated=NAN, positions=NOWHERE)
-
-
-def _press(run: RecordedRun, traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None:
-    whole = traces.during(step.begin, step.end) & traces.commanded.acts
-    if not np.any(whole):
-        return None
-    steady = traces.during(begin, step.end) & traces.commanded.acts
-    if not np.any(steady):
-        steady = whole
-    true = traces.along(traces.true, -1.0)[steady]
-    measured = _mean(traces.along(traces.measured)[steady])
-    return SteadyPress(
-        step=step.name,
-        begin=begin,
-        end=step.end,
-        commanded=_mean(traces.commanded.size[steady]),
-        true=_mean(true),
-        ripple=float(np.ptp(true)) / 2.0,
-        measured=measured,
-        estimated=_mean(traces.along(traces.estimated, -1.0)[steady]),
-        commanded_for=float(np.ptp(traces.stamp[whole])) / 1e9 + traces.period,
-        positions=press_positions(run, traces, steady, measured),
-    )
-
-
-def _mean(values: Numbers) -> float:
-    """Mean if at least half of the values are known, else NaN."""
-    known = values[~np.isnan(values)]
-    return float(np.mean(known)) if 2 * len(known) >= len(values) > 0 else NAN
-
-
 def _loop(run: RecordedRun) -> LoopReport:
     reports = [
         status.facts
@@ -377,7 +275,7 @@ def driver_faults(run: RecordedRun, zero: int) -> list[str]:
     return list(dict.fromkeys(texts))
 
 
-def _moment(run: RecordedRun, traces: Traces, presses: tuple[SteadyPress, ...]) -> Moment | None:
+def _moment(run: RecordedRun, traces: Traces, holds: tuple[Hold, ...]) -> Moment | None:
     """Middle of the steady state of the hardest press, else of the first contact, else the last pose."""
     found = [columns for name in ("sim/joint_states", "joint_states") if (columns := run.joints(name)) is not None]
     joints = next((columns for columns in found if columns.position.size), None)
@@ -385,9 +283,9 @@ def _moment(run: RecordedRun, traces: Traces, presses: tuple[SteadyPress, ...]) 
         return None
     contacts = contact_rows(traces.stamp, traces.true.acts) or contact_rows(traces.stamp, traces.estimated.acts)
     stamp = int(traces.stamp[-1])
-    if presses:
-        hardest = max(presses, key=lambda press: press.commanded)
-        stamp = (hardest.begin + hardest.end) // 2
+    if holds:
+        hardest = max(holds, key=lambda hold: hold.commanded)
+        stamp = (steady_begin(hardest) + hardest.end) // 2
     elif contacts:
         stamp = int(traces.stamp[sum(contacts[0]) // 2])
     row = max(int(np.searchsorted(traces.stamp, stamp, side="right")) - 1, 0)

@@ -1,9 +1,10 @@
-"""For how long a recorded message is held, and where a topic has none for longer."""
+"""Messages at other times: which is held, where a topic has none, and joints in the order of some names."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
+from wam_bag.bag import JointColumns
 
 Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -35,3 +36,18 @@ def with_holes(stamps: Times) -> Times:
     """These and, where none comes for longer than one is held, an instant at which it is not held any more."""
     last = stamps[rows_before_gaps(stamps)]
     return np.sort(np.concatenate([stamps, last + held_for(stamps) + 1])) if len(last) else stamps
+
+
+def at_stamps(columns: JointColumns, stamps: Times) -> tuple[Mask, NDArray[np.intp]]:
+    """Whether there is a message with each of some stamps, and its row; columns must be sorted by stamp."""
+    row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
+    return columns.stamp_ns[row] == stamps, row
+
+
+def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """Columns of a field in the order of some names, (k, n); None if a name is missing."""
+    values: NDArray[np.float64] = getattr(columns, field)
+    if not values.shape[1] or any(name not in columns.names for name in names):
+        return None
+    order = [columns.names.index(name) for name in names]
+    return values if order == list(range(values.shape[1])) else values[:, order]

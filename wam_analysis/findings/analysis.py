@@ -14,7 +14,6 @@ from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
-from wam_analysis.findings.held_force import HeldForce, held_forces
 from wam_analysis.findings.motion import MotionFindings, motion_sections
 from wam_analysis.findings.steps import steps_section
 from wam_analysis.findings.timing import extent, provenance, timing_section
@@ -26,7 +25,7 @@ from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
-from wam_sim.recording import RecordedRun
+from wam_sim.recording import RecordedRun, recorded_run
 
 OF_THE_START = "predicted for the parameters at the start, which were changed"
 Progress = Callable[[str], None]
@@ -52,14 +51,13 @@ class Analysis(NamedTuple):
 
     Attributes
     ----------
-    recording, held, motion : what the sections are made from, for the pictures.
+    recording, motion : what the sections are made from, for the pictures.
     duration : s.
     provenance : origin of the bag and of the numbers.
     sections : one for each subject; "verdict" is the first.
     """
 
     recording: AnalysedRun
-    held: tuple[HeldForce, ...]
     motion: MotionFindings
     duration: float
     provenance: dict[str, str]
@@ -110,11 +108,11 @@ def analyse(
 def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
     """Analyse the joints and wrenches of another robot's bag, see `wam_analysis.foreign.reading.foreign_bag`."""
     sections = foreign_sections(bag, given)
-    recording = analysed_run(bag)._replace(is_foreign=True)
+    recording = AnalysedRun(recorded_run(bag), is_foreign=True)
     nothing = MotionFindings((), None, {}, {})
     duration = extent(bag.topics)
     sections = (_verdict(_foreign_line(bag, duration), sections), *sections)
-    return Analysis(recording, (), nothing, duration, provenance(recording), sections)
+    return Analysis(recording, nothing, duration, provenance(recording), sections)
 
 
 def _is_own(path: Path) -> bool:
@@ -139,17 +137,14 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     """Analyse a bag of this stack that has been read, see `analyse`."""
     progress("forces and contacts")
     recording = analysed_run(bag, namespace)
-    held = held_forces(recording)
-    predicted = [
-        _of_the_start(one, recording) for one in (force_section(recording, held), cycle_section(recording, held))
-    ]
+    predicted = [_of_the_start(one, recording) for one in (force_section(recording), cycle_section(recording))]
     middle = (*predicted, contact_section(recording))
     progress("friction, ripple, power and frequency")
     motion = motion_sections(recording)
     progress("timing")
     prefix = f"{recording.namespace}/"
     duration = extent({name: topic for name, topic in recording.bag.topics.items() if name.startswith(prefix)})
-    steps = steps_section(recording.summary)
+    steps = steps_section(recording)
     sections = (
         _happened(recording, duration),
         *filter(None, [steps]),
@@ -158,7 +153,7 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
         timing_section(recording),
     )
     verdict = _verdict(_own_line(recording, duration), sections)
-    return Analysis(recording, held, motion, duration, provenance(recording), (verdict, *sections))
+    return Analysis(recording, motion, duration, provenance(recording), (verdict, *sections))
 
 
 def _verdict(what: str, sections: tuple[Section, ...]) -> Section:
@@ -199,9 +194,9 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     if summary.steps:
         ended = " to its end" if summary.outcome == Code.DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
-    if recording.holds:
-        forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
-        sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
+    if summary.holds:
+        forces = ", ".join(f"{hold.commanded:.3g} N" for hold in summary.holds)
+        sentences.append(f"The arm was commanded to press {times(len(summary.holds))} ({forces}).")
     sentences += [f"{one.sentence}." for one in recording.run.refused]
     sentences += _touched(summary.traces)
     faults = driver_faults(recording.run, summary.traces.zero)

@@ -100,7 +100,7 @@ def _dashed(name: str, desired: dict[str, Numbers]) -> list[ChartLine]:
 
 
 def _holds(analysis: Analysis) -> Iterator[Chart]:
-    for one in analysis.held:
+    for one in analysis.recording.held:
         if len(one.time):
             level = np.full(len(one.time), one.hold.commanded)
             lines = [ChartLine("measured", MEASURED, one.measured), ChartLine("commanded", COMMANDED, level, True)]

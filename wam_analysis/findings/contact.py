@@ -84,7 +84,7 @@ def contact_section(recording: AnalysedRun) -> Section:
 def contact_numbers(summary: DemoSummary) -> Iterator[Finding]:
     """Every estimated contact in numbers."""
     for number, contact in enumerate(summary.contacts, 1):
-        yield from _numbers(f"{number} {contact.estimate.link}", contact)
+        yield from _numbers(f"{number} {contact.estimate.link}", contact, summary.period)
 
 
 def contact_doubts(summary: DemoSummary) -> Iterator[str]:
@@ -97,7 +97,7 @@ def contact_doubts(summary: DemoSummary) -> Iterator[str]:
         yield f"Positions of contacts: {NOT_PLACED}."
 
 
-def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
+def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Finding]:
     """A contact in numbers, those that are compared with the true ones last."""
     cm = 100.0
     note = f"in step '{contact.step}'" if contact.step else ""
@@ -113,6 +113,8 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be only the least one" * (not one.is_placed)
     yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
+    note = f"to its detection, known to {1e3 * period:.0f} ms"
+    yield Finding(f"{name}: latency", "ms", 1e3 * (contact.latency + period), note=note)
 
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:

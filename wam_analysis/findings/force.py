@@ -10,8 +10,8 @@ from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
-from wam_analysis.findings.held_force import HeldForce
-from wam_analysis.findings.prediction import LargestForce
+from wam_analysis.findings.held_force import HeldForce, Theory
+from wam_analysis.findings.prediction import LargestForce, Predicted
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.thresholds import CYCLE, HOLD
@@ -31,22 +31,23 @@ from wam_sim.reactions import (
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
+STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
 NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
 
 
-def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
+def force_section(recording: AnalysedRun) -> Section:
     """Each commanded force, how it was reached and held, and the dynamic range (3.2.1)."""
     lacking = recording.lacking("force_command", "force_measured", "sim/contact/wrench")
-    sentences, findings, zero = [], [], recording.summary.traces.zero
+    sentences, findings, zero, held = [], [], recording.summary.traces.zero, recording.held
     for one in held:
         sentences.append(_press_sentence(one))
         sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
-        findings += _press_findings(one)
+        findings += press_findings(one, recording.theories[one.hold.name])
     if not held:
         sentences.append(f"{NO_FORCE}.")
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
-    range_stated, range_findings = _dynamic_range(held)
+    range_stated, range_findings = _dynamic_range(recording)
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
     wrong = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary))
     every = (*findings, *range_findings)
@@ -55,7 +56,7 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
 
 def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
     """What was not simply obeyed besides constant forces, by step of the scenario, or of the run."""
-    spans = [(hold.begin, hold.end) for hold in recording.holds]
+    spans = [(hold.begin, hold.end) for hold in recording.summary.holds]
     reactions = of_force_loop(recording.summary.reactions)
     rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
     steps: dict[str, tuple[RecordedReaction, ...]] = {}
@@ -100,12 +101,16 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     return (f"Forces: {len(known)} of {len(held)}{what}, worst {whose}{error:+.1f} %.",)
 
 
-def _dynamic_range(held: Sequence[HeldForce]) -> tuple[list[str], list[Finding]]:
+def _dynamic_range(recording: AnalysedRun) -> tuple[list[str], list[Finding]]:
     """Dynamic range (3.2.1): of the recording, and up to the limits of the arm."""
-    known = [(one, accuracy) for one in held if math.isfinite((accuracy := _accuracy(one)).smallest)]
+    known = [(one, accuracy) for one in recording.held if math.isfinite((accuracy := _accuracy(one)).smallest)]
     if not known:
         return [], []
-    limits = [one.largest for one in held if one.largest is not None and math.isfinite(one.largest.force)]
+    limits = [
+        one.largest
+        for one in recording.theories.values()
+        if one.largest is not None and math.isfinite(one.largest.force)
+    ]
     least = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
     promised = dynamic_range(least.force, least.limited_by, [accuracy for _, accuracy in known])
     held_most = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
@@ -178,14 +183,27 @@ def _touched(one: HeldForce) -> str:
     return f"{text if one.touched else 'touched down at the start of the step'} (up to {shown(peak, 'N')})"
 
 
-def _press_findings(one: HeldForce) -> list[Finding]:
+def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
+    """A commanded force in numbers: how it was held, and how it was reached."""
     name, response = one.hold.name, one.response
     seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
-    found = [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
+    found = [Finding(f"{name}: commanded force", "N", one.hold.commanded)]
+    found += [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
     if one.hold.is_refused:
         return found
-    if one.predicted is not None:
-        rise = math.log(9.0) * one.predicted.time_constant
+    for whose, accuracy in (
+        ("true", one.true_accuracy),
+        ("measured", one.measured_accuracy),
+        ("estimated", one.estimated_accuracy),
+    ):
+        error = 100.0 * accuracy.bias / one.hold.commanded
+        found += [
+            Finding(f"{name}: {whose} force", "N", one.hold.commanded + accuracy.bias, note=STEADY_PART),
+            Finding(f"{name}: error of the {whose} force", "%", error),
+            Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
+        ]
+    if theory.predicted is not None:
+        rise = math.log(9.0) * theory.predicted.time_constant
         note = "predicted for the loop alone (5.2): no friction, inertia, feed-forward, limits of the approach"
     else:
         rise, note = math.nan, ""
@@ -202,36 +220,28 @@ def _press_findings(one: HeldForce) -> list[Finding]:
             Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
             Finding(f"{name}: overshoot", "%", over, note=why),
         ]
-    for whose, accuracy, there in (
-        ("true", one.true_accuracy, len(one.true)),
-        ("measured", one.measured_accuracy, len(one.measured)),
-    ):
-        if there and not one.hold.is_short:
-            found += [
-                Finding(f"{name}: bias of the {whose} force", "N", accuracy.bias),
-                Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
-            ]
     return found
 
 
-def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
+def cycle_section(recording: AnalysedRun) -> Section:
     """Stability and limit cycles of the force loop, compared with chapter 5."""
     sentences: list[str] = []
     findings: list[Finding] = []
     verdict: list[str] = []
     seen: set[str] = set()
-    refused = [one.hold.name for one in held if one.hold.is_refused]
-    held = [one for one in held if not one.hold.is_refused]
+    refused = [one.hold.name for one in recording.held if one.hold.is_refused]
+    held = [one for one in recording.held if not one.hold.is_refused]
     if refused:
         sentences.append(f"Not controlled, so without a stability: {', '.join(refused)}.")
     for one in held:
-        sentences += [sentence for sentence in _cycle_sentences(one) if sentence not in sentences]
+        theory = recording.theories[one.hold.name]
+        sentences += [sentence for sentence in _cycle_sentences(one, theory) if sentence not in sentences]
         verdict += filter(None, [_fate(one)[1]])
-        findings += [*_cycle_findings(one), *_theory_findings(one, seen)]
+        findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory, seen)]
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
-    margins = [one.guarded.assessment.scale for one in held if one.guarded is not None]
+    margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
     margin = f", guard margin {shown(min(margins))}" if margins else ""
     if settled and not verdict:
         verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
@@ -266,11 +276,11 @@ def _fate(one: HeldForce) -> tuple[str, str]:
     return f"{text}.", f"{text}." if is_bad else ""
 
 
-def _cycle_sentences(one: HeldForce) -> list[str]:
-    predicted = one.predicted
+def _cycle_sentences(one: HeldForce, theory: Theory) -> list[str]:
+    predicted = theory.predicted
     sentences = [_fate(one)[0]]
-    if one.guarded is not None:
-        sentences.append(guard_sentence(one.guarded))
+    if theory.guarded is not None:
+        sentences.append(guard_sentence(theory.guarded))
     if predicted is not None and math.isfinite(predicted.gamma):
         text = (
             f"Chapter 5, for an ideal velocity source: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: "
@@ -291,8 +301,8 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
     return sentences
 
 
-def _cycle_findings(one: HeldForce) -> list[Finding]:
-    name, cycle, predicted = one.hold.name, one.cycle, one.predicted
+def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
+    name, cycle = one.hold.name, one.cycle
     seen = cycle.confidence >= CYCLE.sure
     force = period = soft_force = soft_period = math.nan
     note = ""
@@ -318,19 +328,19 @@ def _cycle_findings(one: HeldForce) -> list[Finding]:
     ]
 
 
-def _theory_findings(one: HeldForce, seen: set[str]) -> list[Finding]:
+def _theory_findings(name: str, theory: Theory, seen: set[str]) -> list[Finding]:
     """Predictions for the loop itself, once if several forces have the same."""
-    name, predicted = one.hold.name, one.predicted
-    margin = one.guarded.assessment.scale if one.guarded is not None else math.nan
+    predicted = theory.predicted
+    margin = theory.guarded.assessment.scale if theory.guarded is not None else math.nan
     key = f"{shown(predicted.gamma) if predicted is not None else ''} {shown(margin)}"
     if key in seen:
         return []
     seen.add(key)
-    found = _margin_findings(name, one.guarded)
+    found = _margin_findings(name, theory.guarded)
     if predicted is None:
         return found
     actuator = 1e3 * predicted.actuator_peak_to_peak
-    moved = 1e3 * one.moved_at_contact
+    moved = 1e3 * theory.moved
     ideal = "for an ideal velocity source, without friction"
     return [
         *found,

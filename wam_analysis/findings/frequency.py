@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.held_messages import at_stamps, by_names
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import CYCLE

@@ -1,18 +1,21 @@
-"""Each commanded force: how it was reached and held, and its predictions."""
+"""Each commanded force: how it was reached and held, and what theory predicts for it."""
+
+from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import ForceSignal
-from wam_analysis.findings.analysed_run import AnalysedRun, Hold, by_names
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.swinging import Swinging, at_the_contact, swinging
+from wam_analysis.held_messages import by_names
+from wam_analysis.holds import Hold
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
@@ -20,10 +23,14 @@ from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
+from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
 from wam_theory.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from wam_analysis.findings.analysed_run import AnalysedRun
 
 Numbers = NDArray[np.float64]
 
@@ -32,7 +39,7 @@ UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
 
 class HeldForce(NamedTuple):
-    """A hold with its signals along the force, N, their measures and predictions; without these where it was refused.
+    """A hold with its signals along the force, N, and their measures; without these where it was refused.
 
     Attributes
     ----------
@@ -43,14 +50,11 @@ class HeldForce(NamedTuple):
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
     before : force of the contact in which the hold began and of which the loop had no measurement yet, N, as where no
         force was commanded until then; 0 where there is none.  Rise and overshoot are those of the measurement.
-    measured_accuracy, true_accuracy : in the steady part.
+    measured_accuracy, true_accuracy, estimated_accuracy : in the steady part.
     cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
     stability : of the error.
-    node, predicted, largest : by theory; None if the bag has too few parameters.
-    guarded : by the stability guard; None likewise.
-    position : of the contact, m.
+    cover, position : of the contact, by the simulator, else estimated, else as configured in the force loop; m.
     swinging : of a motor or joint, where neither the measured nor the true force was recorded; None otherwise.
-    moved_at_contact : size of its cycle as a motion of the contact along the force, m; NaN if it is not known.
     """
 
     hold: Hold
@@ -63,15 +67,12 @@ class HeldForce(NamedTuple):
     before: float = 0.0
     measured_accuracy: ForceAccuracy = UNMEASURED
     true_accuracy: ForceAccuracy = UNMEASURED
+    estimated_accuracy: ForceAccuracy = UNMEASURED
     cycle: LimitCycle = NO_CYCLE
     stability: Stability = UNDECIDED
-    node: Node | None = None
-    predicted: Predicted | None = None
-    largest: LargestForce | None = None
-    guarded: Guarded | None = None
+    cover: str = ""
     position: float = math.nan
     swinging: Swinging | None = None
-    moved_at_contact: float = math.nan
 
     @property
     def is_recorded(self) -> bool:
@@ -81,13 +82,12 @@ class HeldForce(NamedTuple):
 
 def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
     """Evaluate every hold of a recording; of a force that was not controlled its signals are all there is."""
-    return tuple(
-        _refused(_held(recording, hold)) if hold.is_refused else _held(recording, hold) for hold in recording.holds
-    )
+    holds = recording.summary.holds
+    return tuple(_refused(_held(recording, hold)) if hold.is_refused else _held(recording, hold) for hold in holds)
 
 
 def _refused(held: HeldForce) -> HeldForce:
-    return HeldForce(*held[:5], position=held.position)
+    return HeldForce(*held[:5], cover=held.cover, position=held.position)
 
 
 def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
@@ -95,21 +95,20 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     traces = recording.summary.traces
     rows = traces.during(hold.begin, hold.end) & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
-    true = traces.along(traces.true, -1.0)[rows]
-    if not np.any(np.isfinite(true)):
-        time_true, true = np.empty(0), np.empty(0)
+    true, estimated = (traces.along(signal, -1.0)[rows] for signal in (traces.true, traces.estimated))
     duration = (hold.end - hold.begin) / 1e9
     late, late_true = time >= (1.0 - HOLD.steady) * duration, time_true >= (1.0 - HOLD.steady) * duration
+    estimated_accuracy = _accuracy(hold, estimated[late_true])
+    if not np.any(np.isfinite(true)):
+        time_true, true, late_true = np.empty(0), np.empty(0), np.empty(0, bool)
     swings, swings_true = time >= (1.0 - CYCLE.late_part) * duration, time_true >= (1.0 - CYCLE.late_part) * duration
     cover, position = _touched(recording, hold)
     touched = _touch_down(recording, hold)
     response = _response(hold, time, measured, HOLD.steady * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
-    theory = _theory(recording, hold, cover, position)
     timing = recording.parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
-    swung = None if len(measured) or len(true) else swinging(recording, hold)
     return HeldForce(
         hold=hold,
         time=time,
@@ -121,30 +120,20 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         before=_before(recording, hold, measured),
         measured_accuracy=_accuracy(hold, measured[late]),
         true_accuracy=_accuracy(hold, true[late_true]),
+        estimated_accuracy=estimated_accuracy,
         cycle=_cycle(time_true[swings_true], true[swings_true], dither)
         or _cycle(time[swings], measured[swings], dither)
         or NO_CYCLE,
         stability=_stability(hold, measured),
-        node=theory.node,
-        predicted=theory.predicted,
-        largest=theory.largest,
-        guarded=theory.guarded,
+        cover=cover,
         position=position,
-        swinging=swung,
-        moved_at_contact=_moved(recording, theory.node, swung),
+        swinging=None if len(measured) or len(true) else swinging(recording, hold),
     )
 
 
 def _accuracy(hold: Hold, force: Numbers) -> ForceAccuracy:
     """Of the force in the steady part, which a short hold lacks."""
     return UNMEASURED if hold.is_short else force_accuracy(np.full(len(force), hold.commanded), force)
-
-
-def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) -> float:
-    arm = recording.parameters.arm
-    if arm is None or node is None or found is None or found.swings.verdict is not Verdict.LIMIT_CYCLE:
-        return math.nan
-    return at_the_contact(found, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
 
 
 def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:
@@ -242,30 +231,30 @@ def _median_position(signal: ForceSignal, rows: NDArray[np.bool_]) -> tuple[str,
     return (str(cover), float(np.median(positions))) if len(positions) else ("", math.nan)
 
 
-class _Theory(NamedTuple):
+class Theory(NamedTuple):
+    """What is predicted for a held force; None where the bag has too few parameters.
+
+    Attributes
+    ----------
+    node, predicted, largest : by chapters 3 and 5.
+    guarded : by the stability guard.
+    moved : size of the cycle of a motor as a motion of the contact along the force, m; NaN if it is not known.
+    """
+
     node: Node | None = None
     predicted: Predicted | None = None
     largest: LargestForce | None = None
     guarded: Guarded | None = None
+    moved: float = math.nan
 
 
-NO_THEORY = _Theory(None, None, None, None)
-
-
-def _theory(recording: AnalysedRun, hold: Hold, cover: str, position: float) -> _Theory:
-    parameters = recording.parameters
-    arm = parameters.arm
-    if arm is None or cover not in arm.covers.names:
-        return NO_THEORY
-    joints = recording.run.joints("sim/joint_states") or recording.run.joints("joint_states")
-    positions = None if joints is None else by_names(joints, "position", arm.joints.names)
-    if joints is None or positions is None:
-        return NO_THEORY
-    middle = (hold.begin + hold.end) // 2
-    row = max(int(np.searchsorted(joints.stamp_ns, middle, side="right")) - 1, 0)
-    q = positions[row].tolist()
-    if not np.all(np.isfinite(q)):
-        return NO_THEORY
+def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None) -> Theory:
+    """What is predicted for a held force, for the recorded arm or another one."""
+    parameters, hold, cover, position = recording.parameters, one.hold, one.cover, one.position
+    arm = arm or parameters.arm
+    q = None if arm is None else _pose(recording, arm, hold)
+    if arm is None or q is None or cover not in arm.covers.names:
+        return Theory()
     link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
     if hold.frame != link:
         body = RigidBody(arm)
@@ -273,14 +262,34 @@ def _theory(recording: AnalysedRun, hold: Hold, cover: str, position: float) -> 
         direction = body.cover_pose(q, link).rotation.T @ rotation @ direction
     node = node_at(parameters, arm, q, link, position, direction) if link == cover else None
     largest = largest_force(arm, q, link, position, direction)
+    if node is None:
+        return Theory(largest=largest)
     loop, timing = parameters.force_loop, parameters.timing
     predicted = None
-    if node is not None and loop is not None and timing is not None and loop.mode == "hybrid":
+    if loop is not None and timing is not None and loop.mode == "hybrid":
         delay = math.ceil(timing.outer_delay / timing.outer_divisor)
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
-    found = None if node is None else guarded(parameters, q, cover, position, direction, node.contact_stiffness)
-    return _Theory(node, predicted, largest, found)
+    found = guarded(parameters, q, cover, position, direction, node.contact_stiffness)
+    moved, seen = math.nan, one.swinging
+    if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:
+        moved = at_the_contact(seen, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
+    return Theory(node, predicted, largest, found, moved)
+
+
+def _pose(recording: AnalysedRun, arm: Arm, hold: Hold) -> list[float] | None:
+    """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
+    for topic in ("sim/joint_states", "joint_states", "joint_sensors", "motor_states"):
+        columns = recording.run.joints(topic)
+        names = arm.motors.names if topic == "motor_states" else arm.joints.names
+        found = None if columns is None else by_names(columns, "position", names)
+        if columns is None or found is None:
+            continue
+        row = max(int(np.searchsorted(columns.stamp_ns, (hold.begin + hold.end) // 2, side="right")) - 1, 0)
+        q: list[float] = found[row].tolist()
+        if np.all(np.isfinite(q)):
+            return TransmissionMap.of(arm).joint_positions(q) if topic == "motor_states" else q
+    return None
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:

@@ -1,18 +1,23 @@
 """Cycles of motors and joints under a force that was not recorded."""
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun, Hold
 from wam_analysis.findings.finding import Finding, shown
+from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.thresholds import CYCLE
 from wam_bag.bag import JointColumns
 from wam_theory.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from wam_analysis.findings.analysed_run import AnalysedRun
 
 Numbers = NDArray[np.float64]
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
+from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.held_messages import at_stamps, by_names
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm

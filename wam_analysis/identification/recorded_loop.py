@@ -6,17 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.findings.analysed_run import Hold, by_names
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.guarded import sentence
-from wam_analysis.findings.prediction import node_at
+from wam_analysis.findings.held_force import Theory, theory_of
 from wam_analysis.foreign.mechanics import friction, is_sure
 from wam_analysis.foreign.reading import foreign_bag
 from wam_analysis.foreign.sources import Source, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_description.arm import Arm
-from wam_description.transmission_map import TransmissionMap
 
 QUANTITIES = ("static friction", "dynamic friction", "viscous friction")
 
@@ -96,20 +94,21 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     if arm is None or loop is None or timing is None:
         raise ValueError(f"{path} has no parameters of the arm: {parameters.note}")
     better, names = _with_identified(arm, analysis)
-    for largest in sorted(analysis.held, key=lambda one: -one.hold.commanded):
-        q, cover, direction = _pose(analysis, arm, largest.hold), largest.hold.frame, largest.hold.force
-        if q is None or cover not in arm.covers.names or not np.isfinite(largest.position):
-            continue
-        node = node_at(parameters, better, q, cover, largest.position, direction)
-        if node is not None and np.isfinite(node.contact_stiffness):
+    theory, largest = Theory(), None
+    for largest in sorted(analysis.recording.held, key=lambda one: -one.hold.commanded):
+        theory = theory_of(analysis.recording, largest, better)
+        if theory.node is not None and np.isfinite(theory.node.contact_stiffness):
             break
     else:
+        theory = Theory()
+    node = theory.node
+    if node is None or largest is None:
         raise ValueError(
             f"{path} has no force that was held on a link at a known pose, on a surface of known stiffness"
         )
     recorded = f"parameters in the bag, {largest.hold.name}"
     origin = f"identified friction of {', '.join(names)}; else {recorded}" if names else recorded
-    axis = int(np.argmax(np.abs(direction)))
+    axis = int(np.argmax(np.abs(largest.hold.force)))
 
     def along(values: Any) -> float:
         return float(np.broadcast_to(values, 3)[axis])
@@ -127,23 +126,7 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
         "rate": LoopNumber(1e9 / timing.outer_period_ns, recorded),
         "delay": LoopNumber(timing.outer_delay * timing.period, recorded),
     }
-    return RecordedLoop(numbers, sentence(largest.guarded) if largest.guarded is not None else "")
-
-
-def _pose(analysis: Analysis, arm: Arm, hold: Hold) -> list[float] | None:
-    """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
-    run = analysis.recording.run
-    for topic in ("sim/joint_states", "joint_states", "joint_sensors", "motor_states"):
-        columns = run.joints(topic)
-        names = arm.motors.names if topic == "motor_states" else arm.joints.names
-        found = None if columns is None else by_names(columns, "position", names)
-        if columns is None or found is None:
-            continue
-        row = max(int(np.searchsorted(columns.stamp_ns, (hold.begin + hold.end) // 2, side="right")) - 1, 0)
-        q = found[row].tolist()
-        if np.all(np.isfinite(q)):
-            return TransmissionMap.of(arm).joint_positions(q) if topic == "motor_states" else q
-    return None
+    return RecordedLoop(numbers, sentence(theory.guarded) if theory.guarded is not None else "")
 
 
 def _with_identified(arm: Arm, analysis: Analysis) -> tuple[Arm, list[str]]:
