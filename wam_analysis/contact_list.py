@@ -106,7 +106,7 @@ class ListedContact(NamedTuple):
 
 
 class MissedContact(NamedTuple):
-    """A true contact during which none was estimated: step, begin, end and link as above; median force, N."""
+    """A true contact during most of which none was estimated: step, begin, end and link as above; median force, N."""
 
     step: str
     begin: float
@@ -178,11 +178,12 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
 
 
 def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[MissedContact, ...]:
-    """The true contacts, by link, during which none was estimated, as far as both were recorded."""
+    """The true contacts, by link, during most of which none was estimated, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
     for begin, end in contacts_by_link(traces.stamp, true):
-        if np.all(estimated.is_known[begin:end]) and not np.any(estimated.acts[begin:end]):
+        is_missed = float(np.mean(estimated.acts[begin:end])) < TOUCH.lasting
+        if np.all(estimated.is_known[begin:end]) and is_missed:
             acting = begin + np.flatnonzero(true.acts[begin:end])
             force = median(true.size[acting])
             found.append(MissedContact(*time_of(traces, steps, begin, end), most(true.frame[acting]), force))

@@ -4,10 +4,14 @@ from functools import cached_property
 
 from wam_analysis.demo_summary import DemoSummary, failure_of, summary_of
 from wam_analysis.findings.held_force import HeldForce, Theory, held_forces, theory_of
+from wam_analysis.foreign.sources import Source, alternates, command_of, sources
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_bag.bag import Bag
 from wam_bag.losses import CUT
 from wam_sim.recording import RecordedRun, recorded_run
+
+MOVING = ("motor_states", "joint_sensors", "joint_states")  # where motion is seen, the best first
 
 
 class AnalysedRun:
@@ -16,12 +20,49 @@ class AnalysedRun:
     Parameters
     ----------
     run : of the bag.
-    is_foreign : whether it is a recording of another robot.
+    given : topics, joints, fields and units of another robot's recording; None of one of this stack.
     """
 
-    def __init__(self, run: RecordedRun, is_foreign: bool = False) -> None:
+    def __init__(self, run: RecordedRun, given: TopicMap | None = None) -> None:
         self.run = run
-        self.is_foreign = is_foreign
+        self.is_foreign = given is not None
+        self.given = given or NOTHING_GIVEN
+
+    @cached_property
+    def sources(self) -> tuple[Source, ...]:
+        """Joints and wrenches with what was done to their raw values; of this stack the motors and joints that move."""
+        bag = self.bag
+        if not self.is_foreign:
+            seen = [name for name in MOVING if self.run.joints(name) is not None]
+            kept = seen[: 1 + ("motor_states" in seen)]  # the joints once
+            topics = [f"{self.namespace}/{name}" for name in kept]
+            bag = bag._replace(topics={name: bag.topics[name] for name in topics})
+        return tuple(sources(bag, self.given))
+
+    @cached_property
+    def mixed(self) -> tuple[Source, ...]:
+        """Those whose topic two publishers share, so that it is not analysed."""
+        return tuple(one for one in self.sources if not one.is_command and self.is_foreign and alternates(one))
+
+    @cached_property
+    def states(self) -> tuple[Source, ...]:
+        """What was measured."""
+        return tuple(one for one in self.analysed if not one.is_command)
+
+    def command_of(self, source: Source) -> Source | None:
+        """What was commanded of a joint or wrench; None where that is not known."""
+        return command_of(source, self.commands, self.states)
+
+    @property
+    def analysed(self) -> tuple[Source, ...]:
+        """All but those of a topic that two publishers share."""
+        left_out = {one.topic for one in self.mixed}
+        return tuple(one for one in self.sources if one.topic not in left_out)
+
+    @property
+    def commands(self) -> tuple[Source, ...]:
+        """What was commanded to another robot."""
+        return tuple(one for one in self.analysed if one.is_command)
 
     @cached_property
     def summary(self) -> DemoSummary:

@@ -16,6 +16,7 @@ from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.motion import MotionFindings, motion_sections
 from wam_analysis.findings.steps import steps_section
+from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import extent, provenance, timing_section
 from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
 from wam_analysis.foreign.sections import foreign_sections
@@ -107,8 +108,8 @@ def analyse(
 
 def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
     """Analyse the joints and wrenches of another robot's bag, see `wam_analysis.foreign.reading.foreign_bag`."""
-    sections = foreign_sections(bag, given)
-    recording = AnalysedRun(recorded_run(bag), is_foreign=True)
+    recording = AnalysedRun(recorded_run(bag), given)
+    sections = foreign_sections(recording)
     nothing = MotionFindings((), None, {}, {})
     duration = extent(bag.topics)
     sections = (_verdict(_foreign_line(bag, duration), sections), *sections)
@@ -149,6 +150,7 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
         _happened(recording, duration),
         *filter(None, [steps]),
         *middle,
+        stick_section(recording),
         *motion.sections,
         timing_section(recording),
     )

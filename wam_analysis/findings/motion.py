@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, deviations, rest_words, shown
+from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.power import power_section
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
@@ -43,21 +42,19 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
         arm = replace(arm, motors=effects.smooth(arm))  # cogging is a ripple, below
     lacking = recording.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
     signals = None if arm is None else transmission_signals(recording, arm)
-    stick = _stick_section(recording)
     if arm is None or signals is None or len(signals.time) < 100:
         why = "no parameters of the arm" if arm is None else "no motor_states with a load"
         sentences = (f"Friction, ripple and power cannot be evaluated: {why} in this bag.",)
-        return MotionFindings((stick, Section("friction", "Friction", sentences, (), lacking)), None, {}, {})
+        return MotionFindings((Section("friction", "Friction", sentences, (), lacking),), None, {}, {})
     joints = _friction_of_joints(signals, arm)
     drowned = _drowned(signals, arm)
     if drowned:
         about = _friction_section(recording, arm, signals, {}, joints)
         about = about._replace(sentences=(drowned, *about.sentences))
-        return MotionFindings((stick, about, frequency_section(recording, arm)), None, {}, {})
+        return MotionFindings((about, frequency_section(recording, arm)), None, {}, {})
     friction = _friction_of_motors(signals, arm, recording.parameters)
     ripple = _ripples(signals, arm, friction)
     sections = (
-        stick,
         _friction_section(recording, arm, signals, friction, joints),
         _ripple_section(signals, ripple, friction, recording.parameters),
         power_section(arm, signals, friction, joints),
@@ -80,43 +77,6 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
         f"{shown(rotors, 'N m')}, the cables carry {shown(cables, 'N m')}. The motors of this recording are velocity "
         "sources, whose torque does not show what is lost."
     )
-
-
-# stick and slip
-
-
-def _stick_section(recording: AnalysedRun) -> Section:
-    sentences, findings = [], []
-    for topic, rest in (
-        ("motor_states", SHAFT.motor_rest),
-        ("joint_sensors", SHAFT.joint_rest),
-        ("joint_states", SHAFT.joint_rest),
-    ):
-        columns = recording.run.joints(topic)
-        if columns is None or not columns.velocity.shape[1] or len(columns.stamp_ns) < 10:
-            continue
-        if topic == "joint_states" and recording.run.joints("joint_sensors") is not None:
-            continue
-        period = float(np.median(np.diff(columns.stamp_ns))) / 1e9
-        for i, name in enumerate(columns.names):
-            velocity = columns.velocity[:, i]
-            velocity = velocity[np.isfinite(velocity)]
-            if len(velocity) < 10:
-                continue
-            phases = stick_slip_phases(velocity, rest, max(1, round(SHAFT.shortest_phase / period)))
-            phases = without_turns(phases, velocity, rest)
-            findings += [
-                Finding(f"{name}: at rest", "%", 100.0 * phases.stuck, note=f"slower than {rest:g} rad/s"),
-                Finding(
-                    f"{name}: slips",
-                    "",
-                    float(len(phases.slips)),
-                    note=f"{phases.reversals} of them reverse the direction",
-                ),
-            ]
-            sentences.append(f"{name}: {rest_words(phases.stuck, len(phases.slips))}.")
-    text = tuple(sentences) or ("No velocity was recorded.",)
-    return Section("stick_slip", "Stick and slip", text, tuple(findings), recording.lacking("motor_states"))
 
 
 # friction

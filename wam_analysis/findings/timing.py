@@ -1,50 +1,90 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.foreign.sources import Source
 from wam_analysis.measures.loop_timing import has_lagged, latency, stamp_timing
+from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.bag import Columns, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import RECORDING
 
+Times = NDArray[np.int64]
+
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
+
+
+class _Stream(NamedTuple):
+    """Stamps and receptions of a topic, ns, and its period by the parameters, s."""
+
+    name: str
+    stamp: Times
+    received: Times | None
+    expected: float
+
+
+def _own_streams(recording: AnalysedRun) -> Iterator[_Stream]:
+    timing = recording.parameters.timing
+    for name in TIMED:
+        columns = recording.bag.topics.get(f"{recording.namespace}/{name}")
+        if isinstance(columns, STAMPED) and len(columns.stamp_ns) >= STREAM.shown:
+            expected = math.nan
+            if timing is not None:
+                expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
+            received = columns.log_time_ns if recording.mode == "realtime" else None
+            yield _Stream(name, columns.stamp_ns, received, expected)
+
+
+def _foreign_streams(recording: AnalysedRun) -> Iterator[_Stream]:
+    """Those of each sender by itself."""
+    senders: dict[tuple[str, bytes], list[Source]] = {}
+    for one in recording.analysed:
+        if len(one.time) >= SHAFT.fewest_samples:
+            senders.setdefault((one.topic, one.sent.tobytes()), []).append(one)
+    for (topic, _), those in senders.items():
+        first, name = those[0], topic
+        others = [some[0] for (other, _), some in senders.items() if other == topic and some is not those]
+        if others:
+            name += f" ({first.frame})" if first.frame and all(one.frame != first.frame for one in others) else ""
+            name += f" of {', '.join(one.name for one in those)}" if first.is_joint else ""
+        stamp, received = (1e9 * first.sent).round().astype(np.int64), (1e9 * first.received).astype(np.int64)
+        yield _Stream(name, stamp, received, math.nan)
 
 
 def timing_section(recording: AnalysedRun) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
     sentences, findings, verdict = [], [], []
     real = recording.mode == "realtime"
-    timing = recording.parameters.timing
-    for name in TIMED:
-        columns = recording.bag.topics.get(f"{recording.namespace}/{name}")
-        if not isinstance(columns, STAMPED) or len(columns.stamp_ns) < 3:
-            continue
-        found = stamp_timing(columns.stamp_ns, columns.log_time_ns if real else None)
-        expected = math.nan
-        if timing is not None:
-            expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
+    streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
+    for name, stamp, received, expected in streams:
+        found = stamp_timing(stamp, received)
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * found.period, 1e3 * expected),
             Finding(f"{name}: missed periods", "", float(found.missed)),
+            Finding(f"{name}: longest gap", "s", found.longest_gap),
         ]
         if found.backwards:
             findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards)))
-        if real:
+        if received is not None:
             findings += [
                 Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
                 Finding(f"{name}: longest wait", "ms", 1e3 * found.worst),
             ]
         if found.missed:
-            sentences.append(
-                f"{name}: {found.missed} periods without a message, the longest gap {shown(found.longest_gap, 's')}."
-            )
+            gap = shown(found.longest_gap, "s")
+            sentences.append(f"{name}: {found.missed} periods without a message, the longest gap {gap}.")
             verdict.append(sentences[-1])
+    if recording.is_foreign:
+        stated = "Every period has its message." if findings else "No stamped topic was recorded."
+        return Section("timing", "Timing", tuple(sentences) or (stated,), tuple(findings), (), (), tuple(verdict))
     states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
     lagging = [
         name

@@ -33,14 +33,14 @@ class Sticking(NamedTuple):
     commanded: float
 
 
-def sticking(source: Source, command: Source | None) -> Sticking | None:
-    """Rest and motion of a joint; None without a velocity."""
+def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
+    """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
     if rests(source):
         return Sticking(1.0, 0, 0, math.nan)
     still = slips = reversals = total = disobeyed = 0
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
-        rest = _rest(piece)
+        rest = _rest(piece, least)
         period = float(piece.time[1] - piece.time[0])
         phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
         total += len(piece.time)
@@ -88,8 +88,8 @@ def _turns(sticks: NDArray[np.int64], velocity: Numbers) -> NDArray[np.bool_]:
     return opposed
 
 
-def _rest(piece: Piece) -> float:
-    return max(SHAFT.joint_rest, SHAFT.noisy * piece.noise["velocity"])
+def _rest(piece: Piece, least: float) -> float:
+    return max(least, SHAFT.noisy * piece.noise["velocity"])
 
 
 def _commanded_speed(command: Source, time: Numbers) -> Numbers:
@@ -172,7 +172,7 @@ def friction(source: Source) -> FoundFriction | None:
     columns = {DRAG: (velocity * np.abs(velocity))[:, np.newaxis]}
     if "position" in joined and source.units["position"] == "rad":
         columns[WEIGHT] = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
-    rest = max(_rest(piece) for piece in some)
+    rest = max(_rest(piece, SHAFT.joint_rest) for piece in some)
     trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
     width, per_lag = round(window / period), math.nan
     acceleration = _Acceleration.of(velocity, sd, rest, width, period)

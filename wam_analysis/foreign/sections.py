@@ -5,7 +5,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, Section, rest_words, shown, times
+from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.stick_slip import stick_section
+from wam_analysis.findings.timing import timing_section
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -13,16 +16,12 @@ from wam_analysis.foreign.mechanics import (
     FILTER,
     WEIGHT,
     friction,
-    hidden_motion,
     is_sure,
     rests,
-    sticking,
     velocity_factor,
 )  # fmt: skip
-from wam_analysis.foreign.sources import Source, Treated, Treatment, alternates, clocks_of, sources
-from wam_analysis.foreign.topic_map import TopicMap
-from wam_analysis.measures.loop_timing import stamp_timing
-from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of
+from wam_analysis.thresholds import CYCLE
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
@@ -35,64 +34,21 @@ ALSO = {
 }
 
 
-def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
+def foreign_sections(recording: AnalysedRun) -> tuple[Section, ...]:
     """Sections in the order of those of a bag of this stack."""
-    found = sources(bag, given)
-    mixed = [one for one in found if not one.is_command and alternates(one)]
-    found = [one for one in found if one.topic not in {other.topic for other in mixed}]
-    states = [one for one in found if not one.is_command]
-    commands = [one for one in found if one.is_command]
     return (
-        _happened(bag, found, mixed, given),
-        _forces(states, commands),
-        _cycles(states, commands),
-        _stick_slip(states, commands),
-        _friction(states),
-        _spectrum(states),
-        _timing(found),
+        _happened(recording),
+        _forces(recording),
+        _cycles(recording),
+        stick_section(recording),
+        _friction(recording.states),
+        _spectrum(recording.states),
+        timing_section(recording),
     )
 
 
-def _command_of(source: Source, commands: Sequence[Source], states: Sequence[Source]) -> Source | None:
-    """The command of a joint by its name, of a wrench in its frame or with none; of several that in the same namespace.
-
-    Of two robots whose topics differ in one part of the name, as /left/joint_states and /right/joint_states, neither
-    has the command of the other.
-    """
-    own = [
-        one
-        for one in commands
-        if one.name == source.name
-        and (source.is_joint or _share_frame(source, one))
-        and not any(_is_of(one, other, source) for other in states if other.name == source.name)
-    ]
-    return max(own, key=lambda one: _shared(_path(one), _path(source)), default=None)
-
-
-def _path(source: Source) -> list[str]:
-    return source.topic.strip("/").split("/")
-
-
-def _shared(one: Sequence[str], other: Sequence[str]) -> int:
-    """How many parts two names have in common from the beginning."""
-    apart = (k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b)
-    return next(apart, min(len(one), len(other)))
-
-
-def _is_of(command: Source, one: Source, other: Source) -> bool:
-    """Whether the topic of a command has that part of the name of the first topic by which the second differs."""
-    mine, theirs = _path(one), _path(other)
-    apart = [k for k, (a, b) in enumerate(zip(mine, theirs, strict=False)) if a != b]
-    if len(mine) != len(theirs) or len(apart) != 1 or apart[0] == len(mine) - 1:
-        return False
-    return _path(command)[apart[0] : apart[0] + 1] == [mine[apart[0]]]
-
-
-def _share_frame(one: Source, other: Source) -> bool:
-    return one.frame == other.frame or not one.frame or not other.frame
-
-
-def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
+def _happened(recording: AnalysedRun) -> Section:
+    bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     what = (
         "Analysed as that of another robot, as the options request."
         if given.is_given
@@ -217,11 +173,12 @@ def _unread(bag: Bag) -> list[str]:
 # forces
 
 
-def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
+def _forces(recording: AnalysedRun) -> Section:
+    states, commands = recording.states, recording.commands
     steps: list[ForceStep] = []
     sentences, findings, doubts, followed = [], [], [], set()
     for one in (one for one in states if not one.is_joint):
-        if (command := _command_of(one, commands, states)) is not None:
+        if (command := recording.command_of(one)) is not None:
             steps += force_steps(one, command)
             followed.add(command.topic)
             continue
@@ -229,7 +186,7 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
             f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
             f"{other.frame}."
             for other in commands
-            if not other.is_joint and not _share_frame(one, other)
+            if not other.is_joint and not one.shares_frame(other)
         ]
     doubts += [text for one in commands if one.topic in followed and (text := _arrival(one))]
     for step in steps:
@@ -276,8 +233,8 @@ def _settled(seconds: float) -> str:
 # cycles and spectrum
 
 
-def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
-    found = [cycle for one in states for cycle in cycles(one, _command_of(one, commands, states))]
+def _cycles(recording: AnalysedRun) -> Section:
+    found = [cycle for one in recording.states for cycle in cycles(one, recording.command_of(one))]
     sentences, findings, verdict = [], [], []
     taken: set[str] = set()
     for one in found:
@@ -339,32 +296,6 @@ def _spectrum(states: Sequence[Source]) -> Section:
 # mechanics
 
 
-def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section:
-    sentences, findings, verdict = [], [], []
-    for one in states:
-        command = _command_of(one, commands, states)
-        # not a position that is sent once and held
-        is_speed = command is not None and len(command.time) >= SHAFT.fewest_samples
-        found = sticking(one, command if is_speed else None) if one.is_joint else None
-        if found is None:
-            continue
-        if not found.slips and (distance := hidden_motion(one)):
-            far = shown(distance, one.units["position"])
-            sentences.append(f"{one.label}: moved by {far}, more slowly than the noise of its velocity.")
-            continue
-        findings += [
-            Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
-            Finding(f"{one.label}: slips", "", float(found.slips), note=f"{found.reversals} reverse the direction"),
-        ]
-        sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
-        if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
-            sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
-            verdict.append(f"{sentence}.")
-        sentences.append(f"{sentence}.")
-    stated = tuple(sentences) or ("No velocity was recorded.",)
-    return Section("stick_slip", "Stick and slip", stated, tuple(findings), (), tuple(verdict))
-
-
 def _friction(states: Sequence[Source]) -> Section:
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
@@ -424,37 +355,3 @@ def _friction(states: Sequence[Source]) -> Section:
         return Section("friction", "Friction", every, tuple(findings), (), tuple(brief), tuple(wrong))
     why = "The friction of the joints cannot be identified: no recorded effort determines a dry or viscous friction."
     return Section("friction", "Friction", (why, *doubts, *wrong), (), (), (), tuple(wrong))
-
-
-# timing
-
-
-def _timing(found: Sequence[Source]) -> Section:
-    clocks: dict[tuple[str, bytes], list[Source]] = {}
-    for one in found:
-        if len(one.time) < SHAFT.fewest_samples:
-            continue
-        clocks.setdefault((one.topic, one.sent.tobytes()), []).append(one)
-    sentences, findings, verdict = [], [], []
-    topics = [topic for topic, _ in clocks]
-    frames = [those[0].frame for those in clocks.values()]
-    for (topic, _), those in clocks.items():
-        frame = those[0].frame
-        name = topic
-        if topics.count(topic) > 1:
-            others = [one for one, of in zip(frames, topics, strict=True) if of != topic]
-            name += f" ({frame})" if frame and frame not in others else ""
-            name += f" of {', '.join(one.name for one in those)}" if those[0].is_joint else ""
-        timing = stamp_timing((those[0].sent * 1e9).round().astype("int64"), (those[0].received * 1e9).astype("int64"))
-        findings += [
-            Finding(f"{name}: period", "ms", 1e3 * timing.period),
-            Finding(f"{name}: missed periods", "", float(timing.missed)),
-            Finding(f"{name}: longest gap", "s", timing.longest_gap),
-            Finding(f"{name}: reception jitter", "ms", 1e3 * timing.jitter, note="standard deviation"),
-        ]
-        if timing.missed:
-            gap = shown(timing.longest_gap, "s")
-            sentences.append(f"{name}: {timing.missed} periods without a message, the longest gap {gap}.")
-            verdict.append(sentences[-1])
-    stated = tuple(sentences) or ("Every period has its message." if findings else "No stamped topic was recorded.",)
-    return Section("timing", "Timing", stated, tuple(findings), (), (), tuple(verdict))

@@ -1,6 +1,7 @@
 """One joint or one wrench of one sender and frame, and what was done to its raw values."""
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -101,6 +102,10 @@ class Source(NamedTuple):
     def is_away(self, time: Numbers) -> Mask:
         """Whether its sender was in another frame at some times, so that its values are not known."""
         return _last(self.away, time) > _last(self.time, time)
+
+    def shares_frame(self, other: "Source") -> bool:
+        """Whether both may be in one frame: they name the same one, or one of them names none."""
+        return self.frame == other.frame or not self.frame or not other.frame
 
     def leaves(self, begin: float) -> float:
         """When its sender goes over to another frame after an instant, s; infinite if it does not."""
@@ -350,6 +355,41 @@ def _labelled(found: list[Source]) -> list[Source]:
             label += f" ({one.frame or 'no frame'})"
         result.append(one._replace(label=label))
     return result
+
+
+def command_of(source: Source, commands: Sequence[Source], states: Sequence[Source]) -> Source | None:
+    """The command of a joint by its name, of a wrench in its frame or with none; of several that in the same namespace.
+
+    Of two robots whose topics differ in one part of the name, as /left/joint_states and /right/joint_states, neither
+    has the command of the other.
+    """
+    own = [
+        one
+        for one in commands
+        if one.name == source.name
+        and (source.is_joint or source.shares_frame(one))
+        and not any(_is_of(one, other, source) for other in states if other.name == source.name)
+    ]
+    return max(own, key=lambda one: _shared(_path(one), _path(source)), default=None)
+
+
+def _path(source: Source) -> list[str]:
+    return source.topic.strip("/").split("/")
+
+
+def _shared(one: Sequence[str], other: Sequence[str]) -> int:
+    """How many parts two names have in common from the beginning."""
+    apart = (k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b)
+    return next(apart, min(len(one), len(other)))
+
+
+def _is_of(command: Source, one: Source, other: Source) -> bool:
+    """Whether the topic of a command has that part of the name of the first topic by which the second differs."""
+    mine, theirs = _path(one), _path(other)
+    apart = [k for k, (a, b) in enumerate(zip(mine, theirs, strict=False)) if a != b]
+    if len(mine) != len(theirs) or len(apart) != 1 or apart[0] == len(mine) - 1:
+        return False
+    return _path(command)[apart[0] : apart[0] + 1] == [mine[apart[0]]]
 
 
 def pieces(source: Source, *quantities: str) -> list[Piece]:
