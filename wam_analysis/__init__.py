@@ -7,13 +7,12 @@ foreign             recordings of other robots: any bag with joints, wrenches or
 identification      from a recording of free motion to the controllers' model, behind `wam identify`
 demo_traces         forces and contacts of a run on one time base
 held_messages       for how long a recorded message is held, and the gaps of a topic
+holds               the constant forces that were commanded
 command_gaps        when a command was not recorded, so that it is not known
 contact_list        the contacts one by one, each estimated one compared with the true one
-contact_comparison  the true contacts one by one, each with what was estimated of it
 unplanned_contact   contacts while no force is commanded that are harder than allowed
 task_forces         forces that tasks command, and what was measured of each
 demo_summary        the demonstration in numbers
-press_positions     the force of a press at the configured, the estimated and the true position
 demo_report         its report, as text
 demo_figure         its picture
 drawing             colours and sizes that all pictures share

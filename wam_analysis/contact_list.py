@@ -178,10 +178,11 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
 
 
 def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[MissedContact, ...]:
-    """The true contacts, by link, during most of which none was estimated, as far as both were recorded."""
+    """The true contacts, by link and step, during most of which none was estimated, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
-    for begin, end in contacts_by_link(traces.stamp, true):
+    bounds = [step.begin for step in steps]
+    for begin, end in cut_at(traces.stamp, contacts_by_link(traces.stamp, true), bounds):
         is_missed = float(np.mean(estimated.acts[begin:end])) < TOUCH.lasting
         if np.all(estimated.is_known[begin:end]) and is_missed:
             acting = begin + np.flatnonzero(true.acts[begin:end])

@@ -1,17 +1,18 @@
 """The analysis of any recording, as `wam analyse` prints it.
 
 analysis               reads a bag and makes all sections
-analysed_run           a bag prepared for analysis, with the forces that were held
+analysed_run           a bag prepared for analysis: its sources, run, forces and predictions
 finding                one number with its prediction; a section
 held_force             each commanded force: measures and predictions
-steps                  section about the steps of a scenario, in answers and numbers
+steps                  section about the steps of a scenario, in answers
+stick_slip             section about rest and motion of motors and joints
 force                  sections about force and stability
 swinging               cycles of motors and joints where no force was recorded
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press
 transmission_signals   motors, cables and joints on one time base
-motion                 sections about stick and slip, friction and ripple
+motion                 sections about friction and ripple
 power                  section about efficiency and backdrivability
 frequency              section about the velocity loops
 timing                 section about the loop, and provenance

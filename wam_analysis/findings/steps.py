@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
-from wam_analysis.contact_list import NO_LINK, ListedContact
+from wam_analysis.contact_list import NO_LINK, ListedContact, MissedContact
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Section
@@ -101,8 +101,7 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Of each contact, also of those that were missed; one that is estimated where none is has its own answer."""
-    missed = [contact for contact in summary.missed if contact.end - contact.begin >= 1e-9 * TOUCH.bounce]
-    if missed:
+    if _missed(summary):
         return VerdictAnswer("right link", VerdictResult.NO, "missed")
     wrong = [float(one.true != one.estimate.link) if one.true else math.nan for one in _compared(summary)]
     return _answer("right link", wrong, 0.0, "another link")
@@ -112,10 +111,16 @@ def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     found = _compared(summary)
     errors = [100.0 * abs(one.position_error) for one in found if not one.estimate.is_lower_bound]
+    errors += [math.nan] * len(_missed(summary))
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
-    unknown = len(found) - len(errors)
+    unknown = sum(one.estimate.is_lower_bound for one in found)
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
     return answer._replace(remark=f"unknown for {unknown} of {len(found)} contacts" * bool(unknown))
+
+
+def _missed(summary: DemoSummary) -> list[MissedContact]:
+    """Those that lasted."""
+    return [contact for contact in summary.missed if contact.end - contact.begin >= 1e-9 * TOUCH.bounce]
 
 
 def _compared(summary: DemoSummary) -> list[ListedContact]:
