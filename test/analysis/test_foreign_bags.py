@@ -14,7 +14,6 @@ from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import Finding
 from wam_analysis.findings.page import page
 from wam_analysis.foreign import reading
-from wam_analysis.foreign.sources import at_times
 from wam_analysis.foreign.topic_map import TopicMap, topic_map
 from wam_bag.bag import BagError
 
@@ -343,14 +342,6 @@ def test_stamps_that_jitter_cut_no_tops_off_a_fast_cycle(tmp_path: Path) -> None
     assert measured["j, 11.3 Hz: amplitude"] == pytest.approx(0.005, rel=CLOSE)
 
 
-def test_values_between_samples_do_not_overshoot_a_step() -> None:
-    time = np.cumsum(chance(63).uniform(0.5, 1.5, 40))
-    value = (time > 20.0).astype(np.float64)
-    between = at_times(np.linspace(time[0], time[-1], 1000), time, value)
-    assert between.min() == 0.0
-    assert between.max() == 1.0
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 2e-3, 5e-3])
 def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: float, tmp_path: Path) -> None:
@@ -467,14 +458,6 @@ def test_a_clock_that_is_set_makes_no_gap(jump: float, tmp_path: Path) -> None:
     assert "periods without a message" not in told
 
 
-def test_a_message_that_overtakes_another_resets_no_clock(tmp_path: Path) -> None:
-    time = np.arange(0.0, 20.0, 0.01)
-    sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
-    late = [one._replace(received=one.received + 0.035 * (i % 500 == 250)) for i, one in enumerate(sent)]
-    found = quiet(by_rosbags(tmp_path / "bag", late))
-    assert "times of reception" not in " ".join(section(found, "happened"))
-
-
 OTHER_CLOCKS: dict[str, Callable[[float], float]] = {
     "behind": lambda t: t - 40.0,
     "since the start of the computer": lambda t: t - 1.7e9 + 5123.0,
@@ -501,16 +484,6 @@ def test_a_command_by_another_clock_is_that_of_the_motion(clock: str, whose: str
     told = [line for line in section(found, "happened") if "clock" in line]
     assert len(told) == 1
     assert (topics[whose] if clock == "never set" else "/joint_") in told[0]
-
-
-def test_a_command_that_was_sent_before_and_held_belongs_to_no_other_clock(tmp_path: Path) -> None:
-    """Sent 0.5 s before the recording begins, to which the recorder got it late."""
-    time = np.arange(0.0, 20.0, 0.01)
-    sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
-    sent += joints("/joint_command", [-0.5], ["a", "b"], position=np.zeros((1, 2)), delay=0.6)
-    found = quiet(by_rosbags(tmp_path / "bag", sent), "/joint_command")
-    assert "clock" not in " ".join(section(found, "happened"))
-    assert "it was not commanded" in " ".join(section(found, "stability"))
 
 
 def test_receptions_of_a_converted_bag_shift_no_clock(tmp_path: Path) -> None:
@@ -540,32 +513,6 @@ def test_a_slow_recording_of_a_motion_back_and_forth_shows_no_rest(
         tmp_path / "bag", joints("/s", time, ["a", "b"], position=cycling(time, frequency, 0.05, 2, 1e-4))
     )
     assert section(quiet(bag), "stick_slip") == ("a: moved all the time.", "b: never moved.")
-
-
-def test_a_rest_before_and_after_a_motion_back_and_forth_is_one(tmp_path: Path) -> None:
-    time = np.arange(0.0, 100.0, 0.02)
-    position = cycling(time, 1.7, 0.02, 1) * ((time > 40.0) & (time < 60.0))[:, None]
-    bag = by_mcap_ros2(tmp_path / "bag", joints("/s", time, ["a"], position=position))
-    assert section(quiet(bag), "stick_slip") == ("a: at rest for 80 % of the time, moved once.",)
-
-
-def test_a_motion_within_the_steps_of_an_encoder_and_degrees_are_said(tmp_path: Path) -> None:
-    time = np.arange(0.0, 30.0, 0.01)
-    position = np.column_stack([np.round(300.0 * np.sin(0.2 * time)) * 1e-3, np.full(len(time), -60.0)])
-    found = quiet(by_rosbags(tmp_path / "bag", joints("/s", time, ["coarse", "still"], position=position)))
-    assert section(found, "stick_slip")[0] == "coarse: moved by 0.6 rad, more slowly than the noise of its velocity."
-    assert "give --unit position=deg" in " ".join(section(found, "happened"))
-
-
-def test_a_command_in_another_frame_is_named(tmp_path: Path) -> None:
-    time = np.arange(0.0, 6.0, 0.004)
-    force = np.zeros((len(time), 3))
-    force[time > 3.0, 2] = 10.0
-    sent = wrenches("/ft/wrench", time, force, "tool0") + wrenches("/force_command", time, force, "base")
-    found = quiet(by_rosbags(tmp_path / "bag", sent), "/force_command")
-    assert section(found, "force") == (
-        "/ft/wrench, in the frame tool0, is not compared with the command /force_command, in the frame base.",
-    )
 
 
 @pytest.mark.parametrize("frames", [("tool", "tool"), ("base", "tool"), ("", "tool")])
@@ -674,43 +621,7 @@ def test_a_force_of_which_an_axis_is_no_number_is_evaluated_by_the_others(
     assert (left_out in section(found, "happened")) == (share == 2)
 
 
-def test_whether_a_cycle_was_commanded_is_not_known_while_the_command_is_in_another_frame(tmp_path: Path) -> None:
-    sent = following(12.0, 99.0, cycle=1.0)
-    (cycle,) = section(quiet(by_rosbags(tmp_path / "bag", sent), "/ft/command"), "stability")
-    assert cycle.endswith("no command of it is known, --command names one.")
-
-
-def test_commands_of_two_senders_in_two_frames_are_divided(tmp_path: Path) -> None:
-    """Both publish all the time on one topic: neither goes over to the frame of the other."""
-    time = np.arange(0.0, 12.0, 0.005)
-    left, right = np.zeros((2, len(time), 3))
-    left[time >= 4.0, 2], right[time >= 6.0, 2] = 10.0, 7.0
-    sent = [
-        one
-        for frame, force, shift in (("left", left, 0.0), ("right", right, 0.002))
-        for topic in ("/ft/command", "/ft/wrench")
-        for one in wrenches(topic, time + shift, force, frame)
-    ]
-    found = quiet(by_rosbags(tmp_path / "bag", sent), "/ft/command")
-    assert section(found, "verdict")[2].startswith("Shows: 2 force steps; the largest steady error is 0 N of ")
-
-
 # ways in
-
-
-@pytest.mark.slow
-def test_a_mapped_mcap_of_json_is_read(tmp_path: Path) -> None:
-    time = times(12.0)
-    position = 1e3 * (at_rest(time, ["x", "y"], 33) + np.column_stack([sine(time, 3.1, 0.02), np.zeros(len(time))]))
-    sent = joints("/state", time, ["x", "y"], position=position)
-    given = topic_map(["/state"], [], [], ["name=state.name", "position=state.position", "stamp=time"], ["position=mm"])
-    _, numbers = found((by_json(tmp_path / "bag", sent), given))
-    assert numbers["x: frequency"] == pytest.approx(3.1, rel=CLOSE)
-    assert numbers["x: cycle, peak to peak"] == pytest.approx(0.02, rel=CLOSE)
-    assert numbers["/state: period"] == pytest.approx(4.0, rel=1e-3)
-    wrong = topic_map(["/state"], [], [], ["position=state.angle"], [])
-    with pytest.raises(ValueError, match=r"no field 'state.angle'; its messages have time, state"):
-        found((tmp_path / "bag.mcap", wrong))
 
 
 @pytest.mark.slow
@@ -850,17 +761,6 @@ def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(
     assert said in section(analysis, "friction")[1]
 
 
-def test_viscous_friction_of_one_frequency_is_said_to_be_that_of_a_delay_too(tmp_path: Path) -> None:
-    """By hand: the inertia's part -J w^2 q of an effort that is dt later holds J w^2 dt of viscous friction."""
-    time, w = times(20.0), 2.0 * math.pi * 2.0
-    q, v = 0.3 * np.sin(w * time), 0.3 * w * np.cos(w * time)
-    effort = 1.0 * v - 0.5 * w**2 * q + 0.002 * chance(83).normal(size=len(time))
-    states = {"position": q, "velocity": v, "effort": effort}
-    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
-    analysis, _ = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
-    assert f"1 ms of delay changes the viscous friction by {0.5 * w**2 * 1e-3:.2g}" in section(analysis, "friction")[1]
-
-
 @pytest.mark.slow
 def test_friction_of_a_slow_motion_by_hand_is_within_its_errors(tmp_path: Path) -> None:
     time = times(40.0)
@@ -904,16 +804,6 @@ def test_corners_of_a_cycle_are_not_cut_off(shape: str, jitter: float, tmp_path:
     wave = 2.0 / np.pi * np.arcsin(np.sin(phase)) if shape == "triangle" else np.sign(np.sin(phase))
     found = cycle_of(of_positions(tmp_path / "bag", time, 0.005 * wave + at_rest(time, ["j"], 92)[:, 0]), 7.87)
     assert found.measured == pytest.approx(0.01, rel=CLOSE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("frequency", "at"), [(2.7, 9.68), (3.83, 7.53), (6.1, 12.0)])
-def test_a_cycle_is_found_on_both_sides_of_a_jump(frequency: float, at: float, tmp_path: Path) -> None:
-    time = times(20.0, 200.0)
-    position = sine(time, frequency, 0.01) + 0.03 * (time > at) + at_rest(time, ["j"], 93)[:, 0]
-    sentences = section(of_positions(tmp_path / "bag", time, position), "stability")
-    sizes = [float(size) for one in sentences for size in re.findall(r"Hz, ([0-9.]+) rad peak", one)]
-    assert sizes == pytest.approx([0.01, 0.01], rel=CLOSE)
 
 
 @pytest.mark.slow

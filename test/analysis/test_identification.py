@@ -38,8 +38,7 @@ from wam_description.world import NO_SPRINGS, World
 from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_sim.recording import recorded_run
-from wam_studies.identification.plants import plant as drawn
-from wam_studies.identification.trial import IdentificationTrial, play, run_trial
+from wam_studies.identification.trial import IdentificationTrial, run_trial
 
 ROOT = Path(__file__).parents[2]
 SHARED = CONFIGURATION.shared
@@ -151,14 +150,6 @@ def test_stated_errors_are_the_errors_from_both_sides() -> None:
 
 
 @pytest.mark.slow
-def test_white_residuals_would_state_far_too_small_errors() -> None:
-    planted = Planted(25.0, 1, noise=0.002)
-    found = planted.identify()
-    _, sd = planted.coulomb_errors(found)
-    assert np.median(sd) > 3.0 * np.median(found.alone[found.unknowns.places("motors.coulomb_positive")])
-
-
-@pytest.mark.slow
 def test_what_the_motion_does_not_show_stays_as_it_was_and_is_reported_so(
     clean: tuple[Planted, Identification],
 ) -> None:
@@ -192,15 +183,6 @@ def test_the_regressor_of_the_links_is_their_inverse_dynamics() -> None:
     body = RigidBody(WAM)
     torque = body.inverse_dynamics_regressor(q, qd, qdd) @ np.concatenate(ten)
     assert torque == pytest.approx(body.inverse_dynamics(q, qd, qdd))
-
-
-def test_slopes_of_the_ten_parameters_are_those_of_finite_differences() -> None:
-    link = np.array([2.0, 0.1, -0.2, 0.3, 0.01, 0.02, 0.03])
-    _, slope = about_origin(link)
-    for i in range(7):
-        step = np.eye(7)[i] * 1e-6
-        difference = (about_origin(link + step)[0] - about_origin(link - step)[0]) / 2e-6
-        assert slope[:, i] == pytest.approx(difference, abs=1e-7)
 
 
 def overlaid(found: Identification) -> Configuration:
@@ -353,17 +335,6 @@ def test_too_little_motion_is_refused_and_a_slow_one_is_warned_about() -> None:
     slow = Planted(15.0, 1, speed=0.1)
     text = report(SHARED, slow.identify(), "bag")
     assert "warning: motor1 turns freely for" in text
-
-
-def test_states_that_are_missing_or_braked_are_not_used() -> None:
-    planted = Planted(20.0, 1)
-    torque = planted.torque.copy()
-    torque[:5000] = 0.0  # brakes
-    kept = np.ones(len(planted.time), bool)
-    kept[9000:9500] = False
-    samples = motion(evenly(planted.time[kept], planted.theta[kept], torque[kept]))
-    assert samples.time.min() > 5.0
-    assert not ((samples.time > 8.95) & (samples.time < 9.55)).any()
 
 
 def write_bag(bag: Path, planted: Planted, torques: Array, pushed_after: float = math.inf) -> None:
@@ -544,51 +515,3 @@ def test_torque_constants_that_differ_between_motors_of_the_same_joints_are_foun
     assert np.abs(error / planted.coulomb.ravel() + reported).max() < 0.015
     values = model_values(SHARED, found, "bag")
     assert not any("torque_difference" in name for name in (*values, *values["model.covariance.parameters"]))
-
-
-@pytest.mark.slow
-def test_ripple_that_accelerates_the_rotors_is_in_the_standard_errors_of_their_inertias() -> None:
-    """Motors 2 and 3 are off by about 20 %, mostly upwards, which leaving out parts of the motion does not show."""
-    ratios, apart = [], []
-    for seed in (5407, 5408, 5409):
-        configuration = drawn(CONFIGURATION, "level", seed)
-        found = identify(configuration.shared, play(configuration, seed, 40.0)[0])
-        at = found.unknowns.places("motors.inertia")[1:3]
-        off = found.values[at] - np.array(configuration.shared.arm.motors.inertia)[1:3]
-        alone = found._replace(uncertainty=found.uncertainty._replace(law=np.zeros_like(found.covariance)))
-        ratios.append(off / found.sd[at])
-        apart.append(off / alone.sd[at])
-    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.5
-    assert np.sqrt(np.mean(np.square(apart))) > 2.0
-
-
-@pytest.mark.slow
-def test_load_friction_of_a_joint_that_differs_by_direction_is_in_the_standard_errors_of_its_motors() -> None:
-    """The regression has it alike in both: what it takes for friction of motors 2 and 3 instead is stated."""
-    scores, without = [], []
-    for seed in range(4):
-        lean = np.array([0.0, 0.0075, -0.0075, 0.0])
-        planted = Planted(25.0, seed, joint_load=np.array([0.05 + lean, 0.05 - lean]) * [0.0, 1.0, 1.0, 0.0])
-        found = planted.identify()
-        at = [found.unknowns.names.index(f"motors.coulomb_{way}.motor{j}") for way in WAYS for j in (2, 3)]
-        error = found.values[at] - planted.coulomb[:, 1:3].ravel()
-        blind = found.uncertainty._replace(law=np.diag((0.003 * found.values) ** 2))
-        scores += (error / found.sd[at]).tolist()
-        without += (error / np.sqrt(blind.variances(np.eye(len(found.values))[at]))).tolist()
-    rms, blind_rms = (math.sqrt(np.mean(np.square(each))) for each in (scores, without))
-    assert 0.5 < rms < 1.5
-    assert blind_rms > 1.6
-
-
-@pytest.mark.slow
-def test_friction_of_a_joint_that_its_motor_has_too_widens_the_standard_error_by_its_load_friction(
-    clean: tuple[Planted, Identification],
-) -> None:
-    """The cables transmit it, so the load is larger or smaller by it; motors 2 and 3 have no joint of their own."""
-    _, found = clean
-    for way in WAYS:
-        load = found.values[found.unknowns.places(f"motors.load_{way}")]
-        sd = found.sd[found.unknowns.places(f"motors.coulomb_{way}")]
-        friction = np.array(WAM.joints.dynamic_friction) / np.abs(np.diag(TransmissionMap.of(WAM).motor_from_joint))
-        for motor in (0, 3):
-            assert sd[motor] >= load[motor] * friction[motor] / math.sqrt(3.0) > 1e-4

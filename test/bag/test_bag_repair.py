@@ -104,14 +104,6 @@ def test_a_killed_recording_is_whole_again_up_to_the_last_chunk(tmp_path: Path, 
     assert (len(lines) > 1) == (split.size > 0)
 
 
-def test_repairing_twice_changes_nothing(tmp_path: Path) -> None:
-    killed(tmp_path / "bag", samples_of(50))
-    repair(tmp_path / "bag")
-    before = {path: path.read_bytes() for path in (tmp_path / "bag").iterdir()}
-    assert all(result.was_whole for result in repair(tmp_path / "bag"))
-    assert {path: path.read_bytes() for path in (tmp_path / "bag").iterdir()} == before
-
-
 @pytest.mark.slow
 def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
     samples = samples_of(4000)
@@ -245,22 +237,6 @@ def test_the_losses_of_two_repairs_stand_side_by_side(tmp_path: Path) -> None:
     assert lost.gone == 20
 
 
-def test_without_indexes_the_hole_lies_between_its_neighbours(tmp_path: Path) -> None:
-    """Nothing counts what was in the chunk, and that is said."""
-    samples = samples_of(100)
-    file = write(tmp_path / "bag.mcap", samples, Way(chunk_size=2000, indexed=False, summary=False))
-    with file.open("rb") as stream:
-        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
-    data = bytearray(file.read_bytes())
-    data[data.index(chunks[3].data) + 30] ^= 255
-    file.write_bytes(data)
-    (result,) = repair(file)
-    assert result.losses is not None
-    (hole,) = result.losses.holes
-    assert (hole.begin, hole.end) == (chunks[2].message_end_time, chunks[4].message_start_time)
-    assert "it is not known how many messages were lost" in described(contents(file))[0]
-
-
 def test_what_the_recorder_counted_is_compared_with_what_is_there(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", samples_of(100))
     bag.metadata(
@@ -286,12 +262,6 @@ def test_one_file_of_several_and_a_cut_are_not_held_against_the_counts_of_the_wh
     cut = {**found.metadata, "cut": {"begin_ns": "0"}}
     assert losses(found.path, cut, found.attachments, {"/jointstate": 1}).gone == 0
     assert losses(found.path, found.metadata, found.attachments, {"/jointstate": 1}).gone == 99
-
-
-@pytest.mark.parametrize("text", ["", "3", "{}", '{"holes": [1]}', '{"holes": [{"begin": 1}], "messages": {}}'])
-def test_a_damaged_record_of_a_repair_still_says_that_there_was_one(tmp_path: Path, text: str) -> None:
-    lost = losses(tmp_path, {"repaired": {"a.mcap": text}}, (), {})
-    assert lost.sentences(0) == ["a.mcap was repaired; the record of its losses cannot be read."]
 
 
 def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None:
@@ -332,17 +302,6 @@ def test_info_says_what_is_in_a_bag(tmp_path: Path) -> None:
     joints = next(line for line in lines if line.startswith("/jointstate "))
     assert joints.split()[1] == "50"
     assert joints.endswith(JOINTS)
-
-
-@pytest.mark.parametrize("way", ["zstd", "unchunked", "no summary"])
-def test_info_counts_what_the_file_does_not_count(tmp_path: Path, way: str) -> None:
-    samples = samples_of(60)
-    found = contents(write(tmp_path / "bag.mcap", samples, WAYS[way]))
-    assert {topic: counted.messages for topic, counted in found.topics.items()} == {
-        "/jointstate": 30,
-        "/wrenchstamped": 30,
-    }
-    assert (found.first, found.last) == (0, 590)
 
 
 FILL = """

@@ -161,7 +161,7 @@ def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[Demo
     assert one.commanded == other.commanded == pytest.approx(8.0)
     for value in (one.measured, one.true, one.estimated, other.measured, other.true, other.estimated):
         assert value == pytest.approx(8.0, rel=0.15)
-    assert {"press across by a task: bias of the true force"} <= {
+    assert {"press across by a task: ripple of the true force"} <= {
         finding.name for section in analysis.sections for finding in section.findings
     }
 

@@ -103,8 +103,11 @@ def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Of each contact, also of those that were missed; one that is estimated where none is has its own answer."""
     if _missed(summary):
         return VerdictAnswer("right link", VerdictResult.NO, "missed")
-    wrong = [float(one.true != one.estimate.link) if one.true else math.nan for one in _compared(summary)]
-    return _answer("right link", wrong, 0.0, "another link")
+    found = _compared(summary)
+    wrong = [float(one.true != one.estimate.link) if one.true else math.nan for one in found]
+    answer = _answer("right link", wrong, 0.0, "another link")
+    least = f"{100.0 * min((one.estimate.lasting for one in found), default=0.0):.0f} %"
+    return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 
 def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
