@@ -246,7 +246,7 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
         first = int(summary.traces.stamp[0]) if len(summary.traces.stamp) else zero
         begin = max(first - zero, 0) / 1e9  # a recording may begin later than its scenario
         axes.set_xlim(begin, max((summary.steps[-1].end - zero) / 1e9, begin + 1e-3))
-    touched = {contact.step for contact in (*summary.contacts, *summary.missed)}
+    touched = {one.step for one in summary.contacts} | {one.step for one in summary.missed}
     busy = {step.begin: "#e7f0f7" for step in summary.steps if step.name in touched}
     pressed = [step for step in summary.steps if any(step.begin < one.end <= step.end for one in summary.holds)]
     busy |= {step.begin: "#faeee2" for step in pressed}

@@ -154,7 +154,6 @@ class Decoder:
 
     def __init__(self, kind: str, definitions: Definitions) -> None:
         self.kind, self.definitions = kind, definitions
-        self._classes: dict[str, Any] = {}
         self._steps: dict[tuple[str, str], Step] = {}
 
     def __call__(self, data: bytes) -> Any:
@@ -175,7 +174,8 @@ class Decoder:
 
     def _new_struct(self, kind: str, order: str) -> Step:
         fields = self.definitions[kind]
-        make = self.maker(kind)
+        names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
+        made: Any = namedtuple(kind.rpartition("/")[2], names)  # type: ignore[misc]
         steps = [self._field(inner, length, order) for _, inner, length in fields]
 
         def decode(data: bytes, position: int) -> tuple[Any, int]:
@@ -185,18 +185,9 @@ class Decoder:
                 values.append(value)
             if not steps and position > len(data):
                 raise Damage("a message ends early")
-            return make(values), position + (not steps)
+            return made._make(values), position + (not steps)
 
         return decode
-
-    def maker(self, kind: str) -> Callable[[Any], Any]:
-        """A function that makes an object of a type from the values of its fields."""
-        make: Callable[[Any], Any] | None = self._classes.get(kind)
-        if make is None:
-            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in self.definitions[kind]]
-            kinds: Any = namedtuple(kind.rpartition("/")[2], names)  # type: ignore[misc]
-            make = self._classes[kind] = kinds._make
-        return make
 
     def _field(self, kind: str, length: int | None, order: str) -> Step:
         if length is not None and kind in PRIMITIVES:

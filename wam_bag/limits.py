@@ -14,8 +14,6 @@ class ReadingLimits:
     yaml_length: int = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
     counts_kept: int = 256  # counts of a layout that are kept; a longer message is walked through each time
     layouts: int = 64  # that are kept of a topic; further ones are found message by message
-    group: int = 32  # objects that are worth making together
-    trials: int = 4  # layouts tried among messages of one length before these are decoded one by one
     digits: int = 20  # digits of a count
     named: int = 3  # topics that a sentence lists
 

@@ -1,6 +1,5 @@
-"""Messages of one layout decoded together: their numbers as columns, and many objects made at once."""
+"""Messages of one layout decoded together: their numbers as columns; others as objects."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple, overload
 
@@ -12,7 +11,6 @@ from wam_bag.errors import BagError, Damage
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import Bytes
 from wam_bag.message_search import Offsets, at
-from wam_bag.message_text import PRIMITIVES
 
 Index = NDArray[np.intp]
 Words = NDArray[np.uint64]
@@ -54,28 +52,6 @@ class Group(NamedTuple):
     def vector(self, path: str) -> Numbers:
         """x, y and z at a path, (m, 3)."""
         return np.hstack([self.numbers(f"{path}.{axis}") for axis in "xyz"])
-
-    def objects(self, decoder: Decoder, kind: str, path: str = "") -> list[Any]:
-        """The messages as a `Decoder` makes them, or their parts at a path, of this type."""
-        columns = [
-            self._values(decoder, f"{path}.{name}" if path else name, inner, length)
-            for name, inner, length in decoder.definitions[kind]
-        ]
-        return list(map(decoder.maker(kind), zip(*columns, strict=True) if columns else [()] * len(self.rows)))
-
-    def _values(self, decoder: Decoder, path: str, kind: str, length: int | None) -> list[Any]:
-        if kind == "string":
-            texts = self.layout.texts[path]
-            return [texts[0] if length is None else list(texts) for _ in self.rows]
-        if kind in PRIMITIVES:
-            numbers = self.numbers(path)
-            if length is not None:
-                return list(numbers.copy())
-            return (numbers[:, 0] != 0 if kind == "bool" else numbers[:, 0]).tolist()
-        if length is None:
-            return self.objects(decoder, kind, path)
-        items = [self.objects(decoder, kind, f"{path}[{i}]") for i in range(self.layout.counts[path])]
-        return list(map(list, zip(*items, strict=True))) if items else [[] for _ in self.rows]
 
 
 class Known(NamedTuple):
@@ -165,40 +141,10 @@ class Decoded(Sequence[Any]):
     def __getitem__(self, index: int | slice) -> Any:
         if self._made is None:
             try:
-                self._made = decoded(self._data, self._decoder)
+                self._made = [self._decoder(data) for data in self._data]
             except Damage as error:
                 raise BagError(f"{self._label}: {error}; copy the bag again") from None
         return self._made[index]
-
-
-def decoded(data: list[bytes], decoder: Decoder) -> list[Any]:
-    """Messages as objects: those of one layout together, the others one by one."""
-    made: list[Any] = [None] * len(data)
-    single = set(range(len(data)))
-    for size, number in Counter(map(len, data)).items():
-        if number < READING_LIMITS.group or size < ENCAPSULATION:
-            continue
-        rows = np.array([i for i, item in enumerate(data) if len(item) == size])
-        padded = np.zeros((number, 8 * _words(size)), np.uint8)
-        joined = np.frombuffer(b"".join([data[i] for i in rows]), np.uint8)
-        padded[:, BEFORE : BEFORE + size] = joined.reshape(number, size)
-        words = padded.view(np.uint64)
-        for _ in range(READING_LIMITS.trials):
-            layout = Layout(decoder.kind, decoder.definitions, data[rows[0]])
-            fits = Known.of(layout).fits(words)
-            chosen = slice(None) if fits is None else fits
-            group = Group(rows[chosen], layout, words[chosen])
-            if len(group.rows) < READING_LIMITS.group:
-                break
-            for i, message in zip(group.rows.tolist(), group.objects(decoder, decoder.kind), strict=True):
-                made[i] = message
-            single.difference_update(group.rows.tolist())
-            if fits is None or len(rows) - len(group.rows) < READING_LIMITS.group:
-                break
-            rows, words = rows[~fits], words[~fits]
-    for i in sorted(single):
-        made[i] = decoder(data[i])
-    return made
 
 
 def _words(size: int) -> int:
