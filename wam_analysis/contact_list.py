@@ -191,6 +191,18 @@ def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[Miss
     return tuple(found)
 
 
+def right_links(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[float, ...]:
+    """Part of the time of each true contact, by link and step, in which its link was estimated; NaN if not known."""
+    true, estimated = traces.true, traces.estimated
+    found = []
+    for begin, end in cut_at(traces.stamp, contacts_by_link(traces.stamp, true), [step.begin for step in steps]):
+        rows = begin + np.flatnonzero(true.acts[begin:end] & estimated.is_known[begin:end])
+        if traces.stamp[end - 1] - traces.stamp[begin] >= TOUCH.bounce:
+            same = estimated.acts[rows] & (estimated.frame[rows] == true.frame[rows])
+            found.append(float(np.mean(same)) if len(rows) else NAN)
+    return tuple(found)
+
+
 def contact_rows(stamp: Times, acts: Mask) -> list[tuple[int, int]]:
     """Rows [begin, end) of each contact; bounces do not end it."""
     contacts: list[tuple[int, int]] = []

@@ -14,6 +14,7 @@ from wam_analysis.contact_list import (
     listed_contacts,
     median,
     missed_contacts,
+    right_links,
 )
 from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
 from wam_analysis.holds import Hold, holds_of
@@ -73,6 +74,7 @@ class DemoSummary(NamedTuple):
     holds : the constant forces that were commanded.
     contacts : all that were estimated.
     missed : true contacts that were not.
+    right_links : part of the time of each true contact in which its link was estimated.
     unplanned : contacts without a command of a force, harder than allowed.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
@@ -95,6 +97,7 @@ class DemoSummary(NamedTuple):
     holds: tuple[Hold, ...]
     contacts: tuple[ListedContact, ...]
     missed: tuple[MissedContact, ...]
+    right_links: tuple[float, ...]
     unplanned: UnplannedContacts
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
@@ -165,6 +168,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         holds=holds,
         contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(seen, steps),
+        right_links=right_links(seen, steps),
         unplanned=unplanned_contacts(run, traces, steps, gaps),
         reactions=reactions,
         false_contact=int(np.sum(false)) * traces.period,

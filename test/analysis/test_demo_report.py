@@ -659,7 +659,7 @@ stoppable_report(Path("{bag}"), False, None)
 def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | right link: YES (100 %) | "
+        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
         "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
         f"false detections within 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
     )

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.float64]
 
+JOINTS = ("sim/joint_states", "joint_states")
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
@@ -248,11 +249,11 @@ class Theory(NamedTuple):
     moved: float = math.nan
 
 
-def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None) -> Theory:
-    """What is predicted for a held force, for the recorded arm or another one."""
+def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None, topics: Sequence[str] = JOINTS) -> Theory:
+    """What is predicted for a held force, for the recorded arm or another one, in the pose that some topics have."""
     parameters, hold, cover, position = recording.parameters, one.hold, one.cover, one.position
     arm = arm or parameters.arm
-    q = None if arm is None else _pose(recording, arm, hold)
+    q = None if arm is None else _pose(recording, arm, hold, topics)
     if arm is None or q is None or cover not in arm.covers.names:
         return Theory()
     link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
@@ -277,9 +278,9 @@ def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None) ->
     return Theory(node, predicted, largest, found, moved)
 
 
-def _pose(recording: AnalysedRun, arm: Arm, hold: Hold) -> list[float] | None:
+def _pose(recording: AnalysedRun, arm: Arm, hold: Hold, topics: Sequence[str]) -> list[float] | None:
     """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
-    for topic in ("sim/joint_states", "joint_states", "joint_sensors", "motor_states"):
+    for topic in topics:
         columns = recording.run.joints(topic)
         names = arm.motors.names if topic == "motor_states" else arm.joints.names
         found = None if columns is None else by_names(columns, "position", names)

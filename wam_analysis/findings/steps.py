@@ -100,13 +100,11 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
-    """Of each contact, also of those that were missed; one that is estimated where none is has its own answer."""
+    """Of each true contact; one that is estimated where none is has its own answer."""
     if _missed(summary):
         return VerdictAnswer("right link", VerdictResult.NO, "missed")
-    found = _compared(summary)
-    wrong = [float(one.true != one.estimate.link) if one.true else math.nan for one in found]
-    answer = _answer("right link", wrong, 0.0, "another link")
-    least = f"{100.0 * min((one.estimate.lasting for one in found), default=0.0):.0f} %"
+    answer = _answer("right link", [1.0 - right for right in summary.right_links], 1.0 - TOUCH.lasting, "another link")
+    least = f"{100.0 * min(summary.right_links, default=0.0):.0f} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 

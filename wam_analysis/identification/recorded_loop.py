@@ -9,13 +9,14 @@ import numpy as np
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.guarded import sentence
-from wam_analysis.findings.held_force import Theory, theory_of
+from wam_analysis.findings.held_force import JOINTS, Theory, theory_of
 from wam_analysis.foreign.mechanics import friction, is_sure
 from wam_analysis.foreign.reading import foreign_bag
 from wam_analysis.foreign.sources import Source, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_description.arm import Arm
 
+POSES = (*JOINTS, "joint_sensors", "motor_states")
 QUANTITIES = ("static friction", "dynamic friction", "viscous friction")
 
 
@@ -96,7 +97,7 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     better, names = _with_identified(arm, analysis)
     theory, largest = Theory(), None
     for largest in sorted(analysis.recording.held, key=lambda one: -one.hold.commanded):
-        theory = theory_of(analysis.recording, largest, better)
+        theory = theory_of(analysis.recording, largest, better, POSES)
         if theory.node is not None and np.isfinite(theory.node.contact_stiffness):
             break
     else:
