@@ -15,7 +15,7 @@ MOVING = ("motor_states", "joint_sensors", "joint_states")  # where motion is se
 
 
 class AnalysedRun:
-    """What the analyses take from a bag; everything is evaluated when it is asked for.
+    """What the analyses take from a bag; everything is evaluated where it is used.
 
     Parameters
     ----------
@@ -77,12 +77,14 @@ class AnalysedRun:
     @cached_property
     def held(self) -> tuple[HeldForce, ...]:
         """Each commanded force, and how it was reached and held."""
-        return held_forces(self)
+        return held_forces(self.run, self.summary, self.parameters)
 
     @cached_property
     def theories(self) -> dict[str, Theory]:
         """What is predicted for each of them, by name; nothing where it was refused."""
-        return {one.hold.name: Theory() if one.hold.is_refused else theory_of(self, one) for one in self.held}
+        found = [one for one in self.held if not one.hold.is_refused]
+        nothing = {one.hold.name: Theory() for one in self.held}
+        return nothing | {one.hold.name: theory_of(self.run, self.parameters, one) for one in found}
 
     @property
     def bag(self) -> Bag:

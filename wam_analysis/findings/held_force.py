@@ -1,16 +1,15 @@
 """Each commanded force: how it was reached and held, and what theory predicts for it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import ForceSignal
+from wam_analysis.demo_summary import DemoSummary
+from wam_analysis.demo_traces import ForceSignal, Traces
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.swinging import Swinging, at_the_contact, swinging
@@ -21,16 +20,15 @@ from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import Stability, stability
+from wam_analysis.recorded import PredictionParameters
 from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
+from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from wam_analysis.findings.analysed_run import AnalysedRun
 
 Numbers = NDArray[np.float64]
 
@@ -81,19 +79,18 @@ class HeldForce(NamedTuple):
         return bool(len(self.measured) or len(self.true))
 
 
-def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
+def held_forces(run: RecordedRun, summary: DemoSummary, parameters: PredictionParameters) -> tuple[HeldForce, ...]:
     """Evaluate every hold of a recording; of a force that was not controlled its signals are all there is."""
-    holds = recording.summary.holds
-    return tuple(_refused(_held(recording, hold)) if hold.is_refused else _held(recording, hold) for hold in holds)
+    found = (_held(run, summary.traces, parameters, hold) for hold in summary.holds)
+    return tuple(_refused(one) if one.hold.is_refused else one for one in found)
 
 
 def _refused(held: HeldForce) -> HeldForce:
     return HeldForce(*held[:5], cover=held.cover, position=held.position)
 
 
-def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
-    time, measured = _measured(recording, hold)
-    traces = recording.summary.traces
+def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
+    time, measured = _measured(run, hold)
     rows = traces.during(hold.begin, hold.end) & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
     true, estimated = (traces.along(signal, -1.0)[rows] for signal in (traces.true, traces.estimated))
@@ -103,12 +100,12 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     if not np.any(np.isfinite(true)):
         time_true, true, late_true = np.empty(0), np.empty(0), np.empty(0, bool)
     swings, swings_true = time >= (1.0 - CYCLE.late_part) * duration, time_true >= (1.0 - CYCLE.late_part) * duration
-    cover, position = _touched(recording, hold)
-    touched = _touch_down(recording, hold)
+    cover, position = _touched(traces, parameters, hold)
+    touched = _touch_down(traces, parameters, hold)
     response = _response(hold, time, measured, HOLD.steady * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
-    timing = recording.parameters.timing
+    timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
     return HeldForce(
         hold=hold,
@@ -118,7 +115,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         true=true,
         response=response,
         touched=touched,
-        before=_before(recording, hold, measured),
+        before=_before(traces, hold, measured),
         measured_accuracy=_accuracy(hold, measured[late]),
         true_accuracy=_accuracy(hold, true[late_true]),
         estimated_accuracy=estimated_accuracy,
@@ -128,7 +125,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         stability=_stability(hold, measured),
         cover=cover,
         position=position,
-        swinging=None if len(measured) or len(true) else swinging(recording, hold),
+        swinging=None if len(measured) or len(true) else swinging(run, hold),
     )
 
 
@@ -137,11 +134,11 @@ def _accuracy(hold: Hold, force: Numbers) -> ForceAccuracy:
     return UNMEASURED if hold.is_short else force_accuracy(np.full(len(force), hold.commanded), force)
 
 
-def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:
+def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:
     if hold.axis >= 0:
-        stamps, value = measured_force(recording.run, hold.axis, hold.begin, hold.end)
+        stamps, value = measured_force(run, hold.axis, hold.begin, hold.end)
         return (stamps - hold.begin) / 1e9, value
-    columns = recording.run.wrench("force_measured")
+    columns = run.wrench("force_measured")
     if columns is None:
         return np.empty(0), np.empty(0)
     a, b = np.searchsorted(columns.stamp_ns, [hold.begin, hold.end])
@@ -162,10 +159,9 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
         return None
 
 
-def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
+def _touch_down(traces: Traces, parameters: PredictionParameters, hold: Hold) -> float:
     """Start of the contact of a hold, by the simulator, else by the estimate; see `HeldForce`."""
-    traces = recording.summary.traces
-    if any(stiffness > 0.0 for stiffness in recording.parameters.springs.stiffness):
+    if any(stiffness > 0.0 for stiffness in parameters.springs.stiffness):
         return math.nan  # a spring under the joint is always in contact
     first, last = (int(row) for row in np.searchsorted(traces.stamp, [hold.begin, hold.end]))
     for signal in (traces.true, traces.estimated):
@@ -181,9 +177,8 @@ def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
     return math.nan
 
 
-def _before(recording: AnalysedRun, hold: Hold, measured: Numbers) -> float:
+def _before(traces: Traces, hold: Hold, measured: Numbers) -> float:
     """Force of the contact in which a hold began, by the simulator, else by the estimate; see `HeldForce`."""
-    traces = recording.summary.traces
     row = int(np.searchsorted(traces.stamp, hold.begin)) - 1
     for signal in (traces.true, traces.estimated):
         if row >= 0 and len(measured) and signal.is_known[row]:
@@ -212,9 +207,9 @@ def _stability(hold: Hold, measured: Numbers) -> Stability:
     return stability(hold.commanded - measured, max(HOLD.loud * hold.commanded, 4.0 * noise(measured)))
 
 
-def _touched(recording: AnalysedRun, hold: Hold) -> tuple[str, float]:
+def _touched(traces: Traces, parameters: PredictionParameters, hold: Hold) -> tuple[str, float]:
     """Cover and position of the contact, by the simulator, else estimated, else as configured in the force loop."""
-    traces, loop = recording.summary.traces, recording.parameters.force_loop
+    loop = parameters.force_loop
     rows = traces.during(hold.begin, hold.end)
     for signal in (traces.true, traces.estimated):
         found = _median_position(signal, rows & signal.acts)
@@ -249,11 +244,17 @@ class Theory(NamedTuple):
     moved: float = math.nan
 
 
-def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None, topics: Sequence[str] = JOINTS) -> Theory:
+def theory_of(
+    run: RecordedRun,
+    parameters: PredictionParameters,
+    one: HeldForce,
+    arm: Arm | None = None,
+    topics: Sequence[str] = JOINTS,
+) -> Theory:
     """What is predicted for a held force, for the recorded arm or another one, in the pose that some topics have."""
-    parameters, hold, cover, position = recording.parameters, one.hold, one.cover, one.position
+    hold, cover, position = one.hold, one.cover, one.position
     arm = arm or parameters.arm
-    q = None if arm is None else _pose(recording, arm, hold, topics)
+    q = None if arm is None else _pose(run, arm, hold, topics)
     if arm is None or q is None or cover not in arm.covers.names:
         return Theory()
     link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
@@ -278,10 +279,10 @@ def theory_of(recording: AnalysedRun, one: HeldForce, arm: Arm | None = None, to
     return Theory(node, predicted, largest, found, moved)
 
 
-def _pose(recording: AnalysedRun, arm: Arm, hold: Hold, topics: Sequence[str]) -> list[float] | None:
+def _pose(run: RecordedRun, arm: Arm, hold: Hold, topics: Sequence[str]) -> list[float] | None:
     """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
     for topic in topics:
-        columns = recording.run.joints(topic)
+        columns = run.joints(topic)
         names = arm.motors.names if topic == "motor_states" else arm.joints.names
         found = None if columns is None else by_names(columns, "position", names)
         if columns is None or found is None:

@@ -1,9 +1,7 @@
 """Cycles of motors and joints under a force that was not recorded."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +12,8 @@ from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.thresholds import CYCLE
 from wam_bag.bag import JointColumns
+from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from wam_analysis.findings.analysed_run import AnalysedRun
 
 Numbers = NDArray[np.float64]
 
@@ -30,11 +26,11 @@ class Swinging(NamedTuple):
     swings: Swings
 
 
-def swinging(recording: AnalysedRun, hold: Hold) -> Swinging | None:
+def swinging(run: RecordedRun, hold: Hold) -> Swinging | None:
     """The motor, or else the joint, whose swings show most about a hold; None if none was recorded."""
     found = []
     for topic in ("motor_states", "joint_sensors", "joint_states"):
-        columns = recording.run.joints(topic)
+        columns = run.joints(topic)
         if columns is None or not columns.position.shape[1]:
             continue
         for i, name in enumerate(columns.names):

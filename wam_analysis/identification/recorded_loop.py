@@ -97,7 +97,7 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     better, names = _with_identified(arm, analysis)
     theory, largest = Theory(), None
     for largest in sorted(analysis.recording.held, key=lambda one: -one.hold.commanded):
-        theory = theory_of(analysis.recording, largest, better, POSES)
+        theory = theory_of(analysis.recording.run, parameters, largest, better, POSES)
         if theory.node is not None and np.isfinite(theory.node.contact_stiffness):
             break
     else:
