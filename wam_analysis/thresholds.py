@@ -154,18 +154,15 @@ class HoldThresholds:
 class TouchThresholds:
     """Which contacts are one, which command they belong to, and how well they are estimated."""
 
-    touch: int = 500_000_000  # ns, within which a contact that began before a pressing step belongs to that step
     # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
     bounce: int = 100_000_000
     plateau: int = 500_000_000  # ns, for which a commanded force is the same
     lasting: float = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
     steady_link: float = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
-    samples: int = 9  # of a steady state
     after_command: int = 100_000_000  # ns, for which the force of a push or a press may last after its command
     position_tolerance: float = 0.04  # m
     false_tolerance: float = 10.0  # % of the time without contact, in which one may be estimated
     ending: float = 0.2  # s: one of less may be a contact that has just ended, before a recording did
-    missed: float = 2.0  # of an answer about the link: worse than another link, which is 1
     # N, below which a true force is printed as 0.00 N: a spring at its rest, which touches nothing
     least_force: float = 5e-3
 
@@ -275,7 +272,6 @@ class ReportLayout:
 
     # text
     width: int = 100  # columns of text, at most
-    step: int = 24  # columns of the name of a step
     narrowest: int = 40  # columns of text, at least
     name: float = 0.4  # width of a name in a table at most, of all
     column: int = 12  # width of a number in a table at least, columns

@@ -9,6 +9,7 @@ from typing import Any
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
+from wam_analysis.table import plain
 from wam_analysis.thresholds import LAYOUT
 
 SCHEMA = 3  # of the JSON; incremented when a key changes its name or meaning
@@ -72,17 +73,11 @@ def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
 
 
 def _block(table: Tabulated, names: int, column: int, columns: list[int]) -> list[str]:
-    lines = []
-    for k, row in enumerate((table.columns, *table.rows)):
-        cells = [textwrap.wrap(row[0], names, subsequent_indent="  ") or [""]]
-        cells += [textwrap.wrap(row[j], column) or [""] for j in columns]
-        height = max(map(len, cells))
-        pad = (lambda cell, height=height: [""] * (height - len(cell)) + cell) if k == 0 else None
-        cells = [cells[0], *cells[1:]] if pad is None else [pad(cell) for cell in cells]
-        for i in range(height):
-            words = [cell[i] if i < len(cell) else "" for cell in cells]
-            lines.append(words[0].ljust(names) + "".join(f"  {word:>{column}}" for word in words[1:]))
-    return [line.rstrip() for line in lines]
+    heads = [[table.columns[0]], *(textwrap.wrap(table.columns[j], column) for j in columns)]
+    height = max(map(len, heads))
+    head = [*zip(*([""] * (height - len(one)) + one for one in heads), strict=True)]
+    rows = [[row[0], *(row[j] for j in columns)] for row in table.rows]
+    return plain(head, rows, first=names, least=column)
 
 
 def document(analysis: Analysis) -> dict[str, Any]:

@@ -24,7 +24,6 @@ class StampTiming(NamedTuple):
     backwards : stamps that are not later than the one before.
     interval : between two receptions, mean, s; NaN if they were not recorded.
     jitter : standard deviation of it, s.
-    jitter_p99 : 99th percentile of |interval - period|, s.
     worst : longest interval between two receptions, s.
     """
 
@@ -35,7 +34,6 @@ class StampTiming(NamedTuple):
     backwards: int
     interval: float
     jitter: float
-    jitter_p99: float
     worst: float
 
 
@@ -66,16 +64,15 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         as in lockstep bags, whose log times are the stamps.
     """
     if len(stamp) < 2:
-        return StampTiming(len(stamp), math.nan, 0, math.nan, 0, math.nan, math.nan, math.nan, math.nan)
+        return StampTiming(len(stamp), math.nan, 0, math.nan, 0, math.nan, math.nan, math.nan)
     steps = np.diff(stamp)
     forward = steps[steps > 0]
     period = float(np.median(forward)) if len(forward) else math.nan
     skipped = _skipped(forward / period) if len(forward) else np.zeros(0, dtype=np.int64)
-    interval = jitter = p99 = worst = math.nan
+    interval = jitter = worst = math.nan
     if received is not None:
         intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
         interval, jitter = float(np.mean(intervals)), float(np.std(intervals))
-        p99 = float(np.percentile(np.abs(intervals - period / 1e9), 99.0))
         worst = float(np.max(intervals))
     return StampTiming(
         messages=len(stamp),
@@ -85,7 +82,6 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         backwards=int(np.sum(steps <= 0)),
         interval=interval,
         jitter=jitter,
-        jitter_p99=p99,
         worst=worst,
     )
 

@@ -22,7 +22,6 @@ class StepResponse(NamedTuple):
     settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
         steady end.
     overshoot : largest excess over `final` as a fraction of the step, 0 if there is none.
-    peak_time : of the largest excess, s; NaN if there is none.
     ripple : half of the range in the steady end.
     rise_error : of `rise`, s: a sample, and the ripple over the slope of the rise.
     """
@@ -31,7 +30,6 @@ class StepResponse(NamedTuple):
     rise: float
     settling: float
     overshoot: float
-    peak_time: float
     ripple: float
     rise_error: float
 
@@ -74,7 +72,7 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         if width <= least or not high - low < CYCLE.sharp * width * float(time[1] - time[0]):
             break
         width = max(width // 2, least)
-    peak, at = _peak(time, (value - begin) / step, part)
+    peak = _peak(time, (value - begin) / step, part)
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):
         settling = 0.0
@@ -89,7 +87,6 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         rise=high - low,
         settling=settling,
         overshoot=peak,
-        peak_time=at,
         ripple=ripple,
         rise_error=math.hypot(period, (high - low) * ripple / (0.8 * abs(step))),
     )
@@ -110,19 +107,18 @@ def _between(time: Numbers, value: Numbers, row: int, level: float) -> float:
     return float(time[row] + share * (time[row + 1] - time[row]))
 
 
-def _peak(time: Numbers, raw: Numbers, part: Numbers) -> tuple[float, float]:
-    """Height over 1 and time of the largest excess: the top of a parabola through the samples about it."""
+def _peak(time: Numbers, raw: Numbers, part: Numbers) -> float:
+    """Height over 1 of the largest excess: the top of a parabola through the samples about it."""
     top = int(np.argmax(part))
     excess = float(part[top]) - 1.0
     if excess <= 0.0:
-        return 0.0, math.nan
+        return 0.0
     below = np.flatnonzero(part < 1.0 + CYCLE.top * excess)
     first = int(below[below < top][-1]) + 1 if np.any(below < top) else 0
     last = int(below[below > top][0]) if np.any(below > top) else len(part)
     if last - first < 5 or top in (first, last - 1):
-        return excess, float(time[top])
-    middle = float(time[top])
-    a, b, c = np.polynomial.polynomial.polyfit(time[first:last] - middle, raw[first:last], 2)
+        return excess
+    a, b, c = np.polynomial.polynomial.polyfit(time[first:last] - time[top], raw[first:last], 2)
     if c >= 0.0:
-        return excess, middle
-    return max(float(a - b * b / (4.0 * c)) - 1.0, 0.0), middle - float(b / (2.0 * c))
+        return excess
+    return max(float(a - b * b / (4.0 * c)) - 1.0, 0.0)
