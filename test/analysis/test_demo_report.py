@@ -266,7 +266,7 @@ def test_a_latency_counts_from_the_start_of_the_true_contact(series, begin, end,
     assert found == pytest.approx(late)
 
 
-@pytest.mark.parametrize("seconds", [0.5, 0.9])
+@pytest.mark.parametrize("seconds", [0.15, 0.5, 0.9])
 def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(seconds):
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 2.0, 0.0), 0.25)  # not yet 4 N
@@ -274,11 +274,11 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
     shown = demo_report.text(recording.summary())
     assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
-    assert "Less than 1 s, no steady state: press 4 N." in shown
-    assert math.isnan(forces_of(recording)["press 4 N: error of the true force"])
+    assert ("Less than 1 s, no steady state: press 4 N." in shown) == (seconds > 0.3)  # else it may be part of a ramp
+    assert math.isnan(forces_of(recording).get("press 4 N: error of the true force", math.nan))
     analysis = " ".join(analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100).split())
     assert "Forces: 1 of 1, worst +5.0 %." in analysis
-    assert "press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis
+    assert ("press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis) == (seconds > 0.3)
     assert "press 4 N: ripple" not in analysis
 
 

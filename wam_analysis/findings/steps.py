@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_analysis.contact_list import NO_LINK, ListedContact, MissedContact
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import AnalysedRun
@@ -56,7 +58,7 @@ def verdict(recording: AnalysedRun) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
     summary = recording.summary
     answers = (
-        _force_verdict(recording.held),
+        _force_verdict(recording.held, _brief(summary)),
         *_command_verdict(summary),
         _link_verdict(summary),
         _position_verdict(summary),
@@ -70,16 +72,23 @@ def verdict(recording: AnalysedRun) -> tuple[VerdictAnswer, ...]:
     return *answers, *[VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")][: bool(unknown)]
 
 
-def _force_verdict(held: Sequence[HeldForce]) -> VerdictAnswer:
+def _brief(summary: DemoSummary) -> int:
+    """How many steps commanded a force too briefly for a hold."""
+    traces, holds = summary.traces, summary.holds
+    pressed = [one for one in summary.steps if np.any(traces.during(one.begin, one.end) & traces.commanded.acts)]
+    return sum(not any(hold.begin < step.end and step.begin < hold.end for hold in holds) for step in pressed)
+
+
+def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     question = f"force within {HOLD.force_tolerance:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [one for one in held if not one.hold.is_refused]
     if len(done) < len(held):
         return VerdictAnswer(question, VerdictResult.NO, f"{len(held) - len(done)} of {len(held)} refused")
-    errors = [100.0 * one.true_accuracy.smallest / one.hold.commanded for one in done]
+    errors = [100.0 * one.true_accuracy.smallest / one.hold.commanded for one in done] + [math.nan] * brief
     answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
-    short = sum(one.hold.is_short for one in done)
-    return answer._replace(remark=f"{short} of {len(held)} commanded for less than {STEADY:g} s" * bool(short))
+    short = brief + sum(one.hold.is_short for one in done)
+    return answer._replace(remark=f"{short} of {len(held) + brief} commanded for less than {STEADY:g} s" * bool(short))
 
 
 def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
