@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
 from wam_bag.bag import JointColumns
+from wam_sim.recording import RecordedRun
 
 Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -51,3 +52,14 @@ def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> NDArr
         return None
     order = [columns.names.index(name) for name in names]
     return values if order == list(range(values.shape[1])) else values[:, order]
+
+
+def lacking(run: RecordedRun, *names: str) -> tuple[str, ...]:
+    """Those of some topics that were not recorded; of what was refused that is known."""
+    refused = {one.topic for one in run.refused}
+    return tuple(
+        name
+        for name in names
+        if name not in refused
+        and not ((columns := run.bag.topics.get(f"{run.namespace}/{name}")) and len(columns.log_time_ns))
+    )

@@ -20,7 +20,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from sample_messages import STORE, joint_state
 
 from wam_analysis.drawing import STYLE, widen_flat
-from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag, analyse_foreign_bag
+from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
 from wam_analysis.findings.charts import charts
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import guarded, sentence
@@ -28,6 +28,7 @@ from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import largest_force, node_at, predict
 from wam_analysis.findings.tabulated import MARK, tabulated
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
+from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
 from wam_analysis.table import bounded
 from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns
@@ -650,7 +651,7 @@ def planted() -> Analysis:
     force = np.column_stack([0.0 * time, 1.2 * np.sin(omega * time), 10.0 + 0.0 * time])
     wrench = WrenchColumns(stamps, stamps, ("tool",) * len(time), force, np.zeros_like(force))
     bag = Bag(Path("other"), {"/r/joint_states": joints, "/r/wrench": wrench}, {}, {}, {})
-    return analyse_foreign_bag(bag)
+    return analyse_bag(bag, lambda doing: None, given=TopicMap())
 
 
 def test_every_joint_and_the_force_have_a_chart_of_their_own(planted: Analysis) -> None:

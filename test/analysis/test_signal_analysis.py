@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wam_analysis.findings.motion import (
-    _friction_of_joints,
-    _friction_of_motors,
-)
+from wam_analysis.findings.transmission import _friction_of_joints, _friction_of_motors
 from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes

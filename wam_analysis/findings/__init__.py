@@ -1,6 +1,6 @@
 """The analysis of any recording, as `wam analyse` prints it.
 
-analysis               reads a bag and makes all sections
+analysis               reads a bag and makes all sections, of one list
 analysed_run           a bag prepared for analysis: its sources, run, forces and predictions
 finding                one number with its prediction; a section
 held_force             each commanded force: measures and predictions
@@ -11,6 +11,7 @@ swinging               cycles of motors and joints where no force was recorded
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press
+transmission           friction and ripple of motors and joints
 transmission_signals   motors, cables and joints on one time base
 motion                 sections about friction and ripple
 power                  section about efficiency and backdrivability

@@ -2,15 +2,20 @@
 
 from functools import cached_property
 
+import numpy as np
+
 from wam_analysis.demo_summary import DemoSummary, failure_of, summary_of
 from wam_analysis.findings.held_force import HeldForce, Theory, held_forces, theory_of
+from wam_analysis.findings.transmission import TransmissionFindings, transmission_findings
 from wam_analysis.foreign.sources import Source, alternates, command_of, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.held_messages import lacking
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
-from wam_bag.bag import Bag
+from wam_bag.bag import Bag, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import CUT
 from wam_sim.recording import RecordedRun, recorded_run
 
+STAMPED = (JointColumns, WrenchColumns, PointColumns)
 MOVING = ("motor_states", "joint_sensors", "joint_states")  # where motion is seen, the best first
 
 
@@ -86,10 +91,24 @@ class AnalysedRun:
         nothing = {one.hold.name: Theory() for one in self.held}
         return nothing | {one.hold.name: theory_of(self.run, self.parameters, one) for one in found}
 
+    @cached_property
+    def motion(self) -> TransmissionFindings:
+        """Friction and ripple of motors and joints."""
+        return transmission_findings(self.run, self.parameters)
+
     @property
     def bag(self) -> Bag:
         """The bag of the run."""
         return self.run.bag
+
+    @property
+    def duration(self) -> float:
+        """Length of what was recorded of the arm, s: from the first to the last stamp, or log time without stamps."""
+        prefix = "" if self.is_foreign else f"{self.namespace}/"
+        own = [one for name, one in self.bag.topics.items() if name.startswith(prefix) and len(one.log_time_ns)]
+        stamped = [one.stamp_ns for one in own if isinstance(one, STAMPED) and len(one.stamp_ns)]
+        chosen = stamped or [one.log_time_ns for one in own]
+        return (max(map(np.max, chosen), default=0) - min(map(np.min, chosen), default=0)) / 1e9
 
     @property
     def namespace(self) -> str:
@@ -98,13 +117,7 @@ class AnalysedRun:
 
     def lacking(self, *names: str) -> tuple[str, ...]:
         """Those of some topics that were not recorded."""
-        refused = {one.topic for one in self.run.refused}
-        return tuple(
-            name
-            for name in names
-            if name not in refused
-            and not ((columns := self.bag.topics.get(f"{self.namespace}/{name}")) and len(columns.log_time_ns))
-        )
+        return lacking(self.run, *names)
 
     @property
     def is_part(self) -> bool:

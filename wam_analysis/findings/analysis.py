@@ -1,7 +1,8 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,16 +11,24 @@ import numpy as np
 from wam_analysis.contact_list import contacts_by_link
 from wam_analysis.demo_summary import driver_faults
 from wam_analysis.demo_traces import Traces
-from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
-from wam_analysis.findings.motion import MotionFindings, motion_sections
+from wam_analysis.findings.frequency import frequency_section
+from wam_analysis.findings.motion import friction_section, ripple_section
+from wam_analysis.findings.power import power_section
 from wam_analysis.findings.steps import steps_section
 from wam_analysis.findings.stick_slip import stick_section
-from wam_analysis.findings.timing import extent, provenance, timing_section
+from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
-from wam_analysis.foreign.sections import foreign_sections
+from wam_analysis.foreign.sections import (
+    effort_section,
+    repetition_section,
+    spectrum_section,
+    step_section,
+    topics_section,
+)
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
@@ -30,6 +39,7 @@ from wam_sim.recording import RecordedRun, recorded_run
 
 OF_THE_START = "predicted for the parameters at the start, which were changed"
 Progress = Callable[[str], None]
+Maker = Callable[[AnalysedRun], Section | None]
 
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
@@ -38,7 +48,7 @@ TOPICS_READ = (
     "contact/point", "contact/hypotheses", "contact/tracked_friction", "sim/contact/wrench", "sim/contact/point",
     "sim/disturbance", "sim/joint_states", "status", "/diagnostics",
 )  # fmt: skip
-OWN = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
+OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",
     "force_command": "geometry_msgs/msg/WrenchStamped",
     "contact/wrench": "geometry_msgs/msg/WrenchStamped",
@@ -52,14 +62,13 @@ class Analysis(NamedTuple):
 
     Attributes
     ----------
-    recording, motion : what the sections are made from, for the pictures.
+    recording : what the sections are made from, for the pictures.
     duration : s.
     provenance : origin of the bag and of the numbers.
     sections : one for each subject; "verdict" is the first.
     """
 
     recording: AnalysedRun
-    motion: MotionFindings
     duration: float
     provenance: dict[str, str]
     sections: tuple[Section, ...]
@@ -95,7 +104,7 @@ def analyse(
     """
     if not isinstance(source, (str, Path)):
         table = source.reset_index() if hasattr(source, "reset_index") else source
-        return analyse_foreign_bag(table_bag(Path("table"), table, given), given)
+        return analyse_bag(table_bag(Path("table"), table, given), progress, given=given)
     path = Path(source)
     progress(f"reading {path}")
     if not given.is_given and _is_own(path):
@@ -103,17 +112,7 @@ def analyse(
     if namespace:
         raise ValueError(f"--namespace chooses an arm of this stack, and {path} is analysed as of another robot")
     progress("it is of another robot")
-    return analyse_foreign_bag(foreign_bag(path, given), given)
-
-
-def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
-    """Analyse the joints and wrenches of another robot's bag, see `wam_analysis.foreign.reading.foreign_bag`."""
-    recording = AnalysedRun(recorded_run(bag), given)
-    sections = foreign_sections(recording)
-    nothing = MotionFindings((), None, {}, {})
-    duration = extent(bag.topics)
-    sections = (_verdict(_foreign_line(bag, duration), sections), *sections)
-    return Analysis(recording, nothing, duration, provenance(recording), sections)
+    return analyse_bag(foreign_bag(path, given), progress, given=given)
 
 
 def _is_own(path: Path) -> bool:
@@ -129,37 +128,25 @@ def _is_own(path: Path) -> bool:
     require_messages(path, (topic.messages for topic in found.topics.values()))
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True
-    spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN.items()
+    spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN_TOPICS.items()
               if name.endswith(f"/{own}") and one.type == kind]  # fmt: skip
     return any(spaces.count(space) > 1 for space in spaces)
 
 
-def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
-    """Analyse a bag of this stack that has been read, see `analyse`."""
-    progress("forces and contacts")
-    recording = analysed_run(bag, namespace)
-    predicted = [_of_the_start(one, recording) for one in (force_section(recording), cycle_section(recording))]
-    middle = (*predicted, contact_section(recording))
-    progress("friction, ripple, power and frequency")
-    motion = motion_sections(recording)
-    progress("timing")
-    prefix = f"{recording.namespace}/"
-    duration = extent({name: topic for name, topic in recording.bag.topics.items() if name.startswith(prefix)})
-    steps = steps_section(recording)
-    sections = (
-        _happened(recording, duration),
-        *filter(None, [steps]),
-        *middle,
-        stick_section(recording),
-        *motion.sections,
-        timing_section(recording),
-    )
-    verdict = _verdict(_own_line(recording, duration), sections)
-    return Analysis(recording, motion, duration, provenance(recording), (verdict, *sections))
+def analyse_bag(bag: Bag, progress: Progress, namespace: str = "", given: TopicMap | None = None) -> Analysis:
+    """Analyse a bag that has been read, see `analyse`; `given` is None for one of this stack."""
+    recording = AnalysedRun(recorded_run(bag, namespace), given)
+    sections = []
+    for make, kinds in SECTIONS:
+        if recording.is_foreign in kinds and (section := make(recording)) is not None:
+            progress(section.title)
+            sections.append(section)
+    return Analysis(recording, recording.duration, provenance(recording), (_verdict(recording, sections), *sections))
 
 
-def _verdict(what: str, sections: tuple[Section, ...]) -> Section:
+def _verdict(recording: AnalysedRun, sections: Sequence[Section]) -> Section:
     """Three lines: what the recording is, what is wrong with it, what it shows."""
+    what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
     return Section(
@@ -179,20 +166,21 @@ def _line(title: str, sentences: list[str], silent: str) -> str:
     return f"{title}: {' '.join(kept)}{more}"
 
 
-def _foreign_line(bag: Bag, duration: float) -> str:
+def _foreign_line(recording: AnalysedRun) -> str:
     """What another robot's recording is."""
+    bag = recording.bag
     joints = {name for one in bag.topics.values() if isinstance(one, JointColumns) for name in one.names}
     wrenches = sum(isinstance(one, WrenchColumns) for one in bag.topics.values())
     held = [_count(len(joints), "joint"), *([_count(wrenches, "wrench topic")] if wrenches else [])]
-    return f"Another robot's recording: {shown(duration, 's')}, {' and '.join(held)}."
+    return f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
 
 
-def _happened(recording: AnalysedRun, duration: float) -> Section:
+def happened_section(recording: AnalysedRun) -> Section:
     """What happened, in a few sentences."""
     summary = recording.summary
     sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
     mode = recording.mode if recording.mode != "unknown" else "not known whether in lockstep or in realtime"
-    sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {mode}.")
+    sentences.append(f"{shown(recording.duration, 's')} of {summary.namespace or '/'}, {mode}.")
     if summary.steps:
         ended = " to its end" if summary.outcome == Code.DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
@@ -216,11 +204,11 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     return Section("happened", "What happened", tuple(sentences), (), lacking, (), tuple(wrong))
 
 
-def _own_line(recording: AnalysedRun, duration: float) -> str:
+def _own_line(recording: AnalysedRun) -> str:
     """What a recording of this stack is."""
     summary = recording.summary
     mode = "" if recording.mode == "unknown" else f" in {recording.mode}"
-    text = f"{summary.namespace or '/'}: {shown(duration, 's')}{mode}"
+    text = f"{summary.namespace or '/'}: {shown(recording.duration, 's')}{mode}"
     steps = f", {_count(len(summary.steps), 'step')}" * bool(summary.steps)
     part = ", part of a longer recording" if recording.is_part else f", {Code.DONE}" * (summary.outcome == Code.DONE)
     return f"{text}{steps}{part}."
@@ -256,10 +244,11 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
         )
 
 
-def _of_the_start(section: Section, recording: AnalysedRun) -> Section:
+def _of_the_start(make: Maker, recording: AnalysedRun) -> Section | None:
     """A section whose predictions are for the parameters at the start, marked where these were changed."""
-    changed = tuple(_changed(recording.run, recording.summary.traces.zero))
-    if not changed:
+    section = make(recording)
+    changed = tuple(_changed(recording.run, recording.summary.traces.zero)) if section is not None else ()
+    if section is None or not changed:
         return section
     findings = tuple(
         one._replace(note="; ".join(filter(None, (one.note, OF_THE_START)))) if math.isfinite(one.predicted) else one
@@ -277,3 +266,25 @@ def _brief(note: str) -> str:
 
 def _count(number: int, name: str) -> str:
     return f"{number} {name}{'s' * (number != 1)}"
+
+
+OWN, FOREIGN = (False,), (True,)  # kinds of recordings
+SECTIONS: tuple[tuple[Maker, tuple[bool, ...]], ...] = (
+    (happened_section, OWN),
+    (topics_section, FOREIGN),
+    (steps_section, OWN),
+    (partial(_of_the_start, force_section), OWN),
+    (step_section, FOREIGN),
+    (partial(_of_the_start, cycle_section), OWN),
+    (repetition_section, FOREIGN),
+    (contact_section, OWN),
+    (stick_section, OWN + FOREIGN),
+    (friction_section, OWN),
+    (effort_section, FOREIGN),
+    (ripple_section, OWN),
+    (power_section, OWN),
+    (frequency_section, OWN),
+    (spectrum_section, FOREIGN),
+    (timing_section, OWN + FOREIGN),
+)
+"""Each makes its section, or None where the recording has nothing for it; and of which recordings."""

@@ -66,7 +66,7 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
         if isinstance(columns, JointColumns):
             yield from _of_motion(name, columns)
     yield from _friction(analysis)
-    ripples = {name: found for name, found in analysis.motion.ripple.items() if len(found.order)}
+    ripples = {name: found for name, found in analysis.recording.motion.ripple.items() if len(found.order)}
     for i, (name, found) in enumerate(ripples.items()):
         line = ChartLine(name, SHAFTS[i % len(SHAFTS)], 1e3 * found.amplitude)
         order = found.order.astype(np.float64)
@@ -125,15 +125,15 @@ def _of_motion(name: str, columns: JointColumns) -> Iterator[Chart]:
 
 
 def _friction(analysis: Analysis) -> Iterator[Chart]:
-    signals, arm = analysis.motion.signals, analysis.recording.parameters.arm
-    if signals is None or arm is None:
+    signals, arm = analysis.recording.motion.signals, analysis.recording.parameters.arm
+    if signals is None or arm is None or not analysis.recording.motion.friction:
         return
     some = np.flatnonzero(signals.use)
     some = some[:: max(1, len(some) // LAYOUT.dots)]
     for i, name in enumerate(arm.motors.names):
         rows = some[np.argsort(signals.velocity[some, i], kind="stable")]
         speed, torque = signals.velocity[rows, i], 1e3 * (signals.torque - signals.load)[rows, i]
-        found, motors = analysis.motion.friction[name], arm.motors
+        found, motors = analysis.recording.motion.friction[name], arm.motors
         of_config = (motors.dynamic_friction[i], motors.viscous_friction[i])
         lines = [ChartLine("torque less load", LAYOUT.grey, torque, dots=True)]
         for label, colour, (dry, viscous) in (

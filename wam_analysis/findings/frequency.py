@@ -10,11 +10,13 @@ from wam_analysis.held_messages import at_stamps, by_names
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import CYCLE
-from wam_description.arm import Arm
 
 
-def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
+def frequency_section(recording: AnalysedRun) -> Section | None:
     """Up to which frequency the motors follow their velocity commands."""
+    arm, signals, *_ = recording.motion
+    if arm is None or signals is None:
+        return None
     sentences, findings = [], []
     shows: list[str] = []
     commands, states = recording.run.joints("motor_velocity_command"), recording.run.joints("motor_states")

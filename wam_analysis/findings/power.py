@@ -1,10 +1,12 @@
 """Section about power: efficiency in both directions, and the torque that backdrives each joint."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.transmission_signals import TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
@@ -15,10 +17,11 @@ from wam_description.arm import Arm
 Numbers = NDArray[np.float64]
 
 
-def power_section(
-    arm: Arm, signals: TransmissionSignals, friction: dict[str, Friction], joints: dict[str, Friction]
-) -> Section:
+def power_section(recording: AnalysedRun) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
+    arm, signals, joints, friction, _, drowned = recording.motion
+    if arm is None or signals is None or drowned:
+        return None
     inertia, speed = np.array(arm.motors.inertia), signals.velocity
     acceleration = np.gradient(speed, signals.time, axis=0)
     motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
@@ -72,7 +75,7 @@ def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
     return result
 
 
-def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Friction]) -> list[Finding]:
+def _backdrive(arm: Arm, friction: Mapping[str, Friction], joints: Mapping[str, Friction]) -> list[Finding]:
     """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
     matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
     motor_per_joint = np.abs(np.linalg.inv(matrix))

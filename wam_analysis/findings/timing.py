@@ -1,24 +1,22 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.findings.analysed_run import STAMPED, AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Source
 from wam_analysis.measures.loop_timing import has_lagged, latency, stamp_timing
 from wam_analysis.thresholds import SHAFT, STREAM
-from wam_bag.bag import Columns, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import RECORDING
 
 Times = NDArray[np.int64]
 
-STAMPED = (JointColumns, WrenchColumns, PointColumns)
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 
 
@@ -158,14 +156,3 @@ def _part_of(read: int, all_of_them: int) -> str:
     if read == all_of_them:
         return str(read)
     return f"{read} of {all_of_them}; the others are not needed and were not read"
-
-
-def extent(columns: Mapping[str, Columns]) -> float:
-    """Length of what was recorded on some topics, s: from the first to the last stamp, or log time without stamps."""
-    times = [topic.log_time_ns for topic in columns.values() if len(topic.log_time_ns)]
-    if not times:
-        return 0.0
-    stamped = [topic.stamp_ns for topic in columns.values() if isinstance(topic, STAMPED) and len(topic.stamp_ns)]
-    chosen = stamped or times
-    first, last = min(int(np.min(t)) for t in chosen), max(int(np.max(t)) for t in chosen)
-    return (last - first) / 1e9

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.held_messages import at_stamps, by_names
+from wam_analysis.held_messages import at_stamps, by_names, lacking
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
+from wam_sim.recording import RecordedRun
 
 Numbers = NDArray[np.float64]
 
@@ -53,9 +53,9 @@ class TransmissionSignals(NamedTuple):
     caveats: tuple[str, ...]
 
 
-def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignals | None:
+def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | None:
     """The signals of a recording; None if it has no motor states or no load."""
-    motors = recording.run.joints("motor_states")
+    motors = run.joints("motor_states")
     if motors is None:
         return None
     names, joints = arm.motors.names, arm.joints.names
@@ -64,17 +64,17 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
     if angle is None or velocity is None or torque is None:
         return None
     stamps = motors.stamp_ns
-    cable = _of(recording, "sim/joint_states", "effort", joints, stamps)
-    strain = _of(recording, "joint_sensors", "effort", joints, stamps)
-    speed = _of(recording, "joint_sensors", "velocity", joints, stamps)
+    cable = _of(run, "sim/joint_states", "effort", joints, stamps)
+    strain = _of(run, "joint_sensors", "effort", joints, stamps)
+    speed = _of(run, "joint_sensors", "velocity", joints, stamps)
     if not np.any(np.isfinite(speed)):
-        speed = _of(recording, "sim/joint_states", "velocity", joints, stamps)
-    gravity = _of(recording, "gravity_effort", "effort", joints, stamps)
+        speed = _of(run, "sim/joint_states", "velocity", joints, stamps)
+    gravity = _of(run, "gravity_effort", "effort", joints, stamps)
     at_joints, load_from = next(
         (
             (values, name)
             for values, name in ((cable, CABLE), (strain, STRAIN), (gravity, GRAVITY))
-            if np.any(np.isfinite(values)) and (name != CABLE or _period(recording) <= SHAFT.slowest_period)
+            if np.any(np.isfinite(values)) and (name != CABLE or _period(run) <= SHAFT.slowest_period)
         ),
         (cable, ""),
     )
@@ -83,11 +83,11 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
     forward = np.concatenate(([True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]))  # time that a reset repeats
     rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
     matrix = TransmissionMap.of(arm).joint_from_motor
-    use = ~_braked(recording, stamps[rows])
+    use = ~_braked(run, stamps[rows])
     caveats: tuple[str, ...] = ()
     if load_from == GRAVITY:
-        touched = _touched(recording, stamps[rows])
-        caveats = tuple(_caveats(recording, float(np.mean(touched[use])) if np.any(use) else 0.0))
+        touched = _touched(run, stamps[rows])
+        caveats = tuple(_caveats(run, float(np.mean(touched[use])) if np.any(use) else 0.0))
         use &= ~touched
     return TransmissionSignals(
         time=stamps[rows] / 1e9,
@@ -97,7 +97,7 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
         load=at_joints[rows] @ matrix,
         load_from=load_from,
         use=use,
-        sampled=_recorded_at(recording, SOURCES[load_from], stamps[rows]),
+        sampled=_recorded_at(run, SOURCES[load_from], stamps[rows]),
         joint_velocity=speed[rows],
         cable_torque=cable[rows],
         strain=strain[rows],
@@ -105,11 +105,11 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
     )
 
 
-def _braked(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _braked(run: RecordedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the brakes held, which is not friction; extended until the cables have taken the load."""
     braked = np.zeros(len(stamps), dtype=np.bool_)
     since: int | None = None
-    for status in recording.run.statuses:
+    for status in run.statuses:
         if status.node != "driver" or not status.mode or not status.stamp:
             continue
         if status.mode == "enabled" and since is not None:
@@ -120,11 +120,11 @@ def _braked(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.boo
     return braked if since is None else braked | (stamps >= since)
 
 
-def _touched(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _touched(run: RecordedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether something pushes or touches the arm, or does shortly before or after."""
     touched = np.zeros(len(stamps), dtype=np.bool_)
     for topic in TOUCHES:
-        forces = recording.run.wrench(topic)
+        forces = run.wrench(topic)
         if forces is None:
             continue
         acting = forces.stamp_ns[np.any(forces.force != 0.0, axis=1)]
@@ -133,34 +133,34 @@ def _touched(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bo
     return touched
 
 
-def _caveats(recording: AnalysedRun, left_out: float) -> Iterator[str]:
+def _caveats(run: RecordedRun, left_out: float) -> Iterator[str]:
     """About a load from gravity alone; `left_out` is the fraction of the time in which something touched the arm."""
     yield "The motors' load is that of gravity alone: what accelerates the links is in their friction, too."
     if left_out > 0.0:
         yield f"Left out is {100.0 * left_out:.0f} % of the time, in which something pushed or touched the arm."
-    lacking = recording.lacking(*TOUCHES[: 1 + recording.run.is_simulated])
-    if lacking:
+    unknown = lacking(run, *TOUCHES[: 1 + run.is_simulated])
+    if unknown:
         yield (
-            f"Whether something pushed or touched the arm is not known: not recorded ({', '.join(lacking)}). "
+            f"Whether something pushed or touched the arm is not known: not recorded ({', '.join(unknown)}). "
             "If so, it is in their friction."
         )
 
 
-def _period(recording: AnalysedRun) -> float:
+def _period(run: RecordedRun) -> float:
     """Period of the simulator's joint states, s."""
-    columns = recording.run.joints("sim/joint_states")
+    columns = run.joints("sim/joint_states")
     return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
 
 
-def _recorded_at(recording: AnalysedRun, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-    columns = recording.run.joints(topic)
+def _recorded_at(run: RecordedRun, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    columns = run.joints(topic)
     return np.zeros(len(stamps), dtype=np.bool_) if columns is None else at_stamps(columns, stamps)[0]
 
 
-def _of(recording: AnalysedRun, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
+def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
     """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages and in their gaps."""
     result = np.full((len(stamps), len(names)), np.nan)
-    columns = recording.run.joints(topic)
+    columns = run.joints(topic)
     values = None if columns is None else by_names(columns, field, names)
     if columns is not None and values is not None and len(columns.stamp_ns) > 1:
         inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])

@@ -7,8 +7,6 @@ import numpy as np
 
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.findings.stick_slip import stick_section
-from wam_analysis.findings.timing import timing_section
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -34,20 +32,8 @@ ALSO = {
 }
 
 
-def foreign_sections(recording: AnalysedRun) -> tuple[Section, ...]:
-    """Sections in the order of those of a bag of this stack."""
-    return (
-        _happened(recording),
-        _forces(recording),
-        _cycles(recording),
-        stick_section(recording),
-        _friction(recording.states),
-        _spectrum(recording.states),
-        timing_section(recording),
-    )
-
-
-def _happened(recording: AnalysedRun) -> Section:
+def topics_section(recording: AnalysedRun) -> Section:
+    """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     what = (
         "Analysed as that of another robot, as the options request."
@@ -173,7 +159,8 @@ def _unread(bag: Bag) -> list[str]:
 # forces
 
 
-def _forces(recording: AnalysedRun) -> Section:
+def step_section(recording: AnalysedRun) -> Section:
+    """Steps of a commanded force, and how the measured one followed."""
     states, commands = recording.states, recording.commands
     steps: list[ForceStep] = []
     sentences, findings, doubts, followed = [], [], [], set()
@@ -233,7 +220,8 @@ def _settled(seconds: float) -> str:
 # cycles and spectrum
 
 
-def _cycles(recording: AnalysedRun) -> Section:
+def repetition_section(recording: AnalysedRun) -> Section:
+    """What repeats, and whether it was commanded."""
     found = [cycle for one in recording.states for cycle in cycles(one, recording.command_of(one))]
     sentences, findings, verdict = [], [], []
     taken: set[str] = set()
@@ -277,7 +265,9 @@ def _cycle_sentence(one: FoundCycle) -> str:
     return f"{one.label} repeats at {frequency}, {size}, {where}; no command of it is known, --command names one."
 
 
-def _spectrum(states: Sequence[Source]) -> Section:
+def spectrum_section(recording: AnalysedRun) -> Section:
+    """The strongest lines of each joint and wrench axis."""
+    states = recording.states
     sentences, findings = [], []
     for label, unit, line in (found for one in states for found in lines(one)):
         sentences.append(f"{label}: {shown(line.frequency, 'Hz')}, amplitude {shown(line.amplitude, unit)}.")
@@ -296,7 +286,9 @@ def _spectrum(states: Sequence[Source]) -> Section:
 # mechanics
 
 
-def _friction(states: Sequence[Source]) -> Section:
+def effort_section(recording: AnalysedRun) -> Section:
+    """Friction and inertia of the joints of another robot."""
+    states = recording.states
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
         factor = velocity_factor(one)
