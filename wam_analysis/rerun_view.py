@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from wam_analysis.arm_picture import side_view
 from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.drawing import BLOCK_COLOUR, COLOURS, PEDESTAL_COLOUR, TUBE_COLOURS, channels
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.timing import STAMPED
+from wam_analysis.findings.analysed_run import STAMPED, AnalysedRun
 from wam_analysis.held_messages import by_names
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_analysis.thresholds import LAYOUT

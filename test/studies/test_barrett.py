@@ -13,7 +13,7 @@ import pytest
 import yaml
 from arms import NOWHERE
 
-from wam_analysis.demo_summary import summarize
+from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.identification.regressor import about_origin
 from wam_bag.bag import Bag, JointColumns
@@ -259,18 +259,19 @@ def pressed(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
 
 @pytest.mark.slow
 def test_the_wrist_presses_within_ten_percent_while_the_elbow_moves(pressed: Bag) -> None:
-    found = summarize(pressed)
+    recording = analysed_run(pressed)
+    found = recording.summary
     assert found.outcome == "done"
     assert found.loop.mode == "lockstep"
-    assert [press.step for press in found.presses] == ["press 5 N", "move the elbow, press 10 N"]
-    for press in found.presses:
-        assert abs(press.error(press.true)) < 10.0
-    assert all(touch.link_estimated == touch.link_true == "wrist" for touch in found.touches)
+    assert [held.hold.name for held in recording.held] == ["press 5 N", "move the elbow, press 10 N"]
+    for held in recording.held:
+        assert abs(held.true_accuracy.bias) < 0.1 * held.hold.commanded
+    assert {contact.estimate.link for contact in found.contacts} == {"wrist"}
     body = RigidBody(CONFIGURATIONS["barrett_wam7"].shared.arm)
-    last = found.presses[-1]
+    last = found.holds[-1]
     truth = pressed.topics["/wam/sim/joint_states"]
     assert isinstance(truth, JointColumns)
-    before, after = (truth.position[np.searchsorted(truth.stamp_ns, at)] for at in (last.begin - 2 * 10**9, last.end))
+    before, after = (truth.position[np.searchsorted(truth.stamp_ns, at)] for at in (last.end - 3 * 10**9, last.end))
     elbow, wrist = (
         float(np.linalg.norm(body.point(after, name, (0, 0, 0)) - body.point(before, name, (0, 0, 0))))
         for name in ("forearm", "wrist")
