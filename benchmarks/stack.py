@@ -360,11 +360,6 @@ class Run(NamedTuple):
     passed: bool
     bag: Path
 
-    @property
-    def factor(self) -> float:
-        """Real-time factor; 0 of one that failed."""
-        return summarize(read(self.bag)).loop.factor if self.passed else 0.0
-
 
 @contextmanager
 def busy_loops(count: int) -> Iterator[None]:

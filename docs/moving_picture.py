@@ -1,11 +1,8 @@
 """Draws docs/demo.webp: the demonstration as a moving picture, the arm above its forces over time.
 
-    python docs/moving_picture.py bags/first docs/demo.webp
-
 Needs neither a display nor a browser.  `make docs` draws it from the recording that docs/demo.txt reports.
 """
 
-import argparse
 from pathlib import Path
 
 import matplotlib as mpl
@@ -100,17 +97,3 @@ def save(bag: Path, file: Path) -> None:
         if file.stat().st_size < LARGEST:
             return
     raise SystemExit(f"{file} has {file.stat().st_size} bytes, more than {LARGEST}")
-
-
-def main() -> None:
-    """Draw a recording."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bag", type=Path)
-    parser.add_argument("picture", type=Path)
-    given = parser.parse_args()
-    save(given.bag, given.picture)
-    print(f"{given.picture}: {given.picture.stat().st_size} bytes")
-
-
-if __name__ == "__main__":
-    main()

@@ -213,14 +213,15 @@ class NodeProcess:
     configuration : values for the node.
     entry : of the parameter `nodes`.
     namespace : of the node.
+    log_level : least severity of what it prints.
     """
 
-    def __init__(self, configuration: Configuration, entry: str, namespace: str) -> None:
+    def __init__(self, configuration: Configuration, entry: str, namespace: str, log_level: str = "error") -> None:
         self._stack = ExitStack()
         prepare_logging_directory()
         file = self._stack.enter_context(parameter_file(configuration))
         place = f"__ns:=/{namespace.strip('/')}"
-        self._entry, self._arguments = entry, ["--params-file", str(file), "-r", place, "--log-level", "error"]
+        self._entry, self._arguments = entry, ["--params-file", str(file), "-r", place, "--log-level", log_level]
         self.start()
 
     def start(self) -> None:
@@ -231,6 +232,10 @@ class NodeProcess:
     def code(self) -> int | None:
         """Exit code where it has ended."""
         return self._process.poll()
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal; without effect where it has ended."""
+        self._process.send_signal(number)
 
     def stop(self) -> None:
         """End the node, the hard way where it does not end by itself."""

@@ -146,7 +146,7 @@ def _worker(end: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-    logging.getLogger("wam_sim").setLevel(logging.ERROR)  # nobody reads the warnings of hundreds of runs
+    logging.getLogger().setLevel(logging.ERROR)  # nobody reads the warnings of hundreds of runs
 
 
 @contextmanager

@@ -27,15 +27,17 @@ Record = TypeVar("Record")
 # name: where its class is
 STUDIES: Final = {
     "contact": "wam_studies.contact.study:ContactStudy",
+    "faults": "wam_studies.faults.study:FaultStudy",
     "force": "wam_studies.force_benchmark.study:ForceStudy",
     "guard": "wam_studies.stability.guard_validation:GuardStudy",
     "identify": "wam_studies.identification.study:IdentificationStudy",
+    "soak": "wam_studies.faults.soak:SoakStudy",
 }
 
 
-def option(default: Any, text: str, least: float | None = None) -> Any:
-    """A field of a study that is an option: its default, what it is, and the least value allowed."""
-    return field(default=default, metadata={"text": text, "least": least})
+def option(default: Any, text: str, least: float | None = None, choices: Collection[str] = ()) -> Any:
+    """A field of a study that is an option: its default, what it is, the least value allowed, or the names allowed."""
+    return field(default=default, metadata={"text": text, "least": least, "choices": choices})
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Study(ABC, Generic[Case, Record]):
     seeds : by default.
     count : cases of a seed by default; None for all that there are.
     base : name of the configuration by default.
+    over_topics : whether a case runs nodes over topics: one case at a time, and every parameter has its effect.
     configuration : under test.
     """
 
@@ -57,11 +60,12 @@ class Study(ABC, Generic[Case, Record]):
     seeds: ClassVar[tuple[int, ...]] = (1, 2, 3)
     count: ClassVar[int | None] = None
     base: ClassVar[str] = "wam"
+    over_topics: ClassVar[bool] = False
 
     configuration: Configuration
 
     def __post_init__(self) -> None:
-        """Refuse an option that is too small.
+        """Refuse an option that is too small, or a name that there is not.
 
         Raises
         ------
@@ -69,9 +73,12 @@ class Study(ABC, Generic[Case, Record]):
             which names the option, its value and what is allowed.
         """
         for one in fields(self):
-            value, least = getattr(self, one.name), one.metadata.get("least")
+            value, least, name = getattr(self, one.name), one.metadata.get("least"), one.name.replace("_", "-")
             if least is not None and not value >= least:
-                raise ValueError(f"--{one.name.replace('_', '-')} is {value:g}; it must be at least {least:g}")
+                raise ValueError(f"--{name} is {value:g}; it must be at least {least:g}")
+            choices = one.metadata.get("choices")
+            if choices and (wrong := [each for each in value if each not in choices]):
+                raise ValueError(f"--{name} is '{wrong[0]}'; choose from {', '.join(choices)}")
 
     @abstractmethod
     def cases(self, seed: int) -> Iterable[Case]:

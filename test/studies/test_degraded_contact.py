@@ -13,26 +13,20 @@ from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
-from wam_studies.contact.degraded_rows import DEGRADED, DriveScore, contacts_needed, degraded_rows, degraded_tables
+from wam_studies.contact.degraded_rows import DEGRADED, contacts_needed, degraded_rows, degraded_tables
+from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
 from wam_studies.contact.recording import Drive, _identified, record
-from wam_studies.contact.replay import (
-    FalseAlarm,
-    ReplayScore,
-    SignalFaults,
-    TouchOutcome,
-    names_payload,
-    payload_probability,
-)
+from wam_studies.contact.replay import SignalFaults, names_payload
+from wam_studies.contact.rows import IDENTIFIED_ARM
 from wam_studies.contact.scenarios import base_values
-from wam_studies.contact.study import ContactStudy
+from wam_studies.contact.study import ContactCase, ContactStudy, play_case
 from wam_studies.contact.touches import axis_of
-from wam_studies.contact.trial import ContactCase, play_case
 from wam_studies.identification.plants import MeasuredSignals
 from wam_studies.scores import Row, ScoreTable, share
 
-TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, 0.0)
+TOUCH = ContactOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, "outer", 0.0, 0.01, True)
+QUIET = TorqueErrors(*[(0.0,)] * 4, 1, 1, 1)
 OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
-ALARM = FalseAlarm(0.2, 0.1, 1.5)
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
 EXACT = ("moving", "asymmetry", "load", "shape", "payload", "mass")
 BELIEVING = {f"contact_estimator:observer.{name}_uncertainty": 0.0 for name in EXACT} | {
@@ -40,10 +34,8 @@ BELIEVING = {f"contact_estimator:observer.{name}_uncertainty": 0.0 for name in E
 }
 
 
-def score_of(drive: Drive) -> ReplayScore:
-    found = play_case(ContactCase(drive.configuration, drive))
-    assert isinstance(found, DriveScore)
-    return found.score
+def score_of(drive: Drive) -> ContactScore:
+    return play_case(ContactCase(drive.configuration, drive))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -54,7 +46,7 @@ def test_a_degradation_is_drawn_from_its_seed_and_changes_the_arm_or_its_signals
 
 
 def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> None:
-    with pytest.raises(ValueError, match=r"no degradation is named 'wind'; degradations: as stated, friction 0\.8"):
+    with pytest.raises(ValueError, match=r"--degradations is 'wind'; choose from all, as stated, friction 0\.8"):
         ContactStudy(CONFIGURATION, degradations=("wind",))
 
 
@@ -75,20 +67,20 @@ def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to
     assert fewer.low < low or fewer.high > high
 
 
-def scored(*outcomes: TouchOutcome, **parts: Any) -> ReplayScore:
-    return ReplayScore(STATED, list(outcomes), 100.0, [], 0.0, 0.0, [], 60.0, [], [], "")._replace(**parts)
+def scored(*outcomes: ContactOutcome, **parts: Any) -> ContactScore:
+    return ContactScore(STATED, "", list(outcomes), 100.0, 0, QUIET, contact_seconds=60.0)._replace(**parts)
 
 
-def driven(*scores: ReplayScore, contacts: str = "wide", is_identified: bool = False) -> list[DriveScore]:
-    return [DriveScore(1, contacts, is_identified, score) for score in scores]
+def driven(*scores: ContactScore, group: str = "wide") -> list[ContactScore]:
+    return [score._replace(group=group) for score in scores]
 
 
-def rows_of(drives: list[DriveScore]) -> dict[str, Row]:
+def rows_of(drives: list[ContactScore]) -> dict[str, Row]:
     return {row.name: row for row in degraded_rows(drives)}
 
 
 def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_they_are_allowed() -> None:
-    rows = rows_of(driven(scored(degradation=COARSE), scored(degradation=LOADED, alarms=[ALARM])))
+    rows = rows_of(driven(scored(name=COARSE), scored(name=LOADED, alarms=1)))
     assert rows[f"false alarms, any degradation alone, the worst: {LOADED}"].found.value == 0.01
 
 
@@ -97,9 +89,9 @@ def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
     inner = TOUCH._replace(kind="inner", force=10.0, latency=np.inf)
     rough = TOUCH._replace(force=20.0, friction=0.8, in_set=False)
     drives = [
-        *driven(scored(inner, inner._replace(latency=0.01), rough, degradation="delay 2 ms")),
-        *driven(scored(TOUCH._replace(sure_and_wrong=0.5)), contacts="lasting"),
-        *driven(scored(TOUCH, late, started=[(False, False), (True, False)]), contacts="level", is_identified=True),
+        *driven(scored(inner, inner._replace(latency=0.01), rough, name="delay 2 ms")),
+        *driven(scored(TOUCH._replace(sure_and_wrong=0.5)), group="lasting"),
+        *driven(scored(TOUCH, late, started=((False, False), (True, False))), group=IDENTIFIED_ARM),
     ]
     rows = rows_of(drives)
     mix = "realistic mix, identified"
@@ -113,7 +105,7 @@ def test_what_goes_in_is_counted_in_the_row_that_it_is_of() -> None:
     assert rows_of([]) == {}
 
 
-def table(title: str, drives: list[DriveScore]) -> ScoreTable:
+def table(title: str, drives: list[ContactScore]) -> ScoreTable:
     return next(one for one in degraded_tables(drives) if one.title.startswith(title))
 
 
@@ -154,7 +146,7 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     for score in (coarse, loaded):
         assert not score.failure
         assert score.free_seconds > 3.0
-        assert len(score.alarms) <= (score is loaded)  # one of the payload, before it is identified
+        assert score.alarms <= (score is loaded)  # one of the payload, before it is identified
         assert len(score.outcomes) >= 1
     assert believing.alarms
     assert loaded.warnings > 0.5
@@ -173,7 +165,7 @@ def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_re
     assert carried.mass > 0.8
     assert carried.detected
     assert outcome.kind == "picking up"
-    drives = [*driven(score), *driven(score, contacts="masses")]
+    drives = [*driven(score), *driven(score, group="masses")]
     masses = table("Picking up", drives).rows[-1]
     assert masses[0] == "all"
     assert "(1)" in masses[1]

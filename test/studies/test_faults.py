@@ -1,5 +1,6 @@
 """The evaluation of faults: broken inputs are broken as described, and what escapes is noticed."""
 
+import math
 import os
 import subprocess
 import sys
@@ -14,10 +15,11 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
 from wam_ros.messages import joint_state
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, big_endian, broken, leaves
-from wam_studies.faults.page import faults_section, report
 from wam_studies.faults.parameter_faults import UNKNOWN_CODES, parameter_set
-from wam_studies.faults.trials import FAULTS, FaultKind, FaultTrial, KindResult, played
-from wam_studies.faults.watched_stack import StackSource, WatchedStack
+from wam_studies.faults.soak import SoakStudy
+from wam_studies.faults.study import KINDS, FaultStudy, run_fault
+from wam_studies.faults.trials import KEPT, FaultCase, FaultTrial
+from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 NOW = 5_000_000_000
@@ -110,35 +112,34 @@ def test_sets_that_must_be_refused_are_refused_by_the_parameter_classes() -> Non
     assert len(seen) == 8
 
 
-def result(*escapes: str) -> KindResult:
-    trials = [FaultTrial(3, "a fault", 10, escapes, 0.002, 1.5), FaultTrial(4, "a loss", 1, (), 0.001, 0.5, 0.042)]
-    return KindResult("messages", "messages", 1, trials, 2.0)
+def trial(kind: str, *escapes: str) -> FaultTrial:
+    return FaultTrial(kind, "a fault", 10, escapes, 0.002, 1.5, 0.042 if kind == "losses" else math.nan)
 
 
-def test_the_report_counts_and_says_how_to_repeat_an_escape() -> None:
-    text = report([result("the arm moved")])
-    assert "11 messages" in text
-    assert "wam evaluate faults --only messages --count 1 --seed 1 --first 3" in text
-    assert "42" in text
-    assert "--only" not in report([result()])
-
-
-def test_a_kind_is_stopped_after_many_escapes() -> None:
-    def play(configuration: Any, seed: int, first: int, count: int) -> Any:
-        yield from (FaultTrial(i, "bad", escapes=("it escaped",)) for i in range(first, first + count))
-
-    kind = FaultKind("bad", "", "trials", 100, 1, play)
-    assert len(played(kind, CONFIGURATION, 1, 0, 100, lambda: 0.0).trials) == FAULTS.most_escapes
-
-
-def test_kinds_that_were_not_played_keep_their_rows() -> None:
-    first = faults_section([result()], "a", "")
-    others = faults_section([result()._replace(kind="bags", unit="bags")], "b", first)
-    again = faults_section([result("the arm moved")], "c", others)
-    assert [line.split("|")[1:4] for line in again.splitlines()[4:]] == [
-        [" messages ", " 11 messages ", " 1 "],
-        [" bags ", " 11 bags ", " 0 "],
+def test_escapes_are_counted_by_kind_and_each_is_listed() -> None:
+    study = FaultStudy(CONFIGURATION)
+    records = [trial("messages", "the arm moved"), trial("messages"), trial("losses")]
+    scores = study.score(records)
+    assert {row.name: row.found.value for row in scores.rows} == {"escapes, messages": 1.0, "escapes, losses": 0.0}
+    assert scores.missed == ["escapes, messages: 1, required 0"]
+    assert list(scores.tables[0].rows) == [
+        ["messages", "20 messages", "0.0020", "1.5", "–"],
+        ["losses", "10 losses", "0.0020", "1.5", "42"],
     ]
+    assert [study.failure(one) for one in records] == ["messages, a fault: the arm moved", "", ""]
+
+
+def test_cases_are_the_trials_of_each_kind() -> None:
+    found = list(FaultStudy(CONFIGURATION, ("parameters", "bags"), trials=2).cases(3))
+    assert [str(case) for case in found] == [
+        "parameters 0, seed 3", "parameters 1, seed 3", "bags 0, seed 3", "bags 1, seed 3",
+    ]  # fmt: skip
+    assert all(case.configuration.shared.timing.mode == "lockstep" for case in found)
+    assert {case.kind for case in FaultStudy(CONFIGURATION, short=True).cases(1)} == {
+        name for name, kind in KINDS.items() if kind.short
+    }
+    with pytest.raises(ValueError, match="--kinds is 'rain'; choose from messages"):
+        FaultStudy(CONFIGURATION, ("rain",))
 
 
 # what is watched, on the nodes
@@ -170,41 +171,43 @@ def test_what_escapes_is_noticed(domain_id: int) -> None:
         assert "unexpected ZeroDivisionError" in stack.escapes[0]
 
 
-def test_a_node_that_ends_is_an_escape_and_the_next_trial_has_all_nodes(domain_id: int) -> None:
-    with StackSource(in_lockstep()) as source:
+def test_a_node_that_ends_is_an_escape_and_the_next_trial_has_all_nodes(
+    domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    case = FaultCase(in_lockstep(), "planted", 1, 0, "")
 
-        def end_a_node(stack: WatchedStack) -> int:
-            stack.commander.create_timer(0.001, lambda: 1 // 0)  # a node without tolerance
-            stack.wait(lambda: False)
-            return 1
+    def end_a_node(stack: WatchedStack) -> int:
+        stack.commander.create_timer(0.001, lambda: 1 // 0)  # a node without tolerance
+        stack.wait(lambda: False)
+        return 1
 
-        ended = source.trial(0, "planted", end_a_node)
-        assert "a node ended: ZeroDivisionError" in ended.escapes[0]
-        assert source.trial(1, "nothing", lambda stack: 1).escapes == ()
+    ended = watched_trial(case, "planted", end_a_node)
+    assert "a node ended: ZeroDivisionError" in ended.escapes[0]
+    assert watched_trial(case, "nothing", lambda stack: 1).escapes == ()
+    KEPT.discard()
 
 
 @pytest.mark.slow
 def test_nothing_escapes_in_the_short_form(domain_id: int) -> None:
-    command = [sys.executable, "-m", "wam_cli.main", "evaluate", "faults", "--short", "--seed", "1"]
+    command = [sys.executable, "-m", "wam_cli.main", "evaluate", "faults", "--short", "--fresh"]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=2 * LONG, check=False)
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr[-2000:]}"
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_nothing(domain_id: int) -> None:
-    from wam_studies.faults import interruptions
-
-    assert [trial.escapes for trial in interruptions.play(1, 1, 1)] == [()]
+def test_ctrl_c_leaves_nothing(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    assert run_fault(FaultCase(CONFIGURATION, "interruptions", 1, 1, "")).escapes == ()
 
 
 @pytest.mark.slow
-def test_a_short_soak_loses_nothing(domain_id: int) -> None:
-    from wam_studies.faults.soak import soak
-
-    seconds: list[int] = []
-    found = soak(in_lockstep(), 4.0, lambda done, of: seconds.append(done))
-    assert found.missed == []
-    assert found.seconds > 3.0
-    assert found.messages > 10_000
-    assert "lost messages | none" in found.section("make soak")
+def test_a_short_soak_loses_nothing(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    study = SoakStudy(in_lockstep(), 4.0)
+    found = [study.run(case) for case in study.cases(1)]
+    assert study.score(found).missed == []
+    assert study.failure(found[0]) == ""
+    assert found[0].seconds > 3.0
+    assert found[0].messages > 10_000

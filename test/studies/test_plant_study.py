@@ -17,14 +17,8 @@ PROMISED = {
     "linear surface": 2e-3,  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
     "hardening surface": 2e-3,
     "impact": 5e-3,  # (3.1) 0.5 %
-    "actuator cycle": 1e-2,  # (5.20) 1 %, at every moment of 6 s
     "backlash in the loop": 1e-2,
     "backlash in a torque loop": 2e-3,  # a step of the plant is a thousandth of a cycle
-    "stiction cycle, peak to peak": 2e-2,
-    "stiction cycle, period": 2e-2,
-    "lower resonance": 3e-3,
-    "upper resonance": 3e-3,
-    "friction by tension, breakaway": 1e-3,  # the motor needs some steps to be seen moving
     "added friction, breakaway": 2e-3,  # and the link some more
     "damping of the circuit, decay": 1e-2,  # explicit damping, h d N^2/J
     "amplifier, time to the continuous limit": 1e-3,  # a period of 1 ms

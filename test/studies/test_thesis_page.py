@@ -10,53 +10,11 @@ from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, not_sho
 ROOT = Path(__file__).resolve().parents[2]
 CLAIMS = [claim for rows in load(ROOT / "docs" / "thesis.yaml").values() for claim in rows]
 # those that claim something
-SECTIONS = [
-    "1.1.1",
-    "2.1.1",
-    "2.1.2",
-    "2.2",
-    "2.3",
-    "3.1",
-    "3.1.2",
-    "3.2.1",
-    "3.2.2",
-    "3.2.3",
-    "3.2.4",
-    "3.2.5",
-    "3.2.6",
-    "4.1.1",
-    "4.1.2",
-    "4.2",
-    "4.3.1",
-    "4.3.2",
-    "4.4",
-    "5.1.2",
-    "5.2",
-    "5.3",
-    "5.4",
-    "5.5",
-    "5.5.1",
-    "5.5.2",
-    "5.5.3",
-    "5.5.4",
-    "5.6",
-    "5.7",
-    "6.2.2",
-    "6.2.3",
-    "6.2.4",
-    "6.2.5",
-    "6.3.1",
-    "6.3.2",
-    "6.4.1",
-    "6.4.2",
-    "6.4.3",
-    "6.4.4",
-    "6.4.5",
-    "6.5",
-    "7.2.1",
-    "7.2.2",
-    "7.3",
-]
+SECTIONS = """
+1.1.1 2.1.1 2.1.2 2.2 2.3 3.1 3.1.2 3.2.1 3.2.2 3.2.3 3.2.4 3.2.5 3.2.6 4.1.1 4.1.2 4.2 4.3.1 4.3.2
+4.4 5.1.2 5.2 5.3 5.4 5.5 5.5.1 5.5.2 5.5.3 5.5.4 5.6 5.7 6.2.2 6.2.3 6.2.4 6.2.5 6.3.1 6.3.2 6.4.1
+6.4.2 6.4.3 6.4.4 6.4.5 6.5 7.2.1 7.2.2 7.3
+"""
 
 
 def test_every_reference_leads_somewhere() -> None:
@@ -66,7 +24,7 @@ def test_every_reference_leads_somewhere() -> None:
 
 def test_every_section_that_claims_something_has_a_row() -> None:
     named = {number for claim in CLAIMS for number in re.findall(r"\d(?:\.\d)+", claim.section)}
-    assert set(SECTIONS) <= named
+    assert set(SECTIONS.split()) <= named
 
 
 @pytest.mark.parametrize(

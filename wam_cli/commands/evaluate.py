@@ -8,9 +8,7 @@ from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
-from wam_cli.commands import evaluate_faults as faults
 from wam_cli.commands import evaluate_figures as figures
-from wam_cli.commands import evaluate_soak as soak
 from wam_cli.options import (
     COUNT,
     PAGE,
@@ -28,8 +26,6 @@ from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evalu
 from wam_studies.page import block, report, with_section
 
 OTHERS = {
-    "faults": (faults, "wrong messages, lost nodes, full disks, Ctrl-C"),
-    "soak": (soak, "a long run: memory and lost messages"),
     "figures": (figures, "draw the figures of chapters 3 to 6 with the simulated plant"),
 }
 
@@ -80,8 +76,11 @@ def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
     if isinstance(default, bool):
         parser.add_argument(name, action="store_true", help=text)
     elif isinstance(default, tuple):
-        chosen = " ".join(default) or "none"
-        parser.add_argument(name, nargs="+", default=default, metavar="NAME", help=f"{text}; default: {chosen}")
+        choices = one.metadata["choices"]
+        given = ", ".join(choices).replace("%", "%%")
+        chosen = "all of them" if default == choices else " ".join(default) or "none"
+        text = f"{text}: {given}; default: {chosen}"
+        parser.add_argument(name, nargs="+", choices=choices, default=default, metavar="NAME", help=text)
     else:
         least = one.metadata["least"]
         kind: Any = type(default)
@@ -96,7 +95,7 @@ def run_study(given: argparse.Namespace) -> int:
     every = [case for own in cases.values() for case in own]
     if given.values:
         refuse_overridden(given, {name for case in every for name in study.own_values(case)}, "each case")
-    with batch_of(given, max(len(every), 1)) as batch:
+    with batch_of(given, 1 if study.over_topics else max(len(every), 1)) as batch:
         measured = evaluate(study, cases, *batch)
     if given.only:
         print("\n".join(map(study.details, measured.total)))
@@ -125,7 +124,8 @@ def program(name: str, kind: type[Study[Any, Any]]) -> int:
 def _study(given: argparse.Namespace) -> Study[Any, Any]:
     """The study with its options; refuses what could not be done after the work."""
     kind: type[Study[Any, Any]] = given.study
-    require_effect("--set", option_values(given.values))
+    if not kind.over_topics:
+        require_effect("--set", option_values(given.values))
     if given.write:
         with_section(given.write, given.part, "")
     own = {one.name: getattr(given, one.name) for one in _options(kind)}
@@ -140,8 +140,13 @@ def _words(given: argparse.Namespace, study: Study[Any, Any]) -> str:
     for one in _options(type(study)):
         value, name = getattr(study, one.name), f"--{one.name.replace('_', '-')}"
         if value != one.default:
-            words += [name] if value is True else [name, *(value if isinstance(value, tuple) else [f"{value:g}"])]
+            words += [name] if value is True else [name, *_texts(value)]
     return shlex.join(words)
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    """The words of a value."""
+    return value if isinstance(value, tuple) else (value if isinstance(value, str) else f"{value:g}",)
 
 
 def _write(given: argparse.Namespace, measured: Measurement) -> None:

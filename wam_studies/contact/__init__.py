@@ -2,12 +2,11 @@
 
 scenarios      what is simulated on the arm as stated: poses, moves, contacts, a true arm drawn from a seed
 moves, foam    random moves within the limits of the arm; a fixed foam post that it runs into
-simulation     play a scenario without ROS: records of truth and estimate
-contacts       true contacts, each with its estimate; free_motion: errors of the torques, false alarms
+simulation     play and score a scenario without ROS
 degradations   how the true arm and its signals differ from what the estimator states
 touches        contacts drawn wider than the estimator's prior, as exact forces; masses that are picked up
 recording      one degraded arm, its signals kept; replay: what the estimator reports on them
-trial          one case of either kind
+outcomes       what is reported of true contacts, between them, and of torques, for both
 rows           what is required of contacts, and of the arm as stated; degraded_rows: of the others
 bounds         what the torques cannot show, by the inference alone
 study          all cases in the harness; picture draws them

@@ -29,6 +29,7 @@ class BoundErrors:
     """What the inference alone is given."""
 
     count: int = 1200  # contacts
+    seed: int = 1
     exact: float = 2e-3  # N m, sd that stands for none
     constant: float = 0.02  # largest error of a torque constant, as in the realistic mix
 
@@ -47,12 +48,12 @@ class BoundRow(NamedTuple):
     sd: Array
     constant: float
 
-    def cells(self, configuration: Configuration, seed: int) -> list[str]:
+    def cells(self, configuration: Configuration) -> list[str]:
         """The row as text: errors of the position at each force, share of small sd, share that the set holds."""
         arm = configuration.shared.arm
         own = configuration.node("contact_estimator", ContactEstimatorParameters)
         body, inference = RigidBody(arm), ContactInference(arm, RigidBody(arm), own.inference)
-        random, moves = np.random.default_rng((seed, 4)), MoveGenerator(arm)
+        random, moves = np.random.default_rng((ERRORS.seed, 4)), MoveGenerator(arm)
         matrix = np.array(TransmissionMap.of(arm).joint_from_motor)
         to_joints = np.linalg.inv(matrix).T
         errors: dict[float, list[float]] = {force: [] for force in TOUCHES.levels}
@@ -85,8 +86,8 @@ class BoundRow(NamedTuple):
         return [self.name, middle, most, *shares, f"{100.0 * np.mean(detected):.0f}"]
 
 
-def bounds(configuration: Configuration, seed: int, errors: Array) -> list[list[str]]:
-    """Rows of `BOUNDS` as text; `errors` as `ReplayScore.torque_errors`."""
+def bounds(configuration: Configuration, errors: Array) -> list[list[str]]:
+    """Rows of `BOUNDS` as text; `errors` (2, n), N m, rms with all motors sliding, and of all."""
     exact = np.full(errors.shape[1], ERRORS.exact)
     sliding, every = errors
     constant = ERRORS.constant
@@ -97,4 +98,4 @@ def bounds(configuration: Configuration, seed: int, errors: Array) -> list[list[
         BoundRow("the same, of one moment", sliding, constant),
         BoundRow("the same, some motors at rest", every, constant),
     ]
-    return [row.cells(configuration, seed) for row in rows]
+    return [row.cells(configuration) for row in rows]

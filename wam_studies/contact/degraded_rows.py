@@ -4,26 +4,30 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from wam_studies.contact.replay import MassOutcome, ReplayScore, TouchOutcome
+from wam_studies.contact.outcomes import ContactOutcome, ContactScore, MassOutcome
 from wam_studies.contact.rows import (
     COLUMNS,
     EVERY_ARM,
+    IDENTIFIED_ARM,
     IDENTIFIED_MIX,
     LINK_COLUMNS,
     Allowed,
     Contacts,
     ScoreColumn,
+    Scores,
     covered,
     detected_within,
+    false_alarms,
+    in_groups,
     link_rows,
     near,
     percent,
     position_rows,
     share_of,
+    torque_z,
 )
 from wam_studies.contact.touches import PICKING_UP
 from wam_studies.scores import NONE, Interval, Row, ScoreTable, events, exact, share
@@ -52,37 +56,20 @@ class DegradedLimits:
 DEGRADED = DegradedLimits()
 
 
-class DriveScore(NamedTuple):
-    """The score of a drive, with the contacts that were drawn and whether the arm was identified before."""
-
-    seed: int
-    contacts: str
-    is_identified: bool
-    score: ReplayScore
+def groups_of(drives: Scores, group: str) -> dict[str, list[ContactScore]]:
+    """Scores by degradation of the drives of a group."""
+    own = in_groups(drives, group)
+    return {name: [one for one in own if one.name == name] for name in dict.fromkeys(one.name for one in own)}
 
 
-Scores = Sequence[ReplayScore]
-
-
-def groups_of(drives: Sequence[DriveScore], contacts: str, is_identified: bool = False) -> dict[str, list[ReplayScore]]:
-    """Scores by degradation of the drives with some contacts."""
-    own = [one.score for one in drives if (one.contacts, one.is_identified) == (contacts, is_identified)]
-    return {name: [s for s in own if s.degradation == name] for name in dict.fromkeys(s.degradation for s in own)}
-
-
-def outcomes(scores: Scores, *kinds: str) -> list[TouchOutcome]:
+def outcomes(scores: Scores, *kinds: str) -> list[ContactOutcome]:
     """Contacts in motion, of some kinds or of all."""
     every = [one for score in scores for one in score.outcomes if one.moving]
     return [one for one in every if not kinds or one.kind in kinds]
 
 
-def _all(groups: Mapping[str, Scores]) -> list[ReplayScore]:
+def _all(groups: Mapping[str, Scores]) -> list[ContactScore]:
     return [score for own in groups.values() for score in own]
-
-
-def false_alarms(scores: Scores) -> Interval:
-    """Detections without contact per second; observed: seconds without contact."""
-    return _per_second(sum(len(score.alarms) for score in scores), sum(score.free_seconds for score in scores))
 
 
 def sure_and_wrong(scores: Scores) -> Interval:
@@ -92,30 +79,29 @@ def sure_and_wrong(scores: Scores) -> Interval:
     return exact(sum(one.sure_and_wrong for one in every) / seconds, len(every)) if seconds else NONE
 
 
-def _per_second(count: int, seconds: float) -> Interval:
-    found = events(count, seconds)
-    if not found.observed:
-        return found
-    return Interval(found.value / seconds, found.low / seconds, found.high / seconds, found.observed)
+def alarm_rate(scores: Scores) -> Interval:
+    """False alarms by second; observed: seconds without contact."""
+    found, seconds = false_alarms(scores), sum(score.free_seconds for score in scores)
+    return found._replace(**{end: getattr(found, end) / seconds for end in found._fields[:3]}) if seconds else found
 
 
 def _per_minute(name: str, found: Interval, allowed: Allowed) -> Row:
     return Row(name, found, "1/min", 60.0, *allowed)
 
 
-def degraded_rows(drives: Sequence[DriveScore]) -> Iterator[Row]:
+def degraded_rows(drives: Scores) -> Iterator[Row]:
     """What is required; none without drives."""
-    wide, identified = groups_of(drives, "wide"), _all(groups_of(drives, "level", True))
+    wide, identified = groups_of(drives, "wide"), _all(groups_of(drives, IDENTIFIED_ARM))
     if not wide:
         return
     lasting, both = _all(groups_of(drives, "lasting")), [*_all(wide), *identified]
     moving, masses = outcomes(both), outcomes(_all(groups_of(drives, "masses")))
     alone = {name: own for name, own in wide.items() if name not in (STATED_ARM, MIX)}
     if alone:
-        name, found = _worst(alone, false_alarms, DEGRADED.alarms)
+        name, found = _worst(alone, alarm_rate, DEGRADED.alarms)
         yield _per_minute(f"false alarms, {ALONE}, the worst: {name}", found, DEGRADED.alarms)
-    yield _per_minute(f"false alarms, {MIX}", false_alarms(wide.get(MIX, ())), DEGRADED.alarms_of_mix)
-    yield _per_minute(f"false alarms, {MIX}, identified", false_alarms(identified), DEGRADED.alarms_of_mix)
+    yield _per_minute(f"false alarms, {MIX}", alarm_rate(wide.get(MIX, ())), DEGRADED.alarms_of_mix)
+    yield _per_minute(f"false alarms, {MIX}, identified", alarm_rate(identified), DEGRADED.alarms_of_mix)
     for row in position_rows("outer link", IDENTIFIED_MIX, outcomes(identified, "outer")):
         yield row._replace(name=f"{row.name}, {MIX}, identified")
     if alone:
@@ -162,13 +148,13 @@ def contacts_needed() -> int:
     return next(n for n, span in spans if span.low >= low and span.high <= high)
 
 
-def degraded_tables(drives: Sequence[DriveScore]) -> Iterator[ScoreTable]:
+def degraded_tables(drives: Scores) -> Iterator[ScoreTable]:
     """Tables by degradation, by kind of contact and force, by mass; none without drives."""
     wide = groups_of(drives, "wide")
     if not wide:
         return
     named = {f"{name}, as configured": own for name, own in groups_of(drives, "level").items()}
-    named |= {f"{name}, identified": own for name, own in groups_of(drives, "level", True).items()}
+    named |= {f"{name}, identified": own for name, own in groups_of(drives, IDENTIFIED_ARM).items()}
     quiet = f"{60.0 * events(0, 1.0).high:.0f} s"
     note = (
         f"With {contacts_needed()} contacts or more the 95 % interval of a measured 91 % lies within what is required; "
@@ -191,10 +177,10 @@ def _detection(groups: Mapping[str, Scores]) -> tuple[list[str], list[list[str]]
     rows = []
     for name, own in groups.items():
         limits = DEGRADED.alarms_of_mix if name.startswith(MIX) else DEGRADED.alarms
-        alarms = _per_minute(name, false_alarms(own), limits)
+        alarms = _per_minute(name, alarm_rate(own), limits)
         value, _, _, verdict = alarms.cells
         inner = detected_within(near(outcomes(own, "inner"), 10.0), DEGRADED.inner_within, or_before=True)
-        ratio = max((score.torque_z for score in own), default=math.nan)
+        ratio = max((torque_z([score]).value for score in own), default=math.nan)
         warned = f"{100.0 * float(np.mean([score.warnings for score in own])):.0f}"
         started = " / ".join(_text(_started(own, k)) for k in (0, 1))
         rows.append([name, value, verdict, _text(inner), f"{ratio:.1f}", warned, started])

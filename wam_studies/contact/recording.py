@@ -16,7 +16,7 @@ from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
 from wam_studies.contact.degradations import Degradation, Values, drawn
 from wam_studies.contact.moves import MoveGenerator
-from wam_studies.contact.scenarios import RANGES, base_values
+from wam_studies.contact.scenarios import base_values, moves_and_stops
 from wam_studies.contact.touches import (
     KINDS,
     LASTING_KINDS,
@@ -95,17 +95,8 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     degradation = drawn(drive.degradation, arm, np.random.default_rng((drive.seed, 1, name)))
     random = np.random.default_rng((drive.seed, 2, name))
     moves = MoveGenerator(arm)
-    start = here = moves.pose(random)
-    steps = [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("settle", RANGES.settle)]
-    left = drive.seconds - RANGES.release - RANGES.settle
-    while left > 0.0:
-        (move,) = moves.moves(random, here, 1, before=steps[-1].posture)
-        steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
-        stop = float(random.choice((0.0, 0.0, 0.0, 0.1, 0.4)))
-        if stop:
-            steps.append(ScenarioStep("stop", stop))
-        left -= move.seconds + stop
-        here = move.posture
+    start = moves.pose(random)
+    steps = moves_and_stops(moves, random, start, drive.seconds, (0.0, 0.0, 0.0, 0.1, 0.4))
     longer = {"masses": TIMES.spacing_of_masses, "lasting": TIMES.spacing_of_lasting}
     spacing = longer.get(drive.contacts, TIMES.spacing)
     times = np.arange(TIMES.warm_up, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)

@@ -8,18 +8,16 @@ from typing import Final, NamedTuple
 
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
-from wam_studies.contact.contacts import EvaluatedContact
-from wam_studies.contact.free_motion import ContactFreeTime, TorqueErrors
-from wam_studies.contact.replay import TouchOutcome
+from wam_studies.contact.outcomes import EVALUATION, ContactOutcome, ContactScore
 from wam_studies.contact.scenarios import KINDS, RANGES
 from wam_studies.scores import ANY, NONE_AT_ALL, Bound, Interval, Row, events, quantile, rms, share
 
 IN_MOTION = ("moving", "free")
 DITHERED = "at rest, dithered"
+IDENTIFIED_ARM = "identified"  # group of the drives of an arm that was identified before
 
-
-EstimatedContact = EvaluatedContact | TouchOutcome
-Contacts = Sequence[EstimatedContact]
+Contacts = Sequence[ContactOutcome]
+Scores = Sequence[ContactScore]
 Allowed = tuple[Bound, Bound]  # required and target values
 FREE: Final[Allowed] = (ANY, ANY)
 
@@ -41,7 +39,6 @@ class ContactLimits:
 
     near: float = 0.2  # of a force: 5 N are 4 to 6 N
     small_sd: float = 0.02  # m
-    sure: float = 0.95  # probability of a link
     rough_force: tuple[float, float] = (12.0, 28.0)  # N, of contacts with the greatest friction
     quiet: tuple[float, float] = (120.0, 600.0)  # s that show no false alarm, required and target
     in_time: Mapping[float, Allowed] = field(default_factory=dict)  # share of 5 N detected within s
@@ -92,7 +89,7 @@ def share_of(hits: Sequence[bool]) -> Interval:
     return share(sum(hits), len(hits))
 
 
-def near(found: Contacts, force: float) -> list[EstimatedContact]:
+def near(found: Contacts, force: float) -> list[ContactOutcome]:
     """Contacts of about this force, N."""
     return [one for one in found if abs(one.force - force) <= STATED.near * force]
 
@@ -105,10 +102,10 @@ def detected_within(found: Contacts, seconds: float, or_before: bool = False) ->
 
 def error_of(found: Contacts, level: float = 0.5) -> Interval:
     """A quantile of the position error, m."""
-    return quantile([abs(one.error) for one in found], level)
+    return quantile([one.error for one in found], level)
 
 
-def small_sd(found: Contacts) -> list[EstimatedContact]:
+def small_sd(found: Contacts) -> list[ContactOutcome]:
     """Contacts with a small standard deviation of the position."""
     return [one for one in found if one.position_sd < STATED.small_sd]
 
@@ -128,7 +125,7 @@ def detected(found: Contacts) -> Interval:
     return share_of([one.detected for one in found])
 
 
-def rough(found: Contacts) -> list[EstimatedContact]:
+def rough(found: Contacts) -> list[ContactOutcome]:
     """Strong contacts with the greatest friction."""
     low, high = STATED.rough_force
     return [one for one in found if abs(one.friction - RANGES.rough) < 1e-9 and low <= one.force <= high]
@@ -164,30 +161,20 @@ def position_rows(links: str, limits: ContactLimits, found: Contacts) -> Iterato
 def link_rows(limits: ContactLimits, found: Contacts) -> Iterator[Row]:
     """Links and 90 % sets of all contacts."""
     yield percent("wrong link", wrong_link(found), limits.wrong)
-    yield percent("wrong link with a probability above 0.95", wrong_link(found, limits.sure), limits.wrong_and_sure)
+    yield percent("wrong link with a probability above 0.95", wrong_link(found, EVALUATION.sure), limits.wrong_and_sure)
     yield percent("90 % set contains the truth", covered(found), limits.covered)
     yield percent("90 % set contains the truth at 20 N, mu 0.8", covered(rough(found)), limits.covered_rough)
 
 
-class ScenarioScore(NamedTuple):
-    """Contribution of one scenario; `not_made` counts the planned contacts that did not happen."""
-
-    name: str
-    contacts: list[EvaluatedContact]
-    excluded: int
-    not_made: int
-    torque_errors: TorqueErrors
-    contact_free: ContactFreeTime
-    failure: str
+def in_groups(scores: Scores, *groups: str) -> list[ContactScore]:
+    """Scores of some groups."""
+    return [score for score in scores if score.group in groups]
 
 
-Scenarios = Sequence[ScenarioScore]
-
-
-def contacts_of(scores: Scenarios, group: str = "moving") -> list[EvaluatedContact]:
+def contacts_of(scores: Scores, group: str = "moving") -> list[ContactOutcome]:
     """Contacts of a group; in motion, those during which the arm moved at the start and at the evaluation."""
-    every = [contact for scenario in scores for contact in scenario.contacts if contact.group == group]
-    return [contact for contact in every if group != "moving" or (contact.moving and contact.began_moving)]
+    every = [one for score in in_groups(scores, group) for one in score.outcomes]
+    return [one for one in every if group != "moving" or one.moving]
 
 
 @cache
@@ -203,12 +190,12 @@ def outer_links(arm: Arm) -> str:
     return " or ".join(outer_covers(arm)).replace("_", " ")
 
 
-def on_outer_link(scores: Scenarios, arm: Arm, group: str = "moving") -> list[EvaluatedContact]:
+def on_outer_link(scores: Scores, arm: Arm, group: str = "moving") -> list[ContactOutcome]:
     """Contacts of a group on the covers along which a position can be measured."""
     return [contact for contact in contacts_of(scores, group) if contact.cover in outer_covers(arm)]
 
 
-def stated_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
+def stated_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
     """What is required on the arm as the estimator's model states it."""
     limits = TORQUES.get(arm.name, ((math.inf,) * len(arm.joints.names),) * 2)
     for when, groups, state in (("in motion", IN_MOTION, "moving"), (DITHERED, ("dither",), "still")):
@@ -216,27 +203,35 @@ def stated_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
             required, target = ((0.0, end) if math.isfinite(end) else ANY for end in ends)
             yield row._replace(required=required, target=target)
     name = "false alarms in free motion with stops"
-    yield Row(name, _alarms(scores, True), "", 1.0, NONE_AT_ALL, NONE_AT_ALL, STATED.quiet)
+    yield Row(
+        name,
+        false_alarms(in_groups(scores, "free")),
+        "",
+        1.0,
+        NONE_AT_ALL,
+        NONE_AT_ALL,
+        STATED.quiet,
+    )
     yield from position_rows(outer_links(arm), STATED, on_outer_link(scores, arm))
     yield from link_rows(STATED, contacts_of(scores))
 
 
-def further_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
+def further_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
     """What is not required of it."""
     links, outer, moving = outer_links(arm), on_outer_link(scores, arm), contacts_of(scores)
     inner = [one for one in moving if one.cover not in outer_covers(arm) and one.right_link]
     named = " or ".join(name for name in arm.covers.names if name not in outer_covers(arm)).replace("_", " ")
-    sure = share_of([one.probability > STATED.sure for one in moving if one.detected])
-    moments = quantile([one.moment_error / one.moment for one in inner], 0.5)
+    sure = share_of([one.probability > EVALUATION.sure for one in moving if one.detected])
+    moments = quantile([one.moment_error for one in inner], 0.5)
     yield percent(f"90 % set contains the truth, {links}", covered(outer))
     yield percent("link identified with a probability above 0.95", sure)
     yield percent(f"{named}: relative error of the moment, median", moments)
     bound = share_of([one.least_force <= one.force for one in inner])
     yield percent(f"{named}: true force is at least the reported bound", bound)
-    ratios = quantile([abs(z) for z in z_scores(outer)], 0.683)
+    ratios = quantile(z_scores(outer), 0.683)
     yield Row("position: 68 % quantile of error over reported sd", ratios)
-    yield Row("torque: rms of error over reported sd, in motion", _torque_z(scores))
-    yield Row("false alarms between contacts", _alarms(scores, False))
+    yield Row("torque: rms of error over reported sd, in motion", torque_z(in_groups(scores, *IN_MOTION)))
+    yield Row("false alarms between contacts", false_alarms(in_groups(scores, "moving", "rest", "dither")))
     for when, groups, state in (("while every motor slides", IN_MOTION, "sliding"), ("at rest", ("rest",), "still")):
         yield from torque_rows(scores, arm, when, groups, state)
     for group, when in (("rest", "at rest"), ("dither", DITHERED)):
@@ -251,24 +246,23 @@ def further_rows(scores: Scenarios, arm: Arm) -> Iterator[Row]:
         yield centimetres(f"position on the {links}, {kind}, median error", error_of(own))
 
 
-def torque_rows(scores: Scenarios, arm: Arm, when: str, groups: Sequence[str], state: str) -> Iterator[Row]:
+def torque_rows(scores: Scores, arm: Arm, when: str, groups: Sequence[str], state: str) -> Iterator[Row]:
     """Errors of the external torque of each joint in some groups; `state` is 'moving', 'still' or 'sliding'."""
-    parts = [scenario.torque_errors for scenario in scores if scenario.torque_errors.group in groups]
+    parts = [score.torques for score in in_groups(scores, *groups)]
     counts: list[int] = [getattr(part, f"{state}_count") for part in parts]
     for i, name in enumerate(arm.joints.names):
         found = rms([getattr(part, state)[i] for part in parts], counts)
         yield Row(f"external torque {when}, rms, {name}", found, "N m")
 
 
-def _alarms(scores: Scenarios, is_free_motion: bool) -> Interval:
-    """False alarms in scenarios of free motion, or between the contacts of all others."""
-    parts = [scenario.contact_free for scenario in scores]
-    chosen = [part for part in parts if (part.group == "free") is is_free_motion]
-    return events(sum(part.alarms for part in chosen), sum(part.seconds for part in chosen))
+def false_alarms(scores: Scores) -> Interval:
+    """Detections that start without contact, and the seconds without."""
+    return events(sum(score.alarms for score in scores), sum(score.free_seconds for score in scores))
 
 
-def _torque_z(scores: Scenarios) -> Interval:
-    parts = [scenario.torque_errors for scenario in scores if scenario.torque_errors.group in IN_MOTION]
+def torque_z(scores: Scores) -> Interval:
+    """Error over stated sd of the external torques in motion."""
+    parts = [score.torques for score in scores]
     joints = len(parts[0].moving_z) if parts else 1
     return rms([sum(part.moving_z) for part in parts], [joints * part.moving_count for part in parts])
 
@@ -298,7 +292,7 @@ COLUMNS = (
 )
 LINK_COLUMNS = (
     ScoreColumn("wrong link, %", lambda found: _cell(wrong_link(found))),
-    ScoreColumn("wrong, p > .95, %", lambda found: _cell(wrong_link(found, STATED.sure))),
+    ScoreColumn("wrong, p > .95, %", lambda found: _cell(wrong_link(found, EVALUATION.sure))),
     ScoreColumn("90 % set contains the truth, %", lambda found: _cell(covered(found))),
     ScoreColumn("detected in the end, %", lambda found: _cell(detected_within(found, 1e9, True))),
 )

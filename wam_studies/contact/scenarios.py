@@ -205,16 +205,7 @@ class ScenarioGenerator:
     def _free(self, i: int) -> BenchmarkScenario:
         random = self._random(2, i)
         start = self._moves.pose(random)
-        steps, left = _opening(), RANGES.free_seconds - RANGES.release - RANGES.settle
-        here = start
-        while left > 0.0:
-            (move,) = self._moves.moves(random, here, 1, before=steps[-1].posture)
-            steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
-            stop = float(random.choice((0.0, 0.0, 0.1, 0.4)))
-            if stop:
-                steps.append(ScenarioStep("stop", stop))
-            left -= move.seconds + stop
-            here = move.posture
+        steps = moves_and_stops(self._moves, random, start, RANGES.free_seconds, (0.0, 0.0, 0.1, 0.4))
         values = self._values(random, start, [])
         if i % 2:  # no payload in the others, as in the scenarios with contact
             values["driver:mismatch.payload"] = float(random.uniform(0.0, RANGES.payload))
@@ -267,6 +258,22 @@ def _drawn_cover(share: float, covers: int) -> int:
 
 def _opening() -> list[ScenarioStep]:
     return [ScenarioStep("release", RANGES.release, request="enable"), ScenarioStep("settle", RANGES.settle)]
+
+
+def moves_and_stops(
+    moves: MoveGenerator, random: np.random.Generator, start: Sequence[float], seconds: float, stops: Sequence[float]
+) -> list[ScenarioStep]:
+    """Steps of a motion from a pose, for at least some seconds; a stop, s, that is drawn follows each move."""
+    steps, left, here = _opening(), seconds - RANGES.release - RANGES.settle, start
+    while left > 0.0:
+        (move,) = moves.moves(random, here, 1, before=steps[-1].posture)
+        steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
+        stop = float(random.choice(stops))
+        if stop:
+            steps.append(ScenarioStep("stop", stop))
+        left -= move.seconds + stop
+        here = move.posture
+    return steps
 
 
 def _mismatch(random: np.random.Generator, arm: Arm) -> dict[str, Any]:

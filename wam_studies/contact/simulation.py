@@ -1,12 +1,12 @@
-"""Play a scenario without ROS: the simulator's truth and the estimate in every outer period."""
+"""Play a scenario without ROS and score what the estimator reports in every outer period against the simulator."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from wam_control.contact.contact_inference import Hypothesis
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -16,57 +16,30 @@ from wam_description.signals import Load
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
-from wam_studies.contact.scenarios import BenchmarkScenario
+from wam_studies.contact.outcomes import (
+    EVALUATION,
+    Array,
+    ContactScore,
+    EstimatedMoment,
+    Mask,
+    TrueContact,
+    alarms,
+    outcome_of,
+    torque_errors,
+)
+from wam_studies.contact.scenarios import RANGES, BenchmarkScenario, PlannedContact
 
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
-
-
-class EstimatedHypothesis(NamedTuple):
-    """One hypothesis of the estimator."""
-
-    cover: str
-    probability: float
-    position: float  # m along the link, NaN if unknown
-    position_sd: float  # m
-    low: float  # m, ends of the 90 % set on this cover; NaN without one
-    high: float
-    force: tuple[float, float, float]  # N
-    moment: tuple[float, float, float]  # N m
-
-
-class Record(NamedTuple):
-    """One outer period: the simulator's truth and the estimate.
-
-    Attributes
-    ----------
-    stamp : ns.
-    q, qd : (n,), true, rad and rad/s.
-    thetad : (n,), of the motors, as measured, rad/s.
-    load : true, of the world on the arm.
-    torques : (n,), true external joint torques, N m, by the simulator's kinematics.
-    external : (n,), the estimated ones.
-    external_sd : (n,), their standard deviations; empty if not recorded.
-    in_contact : whether a contact was detected.
-    hypotheses : of the estimator, the most probable first.
-    """
-
-    stamp: int
-    q: tuple[float, ...]
-    qd: tuple[float, ...]
-    thetad: tuple[float, ...]
-    load: Load
-    torques: tuple[float, ...]
-    external: tuple[float, ...]
-    external_sd: tuple[float, ...]
-    in_contact: bool
-    hypotheses: tuple[EstimatedHypothesis, ...]
+SLIDING = 1.0  # rad/s of the slowest motor
 
 
 class Played(NamedTuple):
-    """A scenario with its records; `failure` is the reason of an early stop, else ''."""
+    """A scenario with its moments, the true loads and external torques of each, and why it ended early."""
 
     scenario: BenchmarkScenario
-    records: list[Record]
+    moments: list[EstimatedMoment]
+    loads: list[Load]
+    torques: list[tuple[float, ...]]
     failure: str
 
 
@@ -96,10 +69,6 @@ class LoadTorques:
         return tuple(result[self._n :].tolist())
 
 
-def _estimated(found: Hypothesis) -> EstimatedHypothesis:
-    return EstimatedHypothesis(*(getattr(found, name) for name in EstimatedHypothesis._fields))
-
-
 def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
     """Play a scenario without ROS."""
     configured = configuration.with_values(scenario.values)
@@ -109,7 +78,7 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
         finer = {"timing.substeps": 2 * configured.shared.timing.substeps}
         run = Simulation(configured.with_values(finer), scenario.steps)
     load_torques = LoadTorques(configured.shared.arm)
-    records: list[Record] = []
+    played = Played(scenario, [], [], [], "")
     done = False
     while not done:
         is_outer, stamp = run.driver.is_outer, run.driver.stamp
@@ -118,21 +87,112 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
         done = run.step()
         if load is None:
             continue
-        estimate = run.estimate
-        records.append(
-            Record(
-                stamp=stamp,
-                q=tuple(joints.position),
-                qd=tuple(joints.velocity),
-                thetad=tuple(motors.velocity),
-                load=load,
-                torques=load_torques.torques(joints.position, load),
-                external=estimate.external_torques,
-                external_sd=estimate.torque_sd,
-                in_contact=estimate.in_contact,
-                hypotheses=tuple(map(_estimated, estimate.hypotheses)),
-            )
-        )
+        is_moving = max(map(abs, joints.velocity)) > EVALUATION.moving
+        played.moments.append(EstimatedMoment(stamp * 1e-9, run.estimate, is_moving, min(map(abs, motors.velocity))))
+        played.loads.append(load)
+        played.torques.append(load_torques.torques(joints.position, load))
         if run.driver.safety.mode is Mode.FAULT:
-            return Played(scenario, records, run.driver.safety.fault)
-    return Played(scenario, records, run.scenario.failure)
+            return played._replace(failure=run.driver.safety.fault)
+    return played._replace(failure=run.scenario.failure)
+
+
+def force_of(load: Load) -> float:
+    """Size of a load's force, N."""
+    return math.hypot(*load.force)
+
+
+class Span(NamedTuple):
+    """Moments `first` to `last` (included) of one true contact."""
+
+    cover: str
+    first: int
+    last: int
+
+
+def spans(loads: Sequence[Load]) -> list[Span]:
+    """True contacts, in order of time."""
+    found: list[Span] = []
+    for i, load in enumerate(loads):
+        if force_of(load) < EVALUATION.least_force:
+            continue
+        if found and found[-1].cover == load.cover and i - found[-1].last <= 1 + EVALUATION.gap:
+            found[-1] = found[-1]._replace(last=i)
+        else:
+            found.append(Span(load.cover, i, i))
+    return found
+
+
+def score(played: Played, arm: Arm) -> ContactScore:
+    """Score a scenario."""
+    group, moments, found = played.scenario.group, played.moments, spans(played.loads)
+    counted = [span for span in found if _counts(played, span)]
+    acting = [_between(moments, span.first, span.last) for span in counted]
+    excluded, period = len(found) - len(counted), moments[1].time - moments[0].time
+    busy = np.zeros(len(moments), bool)
+    for span in found:
+        busy |= _between(moments, span.first, span.last + round(EVALUATION.edge / period))
+    return ContactScore(
+        name=played.scenario.name,
+        group=group,
+        outcomes=[
+            outcome_of(_contact(played, span), moments, arm.covers.length_of(span.cover), acts)
+            for span, acts in zip(counted, acting, strict=True)
+        ],
+        free_seconds=period * int((~busy).sum()),
+        alarms=alarms(moments, busy),
+        torques=torque_errors(moments, _truth(played, period), _settled(moments, found), SLIDING),
+        excluded=excluded,
+        not_made=max(0, len(played.scenario.planned) - len(found)),
+        failure=played.failure,
+    )
+
+
+def _between(moments: Sequence[EstimatedMoment], first: int, last: int) -> Mask:
+    at = np.arange(len(moments))
+    return (at >= first) & (at <= last)
+
+
+def _counts(played: Played, span: Span) -> bool:
+    """Whether a contact is neither too short nor too hard."""
+    hardest = max(map(force_of, played.loads[span.first : span.last + 1]))
+    lasts = played.moments[span.last].time - played.moments[span.first].time
+    return lasts >= EVALUATION.shortest - 1e-9 and hardest <= EVALUATION.greatest_force
+
+
+def _contact(played: Played, span: Span) -> TrueContact:
+    moments, begin = played.moments, played.moments[span.first].time
+    planned = _planned(played.scenario.planned, begin)
+    kind = planned.kind if planned else ""
+    wait = EVALUATION.settled if played.scenario.group == "moving" else EVALUATION.settled_at_rest
+    wait = EVALUATION.settled_in_foam if kind == "foam" else wait
+    due = max(i for i in range(span.first, span.last) if moments[i].time - begin <= wait + 1e-9)
+    load = played.loads[due] if played.loads[due].cover else played.loads[due - 1]
+    since, friction = moments[max(span.first - 1, 0)].time, planned.friction if planned else np.nan
+    return TrueContact(
+        kind, span.cover, friction, load.position, force_of(load), span.first, due, span.last, since, load.moment
+    )
+
+
+def _planned(planned: Sequence[PlannedContact], time: float) -> PlannedContact | None:
+    return next((contact for contact in planned if contact.begin - 0.05 <= time <= contact.end), None)
+
+
+def _settled(moments: Sequence[EstimatedMoment], found: Sequence[Span]) -> Mask:
+    """Moments away from the start and end of contacts, and from the observer's own transient."""
+    times = np.array([one.time for one in moments])
+    keep: Mask = times > times[0] + 0.2
+    for span in found:
+        for edge in (times[span.first], times[span.last]):
+            keep &= ~((times > edge - 0.02) & (times < edge + EVALUATION.edge))
+    return keep
+
+
+def _truth(played: Played, period: float) -> Array:
+    """True external torques, (k, n); with dither the means over its cycle, as the estimate is one."""
+    rows: Array = np.array(played.torques)
+    if played.scenario.group != "dither":
+        return rows
+    count = round(RANGES.dither_cycle / period)
+    before = np.concatenate((np.repeat(rows[:1], count, axis=0), rows)).cumsum(axis=0)
+    mean: Array = (before[count:] - before[:-count]) / count
+    return mean

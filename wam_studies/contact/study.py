@@ -10,11 +10,13 @@ import numpy as np
 from wam_description.configuration import Configuration
 from wam_studies.contact.bounds import BOUNDS, bounds
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
-from wam_studies.contact.degraded_rows import DriveScore, degraded_rows, degraded_tables, groups_of
-from wam_studies.contact.recording import Drive
-from wam_studies.contact.rows import ScenarioScore, further_rows, stated_rows
+from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables, groups_of
+from wam_studies.contact.outcomes import ContactScore
+from wam_studies.contact.recording import CONTACTS, Drive, record
+from wam_studies.contact.replay import replay
+from wam_studies.contact.rows import IDENTIFIED_ARM, further_rows, stated_rows
 from wam_studies.contact.scenarios import BenchmarkScenario, ScenarioGenerator, dither_values
-from wam_studies.contact.trial import ContactCase, play_case
+from wam_studies.contact.simulation import play, score
 from wam_studies.harness import Study, option
 from wam_studies.scores import Row, Scores, ScoreTable
 
@@ -32,8 +34,28 @@ class DriveExtent(NamedTuple):
 EXTENT = DriveExtent()
 
 
+class ContactCase(NamedTuple):
+    """What is played on the arm of a configuration."""
+
+    configuration: Configuration
+    given: BenchmarkScenario | Drive
+
+    def __str__(self) -> str:
+        given = self.given
+        return given.name if isinstance(given, BenchmarkScenario) else f"{given.degradation}, seed {given.seed}"
+
+
+def play_case(case: ContactCase) -> ContactScore:
+    """Simulate a case and score it."""
+    given = case.given
+    if isinstance(given, BenchmarkScenario):
+        return score(play(case.configuration, given), case.configuration.shared.arm)
+    group = IDENTIFIED_ARM if given.is_identified else given.contacts
+    return replay(given.configuration, given.degradation, group, record(given), given.seed)
+
+
 @dataclass(frozen=True)
-class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
+class ContactStudy(Study[ContactCase, ContactScore]):
     """Scenarios of an arm as stated; and drives of arms and signals with degradations, one at a time and mixed."""
 
     title: ClassVar[str] = "contact estimation on the whole arm, as its model states it or with degradations"
@@ -43,23 +65,8 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
     resting: int = option(30, "contacts at rest per seed", 0)
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
-    degradations: tuple[str, ...] = option(
-        (), f"of arm and signals: {ALL}, or of {', '.join(NAMES)}".replace("%", "%%")
-    )
+    degradations: tuple[str, ...] = option((), "of arm and signals", choices=(ALL, *NAMES))
     seconds: float = option(110.0, "length of a recording with degradations", EXTENT.shortest)
-
-    def __post_init__(self) -> None:
-        """Refuse a degradation that is not known.
-
-        Raises
-        ------
-        ValueError
-            which names it and those that there are.
-        """
-        super().__post_init__()
-        for name in self.degradations:
-            if name not in (ALL, *NAMES):
-                raise ValueError(f"no degradation is named '{name}'; degradations: {', '.join(NAMES)}")
 
     def cases(self, seed: int) -> list[ContactCase]:
         """The scenarios of a seed, then its drives."""
@@ -93,47 +100,52 @@ class ContactStudy(Study[ContactCase, ScenarioScore | DriveScore]):
         """Parameters of the scenario."""
         return case.given.values if isinstance(case.given, BenchmarkScenario) else ()
 
-    def score(self, records: Sequence[ScenarioScore | DriveScore]) -> Scores:
+    def score(self, records: Sequence[ContactScore]) -> Scores:
         """Rows of the arm as stated, then of degradations."""
         arm = self.configuration.shared.arm
-        scenarios = [one for one in records if isinstance(one, ScenarioScore)]
-        drives = [one for one in records if isinstance(one, DriveScore)]
+        scenarios, drives = _of_both(records)
         rows: list[Row] = [*stated_rows(scenarios, arm), *further_rows(scenarios, arm), *degraded_rows(drives)]
-        tables = [_extent(scenarios), *degraded_tables(drives), *_bounds(self.configuration, drives)]
-        return Scores(rows, tables)
+        return Scores(rows, [_extent(scenarios), *degraded_tables(drives), *_bounds(self.configuration, drives)])
 
-    def failure(self, record: ScenarioScore | DriveScore) -> str:
+    def failure(self, record: ContactScore) -> str:
         """Why a case ended early."""
-        return record.failure if isinstance(record, ScenarioScore) else record.score.failure
+        return record.failure
 
-    def picture(self, records: Sequence[ScenarioScore | DriveScore], file: Path) -> bool:
-        """Position errors, calibration, torque errors, latency, link identification on the arm as stated."""
-        from wam_studies.contact.picture import figure  # matplotlib is slow to import
+    def picture(self, records: Sequence[ContactScore], file: Path) -> bool:
+        """Position errors, calibration, latency on the arm as stated."""
+        from wam_studies.contact.picture import panels_of  # matplotlib is slow to import
+        from wam_studies.figures.panels import draw_panels
 
-        figure([one for one in records if isinstance(one, ScenarioScore)], self.configuration.shared.arm, file)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        draw_panels(panels_of(_of_both(records)[0], self.configuration.shared.arm), file, 2)
         return True
 
 
-def _extent(scenarios: Sequence[ScenarioScore]) -> ScoreTable:
+def _of_both(records: Sequence[ContactScore]) -> tuple[list[ContactScore], list[ContactScore]]:
+    """Scores of scenarios, and of drives."""
+    of_drives = (*CONTACTS, IDENTIFIED_ARM)
+    return [one for one in records if one.group not in of_drives], [one for one in records if one.group in of_drives]
+
+
+def _extent(scenarios: Sequence[ContactScore]) -> ScoreTable:
     """Numbers of scenarios and contacts."""
-    free = sum(one.contact_free.seconds for one in scenarios if one.contact_free.group == "free")
     counts = {
         "scenarios": len(scenarios),
-        "contacts evaluated": sum(len(one.contacts) for one in scenarios),
+        "contacts evaluated": sum(len(one.outcomes) for one in scenarios),
         "contacts too short or too hard": sum(one.excluded for one in scenarios),
         "contacts planned but not made": sum(one.not_made for one in scenarios),
-        "free motion, s": round(free),
+        "free motion, s": round(sum(one.free_seconds for one in scenarios if one.group == "free")),
     }
     return ScoreTable("Extent", list(counts), [list(map(str, counts.values()))])
 
 
-def _bounds(configuration: Configuration, drives: Sequence[DriveScore]) -> Iterator[ScoreTable]:
+def _bounds(configuration: Configuration, drives: Sequence[ContactScore]) -> Iterator[ScoreTable]:
     """What is possible at best with the errors of the torques of identified arms; none without any."""
-    identified = [one for own in groups_of(drives, "level", True).values() for one in own]
+    identified = [one.torques for own in groups_of(drives, IDENTIFIED_ARM).values() for one in own]
     if identified:
-        errors = np.sqrt(np.mean(np.square([one.torque_errors for one in identified]), axis=0))
-        rows = bounds(configuration, min(one.seed for one in drives), errors)
-        yield ScoreTable("What is possible at best", BOUNDS, rows, OPEN)
+        both = [[one.rms("sliding"), one.rms("moving")] for one in identified]
+        errors = np.sqrt(np.mean(np.square(both), axis=0))
+        yield ScoreTable("What is possible at best", BOUNDS, bounds(configuration, errors), OPEN)
 
 
 OPEN = """The inference alone, with torques that have the errors of a row and no others, and exactly their covariance;

@@ -1,12 +1,11 @@
-"""The evaluation of faults (`wam evaluate faults`).
+"""The studies of faults (`wam evaluate faults`) and of a long run (`wam evaluate soak`).
 
-trials             what a trial is, the limits of motion, force and delay, and the results by kind
+study              every kind of fault, its trials in the harness
+trials             what a trial is, the limits of motion, force and delay, the nodes that trials share
 message_faults     messages broken field by field, stamp by stamp, byte by byte
 parameter_faults   sets of live parameters, in part good and in part not
 bag_faults         bags broken at random, and what a reader makes of them
-page               the table of results and docs/safety.md
-kinds              the table of kinds
-messages, parameter_sets, second_publishers, disks, bags   trials on the nodes in this process
+messages, parameter_sets, second_publishers, disks, bags   trials on the nodes in one process
 losses             trials on nodes in processes of their own
 interruptions      Ctrl-C at random moments of the demonstration
 soak               a long run, its memory and its losses

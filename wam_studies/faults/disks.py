@@ -2,7 +2,7 @@
 
 import resource
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from random import Random
@@ -10,49 +10,44 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from wam_bag.bag import BagError, read
-from wam_description.configuration import Configuration
 from wam_description.event import CAUSE
-from wam_studies.faults.trials import FAULTS, FaultTrial
-from wam_studies.faults.watched_stack import NodeEndedError, WatchedStack
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
+from wam_studies.faults.watched_stack import NodeEndedError, WatchedStack, recorded_into
 
 Work = Callable[[WatchedStack, Path, Random], None]
 ERROR: Final = b"\x02"
 
 
-def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count`, a stack and a bag each."""
-    ways = {"full disk": _fill, "directory removed": _remove, "no place for the samples of a fault": _fault}
-    for index in range(first, first + count):
-        chance = Random(f"disks {seed} {index}")
-        name = list(ways)[index % len(ways)]
-        with TemporaryDirectory(prefix="wam_faults_") as folder:
-            values = {
-                "nodes": [*configuration.shared.nodes, "recorder"],
-                "timing.mode": "lockstep",
-                "recorder:directory": folder,
-                "recorder:name": "bag",
-                "driver:post_mortem_directory": "/proc/none" if ways[name] is _fault else "",
-            }
-            yield _trial(configuration.with_values(values), index, name, Path(folder, "bag"), ways[name], chance)
-
-
-def _trial(configuration: Configuration, index: int, name: str, bag: Path, work: Work, chance: Random) -> FaultTrial:
-    """One trial; the end of the recorder is part of it."""
-    stack = WatchedStack(configuration)
-    reason = stack.begin()
-    try:
-        if not reason:
-            stack.run(chance.uniform(0.05, 0.3))
-            work(stack, bag, chance)
-            reason = stack.recover()
-    except NodeEndedError as error:
-        reason = str(error)
-    try:
-        stack.close()
-    except Exception as error:
-        stack.escapes.append(f"the end of a node: {type(error).__name__}: {error}")
+def play(case: FaultCase) -> FaultTrial:
+    """A trial on a stack of its own with a recorder, whose end is part of it."""
+    ways: dict[str, Work] = {
+        "full disk": _fill,
+        "directory removed": _remove,
+        "no place for the samples of a fault": _fault,
+    }
+    name = list(ways)[case.number % len(ways)]
+    chance = Random(f"disks {case.seed} {case.number}")
+    KEPT.discard()
+    with TemporaryDirectory(prefix="wam_faults_") as folder:
+        own = {
+            **recorded_into(case.configuration, folder),
+            "driver:post_mortem_directory": "/proc/none" if ways[name] is _fault else "",
+        }
+        stack = WatchedStack(case.configuration.with_values(own))
+        reason = stack.begin()
+        try:
+            if not reason:
+                stack.run(chance.uniform(0.05, 0.3))
+                ways[name](stack, Path(folder, "bag"), chance)
+                reason = stack.recover()
+        except NodeEndedError as error:
+            reason = str(error)
+        try:
+            stack.close()
+        except Exception as error:
+            stack.escapes.append(f"the end of a node: {type(error).__name__}: {error}")
     escapes = (*stack.escapes, *filter(None, [reason]))
-    return FaultTrial(index, name, escapes=escapes, motion=stack.motion, force=stack.force)
+    return FaultTrial(case.kind, name, escapes=escapes, motion=stack.motion, force=stack.force)
 
 
 def _fill(stack: WatchedStack, bag: Path, chance: Random) -> None:

@@ -15,19 +15,20 @@ from typing import Final
 from wam_bag.bag import BagError
 from wam_bag.contents import contents
 from wam_studies.faults.soak import lost_in
-from wam_studies.faults.trials import FAULTS, FaultTrial
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 
 MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
 
 
-def play(seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count`, a demonstration each."""
-    for index in range(first, first + count):
-        chance = Random(f"interruptions {seed} {index}")
-        moment = chance.uniform(FAULTS.python, FAULTS.starting if index % 2 else FAULTS.playing)
-        with TemporaryDirectory(prefix="wam_faults_") as folder:
-            escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{index}"))
-        yield FaultTrial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
+def play(case: FaultCase) -> FaultTrial:
+    """A trial of one demonstration."""
+    chance = Random(f"interruptions {case.seed} {case.number}")
+    moment = chance.uniform(FAULTS.python, FAULTS.starting if case.number % 2 else FAULTS.playing)
+    KEPT.discard()  # the demonstration is alone in its network
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # a process of a batch blocks it, and its children
+    with TemporaryDirectory(prefix="wam_faults_") as folder:
+        escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{case.number}"))
+    return FaultTrial(case.kind, f"Ctrl-C after {moment:.2f} s", 1, escapes)
 
 
 def _interrupted(folder: Path, moment: float, mark: str) -> Iterator[str]:

@@ -2,43 +2,32 @@
 
 import math
 import signal
-from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from wam_description.configuration import Configuration
 from wam_studies.faults.node_processes import ANSWERS, NodeProcesses
-from wam_studies.faults.trials import FAULTS, FaultTrial
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
+# with the estimate fed back, the estimator belongs to the chain, too
+FEEDBACK: Final = {"timing.timeout": 2.0, "force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count` of a seed, one loss each."""
-    chain: NodeProcesses | None = None
-    # with the estimate fed back, the estimator belongs to the chain, too
-    feedback = {"force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
-    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 2.0, **feedback})
-    try:
-        for index in range(first, first + count):
-            chance = Random(f"losses {seed} {index}")
-            chain = chain or NodeProcesses(configured)
-            name = chain.names[index % len(chain.names)]
-            way = WAYS[index // len(chain.names) % len(WAYS)]
-            trial = _trial(chain, name, way, chance, index, mode)
-            yield trial
-            if trial.escapes:
-                chain.close()
-                chain = None
-    finally:
-        if chain is not None:
-            chain.close()
+def play(case: FaultCase) -> FaultTrial:
+    """A trial of one loss."""
+    chance = Random(f"losses {case.seed} {case.number}")
+    chain: NodeProcesses = KEPT.ready(NodeProcesses, case.configuration)
+    name = chain.names[case.number % len(chain.names)]
+    trial = _lost(case, chain, name, WAYS[case.number // len(chain.names) % len(WAYS)], chance)
+    if trial.escapes:
+        KEPT.discard()
+    return trial
 
 
-def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> FaultTrial:
-    what = f"{name} {way.name}, {mode}"
+def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals, chance: Random) -> FaultTrial:
+    what = f"{name} {way.name}"
     if reason := chain.enabled(FAULTS.recovered):
-        return FaultTrial(index, what, 1, (f"before: {reason}",))
+        return FaultTrial(case.kind, what, 1, (f"before: {reason}",))
     chain.wait(lambda: False, chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
     chain.reports.clear()
@@ -52,7 +41,8 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
         chain.send(name, signal.SIGCONT)
     else:
         chain.wait(lambda: name in chain.ended(), FAULTS.noticed)
-        chain.end(name)
+        chain.send(name, signal.SIGKILL)
+        chain.wait(lambda: name in chain.ended(), FAULTS.noticed)
     if others := [one for one in chain.ended() if one != name]:
         escapes.append(f"{', '.join(others)} ended, too")
     if way != signal.SIGSTOP:
@@ -65,7 +55,7 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
         escapes.append(f"the arm moved {motion:.3f} rad")
     if chain.force > FAULTS.force:
         escapes.append(f"{chain.force:.0f} N")
-    return FaultTrial(index, what, 1, tuple(escapes), motion, chain.force, delay)
+    return FaultTrial(case.kind, what, 1, tuple(escapes), motion, chain.force, delay)
 
 
 def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:

@@ -7,6 +7,7 @@ import struct
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from random import Random
 from typing import Any, Final, NamedTuple
 
@@ -46,6 +47,17 @@ class MessageLeaf(NamedTuple):
         """Its present value."""
         return getattr(self.owner, self.name)
 
+    @property
+    def is_sequence(self) -> bool:
+        """Whether it has a number of values."""
+        return self.kind.startswith("sequence")
+
+    def put(self, value: Any) -> bool:
+        """Replace its value; True."""
+        old = self.value
+        setattr(self.owner, self.name, array(old.typecode, value) if isinstance(old, array) else value)
+        return True
+
 
 def leaves(message: Message) -> Iterator[MessageLeaf]:
     """Every field that is no message, in order; a sequence of messages by its members."""
@@ -60,48 +72,51 @@ def leaves(message: Message) -> Iterator[MessageLeaf]:
             yield MessageLeaf(message, name, kind)
 
 
-def _numbers(message: Message) -> list[MessageLeaf]:
-    return [leaf for leaf in leaves(message) if leaf.kind.removeprefix("sequence<").startswith(("double", "float"))]
+def _chosen(message: Message, chance: Random, is_meant: Callable[[MessageLeaf], bool]) -> MessageLeaf | None:
+    found = list(filter(is_meant, leaves(message)))
+    return chance.choice(found) if found else None
 
 
-def with_numbers(message: Message, chance: Random, values: tuple[float, ...]) -> bool:
-    """Put one of the values into one number of a message, or into all of an array; False where it has none."""
-    found = [leaf for leaf in _numbers(message) if not leaf.kind.startswith("sequence") or len(leaf.value)]
-    if not found:
+# changes of a message; False where it cannot be changed so
+
+
+def with_numbers(message: Message, chance: Random, now: int, values: tuple[float, ...]) -> bool:
+    """Put one of the values into one number of a message, or into all of an array."""
+
+    def is_number(leaf: MessageLeaf) -> bool:
+        is_float = leaf.kind.removeprefix("sequence<").startswith(("double", "float"))
+        return is_float and not (leaf.is_sequence and not len(leaf.value))
+
+    leaf = _chosen(message, chance, is_number)
+    if leaf is None:
         return False
-    leaf, value = chance.choice(found), chance.choice(values)
-    if leaf.kind.startswith("sequence"):
-        numbers = list(leaf.value)
-        for i in range(len(numbers)) if chance.random() < 0.3 else [chance.randrange(len(numbers))]:
-            numbers[i] = value
-        setattr(leaf.owner, leaf.name, numbers)
-    else:
-        setattr(leaf.owner, leaf.name, value)
-    return True
+    value = chance.choice(values)
+    if not leaf.is_sequence:
+        return leaf.put(value)
+    numbers = list(leaf.value)
+    for i in range(len(numbers)) if chance.random() < 0.3 else [chance.randrange(len(numbers))]:
+        numbers[i] = value
+    return leaf.put(numbers)
 
 
-def with_lengths(message: Message, chance: Random) -> bool:
-    """Give an array another length; False where there is none."""
-    found = [leaf for leaf in leaves(message) if leaf.kind.startswith("sequence")]
-    if not found:
+def with_lengths(message: Message, chance: Random, now: int) -> bool:
+    """Give an array another length."""
+    leaf = _chosen(message, chance, lambda leaf: leaf.is_sequence)
+    if leaf is None:
         return False
-    leaf = chance.choice(found)
     old = list(leaf.value)
     length = chance.choice([n for n in BROKEN.lengths if n != len(old)])
     filler = old[:1] or (["joint1"] if "string" in leaf.kind else [0] if "int" in leaf.kind else [0.3])
-    setattr(leaf.owner, leaf.name, _like(leaf.value, (old + filler * length)[:length]))
-    return True
+    return leaf.put((old + filler * length)[:length])
 
 
-def with_texts(message: Message, chance: Random) -> bool:
-    """Replace, double or lose a name or a text; False where there is none."""
-    found = [leaf for leaf in leaves(message) if "string" in leaf.kind]
-    if not found:
+def with_texts(message: Message, chance: Random, now: int) -> bool:
+    """Replace, double or lose a name or a text."""
+    leaf = _chosen(message, chance, lambda leaf: "string" in leaf.kind)
+    if leaf is None:
         return False
-    leaf = chance.choice(found)
-    if not leaf.kind.startswith("sequence"):
-        setattr(leaf.owner, leaf.name, chance.choice([text for text in TEXTS if text != leaf.value]))
-        return True
+    if not leaf.is_sequence:
+        return leaf.put(chance.choice([text for text in TEXTS if text != leaf.value]))
     names = list(leaf.value) or ["joint1"]
     i, way = chance.randrange(len(names)), chance.randrange(4)
     if way == 0:
@@ -112,40 +127,31 @@ def with_texts(message: Message, chance: Random) -> bool:
         del names[i]
     else:
         names.append(names[0])
-    setattr(leaf.owner, leaf.name, names)
-    return True
+    return leaf.put(names)
 
 
-def permuted(message: Message, chance: Random) -> bool:
-    """Change the order of names and values together, which means the same; False where there are no names."""
+def permuted(message: Message, chance: Random, now: int) -> bool:
+    """Change the order of names and values together, which means the same."""
     names = getattr(message, "name", None)
     if not isinstance(names, list) or not names:
         return False
     order = chance.sample(range(len(names)), len(names))
     for leaf in leaves(message):
-        if leaf.kind.startswith("sequence") and len(leaf.value) == len(order):
-            setattr(leaf.owner, leaf.name, _like(leaf.value, [leaf.value[i] for i in order]))
+        if leaf.is_sequence and len(leaf.value) == len(order):
+            leaf.put([leaf.value[i] for i in order])
     return True
 
 
-def with_integers(message: Message, chance: Random) -> bool:
-    """Put an extreme into an integer other than those of a stamp; False where there is none."""
-    found = [
-        leaf
-        for leaf in leaves(message)
-        if leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
-    ]
-    if not found:
+def with_integers(message: Message, chance: Random, now: int) -> bool:
+    """Put an extreme into an integer other than those of a stamp."""
+    leaf = _chosen(
+        message, chance, lambda leaf: leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
+    )
+    if leaf is None:
         return False
-    leaf = chance.choice(found)
-    bits = int("".join(filter(str.isdigit, leaf.kind)))
-    top = 2**bits if leaf.kind.startswith("u") else 2 ** (bits - 1)
-    setattr(leaf.owner, leaf.name, chance.choice([top - 1, top // 2, 0 if leaf.kind.startswith("u") else -top]))
-    return True
-
-
-def _like(old: Any, new: list[Any]) -> Any:
-    return array(old.typecode, new) if isinstance(old, array) else new
+    bits, is_signed = int("".join(filter(str.isdigit, leaf.kind))), not leaf.kind.startswith("u")
+    top = 2 ** (bits - is_signed)
+    return leaf.put(chance.choice([top - 1, top // 2, -top if is_signed else 0]))
 
 
 def set_stamp(message: Message, nanoseconds: int) -> bool:
@@ -158,24 +164,32 @@ def set_stamp(message: Message, nanoseconds: int) -> bool:
     return True
 
 
-FUTURE: Final[dict[str, Stamps]] = {
-    "next period": lambda chance, now: now + 1_000_000,
-    "next seconds": lambda chance, now: now + chance.randrange(2_000_000, 10 * SECOND),
-    "wall clock": lambda chance, now: 1_790_000_000 * SECOND + chance.randrange(SECOND),
-    "end of time": lambda chance, now: (2**31 - 1) * SECOND + SECOND - 1,
-}
-PAST: Final[dict[str, Stamps]] = {
-    "zero": lambda chance, now: 0,
-    "negative": lambda chance, now: -chance.randrange(1, 2**31) * SECOND,
-    "stale": lambda chance, now: max(1_000_000, now - chance.randrange(200_000_000, 5 * SECOND)),
+def stamped(message: Message, chance: Random, now: int, stamps: Stamps) -> bool:
+    """Set the stamp to another time."""
+    return set_stamp(message, stamps(chance, now))
+
+
+STAMPS: Final[dict[str, Stamps]] = {
+    "future: next period": lambda chance, now: now + 1_000_000,
+    "future: next seconds": lambda chance, now: now + chance.randrange(2_000_000, 10 * SECOND),
+    "future: wall clock": lambda chance, now: 1_790_000_000 * SECOND + chance.randrange(SECOND),
+    "future: end of time": lambda chance, now: (2**31 - 1) * SECOND + SECOND - 1,
+    "past: zero": lambda chance, now: 0,
+    "past: negative": lambda chance, now: -chance.randrange(1, 2**31) * SECOND,
+    "past: stale": lambda chance, now: max(1_000_000, now - chance.randrange(200_000_000, 5 * SECOND)),
 }
 
 
-def with_excess_nanoseconds(message: Message, chance: Random) -> bool:
-    """A stamp with more nanoseconds than a second has; False where it has no header."""
+def with_excess_nanoseconds(message: Message, chance: Random, now: int) -> bool:
+    """A stamp with more nanoseconds than a second has."""
     if not hasattr(message, "header"):
         return False
     message.header.stamp.nanosec = chance.randrange(SECOND, 2**32)
+    return True
+
+
+def unchanged(message: Message, chance: Random, now: int) -> bool:
+    """The message as it is."""
     return True
 
 
@@ -241,6 +255,9 @@ def _put(out: bytearray, code: str, value: Any) -> None:
 # the faults
 
 
+Change = Callable[[Message, Random, int], bool]
+
+
 class MessageFault(NamedTuple):
     """A way to break a message.
 
@@ -249,33 +266,27 @@ class MessageFault(NamedTuple):
     name : in words.
     moves : whether the values would move the arm if the message were used; they do not where it is right to use it.
     change : changes a message, the chance and the time of the arm given; False where it cannot be broken so.
-    data : changes the bytes afterwards.
     """
 
     name: str
     moves: bool
-    change: Callable[[Message, Random, int], bool] = lambda message, chance, now: True
-    data: Callable[[bytes, Message, Random], bytes] = lambda data, message, chance: data
+    change: Change
 
 
-def _stamped(stamps: Stamps) -> Callable[[Message, Random, int], bool]:
-    return lambda message, chance, now: set_stamp(message, stamps(chance, now))
-
-
+GARBAGE, BIG_ENDIAN = "bytes that are no message", "the other byte order"
 MESSAGE_FAULTS: Final = (
-    MessageFault("a number not finite", True, lambda m, chance, now: with_numbers(m, chance, NOT_FINITE)),
-    MessageFault("a huge number", True, lambda m, chance, now: with_numbers(m, chance, BROKEN.huge)),
-    MessageFault("a tiny number", False, lambda m, chance, now: with_numbers(m, chance, BROKEN.tiny)),
-    MessageFault("an array of another length", True, lambda m, chance, now: with_lengths(m, chance)),
-    MessageFault("a wrong text or name", True, lambda m, chance, now: with_texts(m, chance)),
-    MessageFault("names in another order", False, lambda m, chance, now: permuted(m, chance)),
-    MessageFault("an extreme integer", True, lambda m, chance, now: with_integers(m, chance)),
-    *(MessageFault(f"a stamp of the future: {name}", True, _stamped(stamps)) for name, stamps in FUTURE.items()),
-    *(MessageFault(f"a stamp of the past: {name}", True, _stamped(stamps)) for name, stamps in PAST.items()),
-    MessageFault("a stamp of too many nanoseconds", True, lambda m, chance, now: with_excess_nanoseconds(m, chance)),
-    MessageFault("the same message again", False),
-    MessageFault("bytes that are no message", True, data=lambda data, m, chance: garbage(data, chance)),
-    MessageFault("the other byte order", False, data=lambda data, m, chance: big_endian(m)),
+    MessageFault("a number not finite", True, partial(with_numbers, values=NOT_FINITE)),
+    MessageFault("a huge number", True, partial(with_numbers, values=BROKEN.huge)),
+    MessageFault("a tiny number", False, partial(with_numbers, values=BROKEN.tiny)),
+    MessageFault("an array of another length", True, with_lengths),
+    MessageFault("a wrong text or name", True, with_texts),
+    MessageFault("names in another order", False, permuted),
+    MessageFault("an extreme integer", True, with_integers),
+    *(MessageFault(f"a stamp of the {name}", True, partial(stamped, stamps=stamps)) for name, stamps in STAMPS.items()),
+    MessageFault("a stamp of too many nanoseconds", True, with_excess_nanoseconds),
+    MessageFault("the same message again", False, unchanged),
+    MessageFault(GARBAGE, True, unchanged),
+    MessageFault(BIG_ENDIAN, False, unchanged),
 )
 
 
@@ -285,7 +296,10 @@ def broken(
     """The bytes of a message after it has been broken, None where it cannot be broken in this way."""
     if not fault.change(message, chance, now):
         return None
-    return fault.data(serialize(message), message, chance)
+    if fault.name == BIG_ENDIAN:
+        return big_endian(message)
+    data = serialize(message)
+    return garbage(data, chance) if fault.name == GARBAGE else data
 
 
 # values that would move the arm

@@ -1,16 +1,12 @@
 """Broken messages on every topic that a node takes, from the topic's own publisher and from a second one."""
 
-from collections.abc import Iterator
 from functools import partial
 from random import Random
 from typing import Final, NamedTuple
 
-from rclpy.publisher import Publisher
-
-from wam_description.configuration import Configuration
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
-from wam_studies.faults.trials import FAULTS, FaultTrial
-from wam_studies.faults.watched_stack import StackSource, WatchedStack
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
+from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 PUSH: Final = "sim/disturbance"
 
@@ -37,18 +33,17 @@ def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
     return every[index % len(every)]
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count` of a seed, `FAULTS.messages` messages each, in a mode of `timing.mode`."""
-    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
-        for index in range(first, first + count):
-            todo = plan(source.ready().taken_topics(), seed, index)
-            yield source.trial(index, todo.name, partial(_send, todo, Random(f"messages {seed} {index}")))
+def play(case: FaultCase) -> FaultTrial:
+    """A trial of `FAULTS.messages` messages."""
+    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    todo = plan(topics, case.seed, case.number)
+    return watched_trial(case, todo.name, partial(_send, todo, Random(f"messages {case.seed} {case.number}")))
 
 
 def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     """Publish the broken messages; returns how many there were."""
-    publisher: Publisher | None
-    publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
+    publish = stack.foreign_publisher if todo.is_foreign else partial(stack.own_publisher, chance=chance)
+    publisher = publish(todo.topic)
     sent = 0
     stack.allowed_motion = FAULTS.motion if todo.is_foreign else FAULTS.held_motion
     if publisher is None:

@@ -1,13 +1,9 @@
 """Nodes as real processes that are killed, frozen and started again, watched over topics."""
 
-import multiprocessing
-import os
 import signal
-import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -18,7 +14,7 @@ from std_srvs.srv import SetBool, Trigger
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
 from wam_description.signals import NodeStatus, State, Wrench
-from wam_ros.bring_up import parameter_file
+from wam_ros.bring_up import NodeProcess
 from wam_ros.messages import message_type, read_status
 from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import Connection
@@ -34,29 +30,7 @@ ANSWERS: Final = {  # a topic that each node publishes in every outer period or 
     "force_loop": "joint_velocity_command",
     "contact_estimator": "external_joint_torques",
 }
-PRELOADED: Final = [
-    "numpy",
-    "mujoco",
-    "pinocchio",
-    "rclpy",
-    "wam_ros.node",
-    "wam_driver.driver",
-    "wam_control.force.force_loop",
-]
 COMMANDS: Final = ("joint_posture_command", "force_command")
-
-
-def run_node(entry: str, arguments: list[str], quiet: bool) -> None:
-    """Run one node as this process, as `python3 -m wam_ros.program` does."""
-    from wam_ros.node import node_makers
-    from wam_ros.run import run
-
-    if quiet:
-        null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, 1)
-        os.dup2(null, 2)
-    sys.argv = [entry, *arguments]
-    run(node_makers([entry]))
 
 
 class NodeProcesses:
@@ -77,20 +51,6 @@ class NodeProcesses:
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
-        self._stack = ExitStack()
-        file = self._stack.enter_context(parameter_file(configuration))
-        self._arguments = [
-            "--ros-args",
-            "--params-file",
-            str(file),
-            "-r",
-            f"__ns:=/{NAMESPACE}",
-            "--log-level",
-            "fatal",
-        ]
-        self._processes: dict[str, Any] = {}
-        self._forks = multiprocessing.get_context("forkserver")
-        self._forks.set_forkserver_preload(PRELOADED)
         self.names = [name for name in ANSWERS if name in configuration.shared.nodes]
         shared = configuration.shared
         interface = Interface(shared)
@@ -127,43 +87,28 @@ class NodeProcesses:
             "enable": self.node.create_client(SetBool, "driver/enable"),
             "reset_fault": self.node.create_client(Trigger, "driver/reset_fault"),
         }
-        for name in self.names:
-            self.start(name)
-
-    def __enter__(self) -> "NodeProcesses":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        self._processes = {name: NodeProcess(configuration, name, NAMESPACE, "fatal") for name in self.names}
 
     def close(self) -> None:
         """End all nodes."""
-        for name in self.names:
-            self.end(name)
+        for name, process in self._processes.items():
+            self.send(name, signal.SIGKILL)
+            process.close()
         self._connection.close()
-        self._stack.close()
 
     # processes
 
     def start(self, name: str) -> None:
-        """Start a node."""
-        process = self._forks.Process(target=run_node, args=(name, self._arguments, True), daemon=True)
-        process.start()
-        self._processes[name] = process
+        """Start a node that has ended."""
+        self._processes[name].start()
 
-    def send(self, name: str, number: int) -> None:
+    def send(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node."""
-        os.kill(self._processes[name].pid, number)
-
-    def end(self, name: str) -> None:
-        """End a node by SIGKILL, frozen or not."""
-        with suppress(ProcessLookupError):
-            self.send(name, signal.SIGKILL)
-        self._processes[name].join(10.0)
+        self._processes[name].send(number)
 
     def ended(self) -> list[str]:
         """Names of the nodes that do not run."""
-        return [name for name, process in self._processes.items() if not process.is_alive()]
+        return [name for name, process in self._processes.items() if process.code is not None]
 
     # what is seen
 

@@ -1,6 +1,5 @@
 """Parameter sets for every node: refused ones change nothing, accepted ones leave an arm that is stable."""
 
-from collections.abc import Iterator
 from functools import partial
 from random import Random
 from typing import Any, Final
@@ -10,7 +9,6 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 
 from wam_description.arm import Shared
-from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_description.parameters import Field, fields
 from wam_studies.faults.parameter_faults import (
@@ -22,8 +20,8 @@ from wam_studies.faults.parameter_faults import (
     ParameterSet,
     parameter_set,
 )
-from wam_studies.faults.trials import FAULTS, FaultTrial
-from wam_studies.faults.watched_stack import StackSource, WatchedStack
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
+from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 FIELDS: Final = {
     BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",
@@ -39,18 +37,16 @@ def message(assignment: Assignment) -> Parameter:
     return Parameter(name=assignment.name, value=value)
 
 
-def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials `first` to `first + count` of a seed, one set each."""
-    with StackSource(configuration.with_values({"timing.mode": "lockstep"})) as source:
-        for index in range(first, first + count):
-            stack = source.ready()
-            name = sorted(stack.nodes)[index % len(stack.nodes)]
-            chance = Random(f"parameters {seed} {index}")
-            todo = parameter_set(_fields(stack, name), _present(stack, name), chance)
-            trial = source.trial(index, f"{name}, {todo.name}", partial(_try, name, todo))
-            if trial.escapes:
-                source.discard()  # its parameters may have changed
-            yield trial
+def play(case: FaultCase) -> FaultTrial:
+    """A trial of one set."""
+    stack: WatchedStack = KEPT.ready(WatchedStack, case.configuration)
+    name = sorted(stack.nodes)[case.number % len(stack.nodes)]
+    chance = Random(f"parameters {case.seed} {case.number}")
+    todo = parameter_set(_fields(stack, name), _present(stack, name), chance)
+    trial = watched_trial(case, f"{name}, {todo.name}", partial(_try, name, todo))
+    if trial.escapes:
+        KEPT.discard()  # its parameters may have changed
+    return trial
 
 
 def _fields(stack: WatchedStack, name: str) -> list[Field]:

@@ -1,7 +1,6 @@
 """Second publishers: false commands and feedback with right stamps, another type, and old bags replayed."""
 
 import struct
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -13,46 +12,39 @@ from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
 from wam_bag.cdr import LITTLE_ENDIAN
-from wam_description.configuration import Configuration
 from wam_ros.topics import NAMESPACE
 from wam_ros.wire import stamp_of
 from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
-from wam_studies.faults.trials import FAULTS, FaultTrial
-from wam_studies.faults.watched_stack import StackSource, WatchedStack
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
+from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 WALL_CLOCK: Final = 1_790_000_000 * SECOND
 STAMPS: Final = ("as recorded", "from now on", "of the wall clock")
 GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != "sim/disturbance")  # a second publisher is a fault
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials with a second publisher: every topic that a node takes, in turn, with messages of its type or another."""
-    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
-        for index in range(first, first + count):
-            stack = source.ready()
-            topics = stack.taken_topics()
-            topic, is_other_type = topics[index % len(topics)], index // len(topics) % 3 == 2
-            name = f"{topic}, {'another type' if is_other_type else 'second publisher'}, {mode}"
-            work = _other_type if is_other_type else _stream
-            yield source.trial(index, name, partial(work, topic))
+def play(case: FaultCase) -> FaultTrial:
+    """A trial with a second publisher: topics that a node takes, in turn, with messages of their type or another."""
+    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    topic, is_other_type = topics[case.number % len(topics)], case.number // len(topics) % 3 == 2
+    name = f"{topic}, {'another type' if is_other_type else 'second publisher'}"
+    return watched_trial(case, name, partial(_other_type if is_other_type else _stream, topic))
 
 
-def replay(bag: Path, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
-    """Trials with a bag replayed onto the topics of an enabled arm: one topic, or all commands, or all feedback."""
-    mode = "realtime"
-    recorded = {name.removeprefix(f"/{NAMESPACE}/"): found for name, found in raw(bag).items()}
-    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
-        for index in range(first, first + count):
-            stack = source.ready()
-            chance = Random(f"replays {seed} {index}")
-            known = [topic for topic in stack.taken_topics() if topic in recorded and recorded[topic].data]
-            commands = [topic for topic in known if "command" in topic]
-            feedback = [topic for topic in known if topic in ("motor_states", "joint_states", "joint_sensors")]
-            chosen = [commands, feedback, known][index % 3] if index % 2 else [chance.choice(known)]
-            stamps = STAMPS[index // 2 % len(STAMPS)]
-            what = chosen[0] if len(chosen) == 1 else f"{len(chosen)} topics"
-            work = partial(_replay, {topic: recorded[topic].data for topic in chosen}, stamps)
-            yield source.trial(index, f"{what} replayed, stamps {stamps}", work)
+def replay(case: FaultCase) -> FaultTrial:
+    """A trial with a bag replayed onto the topics of an enabled arm: one topic, or all commands, or all feedback."""
+    index = case.number
+    recorded = {name.removeprefix(f"/{NAMESPACE}/"): found.data for name, found in raw(Path(case.bag)).items()}
+    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    known = [topic for topic in topics if recorded.get(topic)]
+    commands = [topic for topic in known if "command" in topic]
+    feedback = [topic for topic in known if topic in ("motor_states", "joint_states", "joint_sensors")]
+    alone = Random(f"replays {case.seed} {index}").choice(known)
+    chosen = [commands, feedback, known][index % 3] if index % 2 else [alone]
+    stamps = STAMPS[index // 2 % len(STAMPS)]
+    what = chosen[0] if len(chosen) == 1 else f"{len(chosen)} topics"
+    work = partial(_replay, {topic: recorded[topic] for topic in chosen}, stamps)
+    return watched_trial(case, f"{what} replayed, stamps {stamps}", work)
 
 
 def _stream(topic: str, stack: WatchedStack) -> int:

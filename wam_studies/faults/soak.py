@@ -1,11 +1,12 @@
-"""A long run of the nodes in this process with a moving arm and the recorder: memory and losses."""
+"""A long run of the nodes in one process with a moving arm and the recorder: memory and losses."""
 
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import yaml
@@ -17,11 +18,21 @@ from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
 from wam_studies.contact.moves import MoveGenerator
 from wam_studies.faults.trials import FAULTS
+from wam_studies.harness import Study, option
+from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, exact
 
 PUSH: Final = {"newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
 
 
-class Soak(NamedTuple):
+class SoakCase(NamedTuple):
+    """Nodes, mode and recorder as configured, for some seconds of the arm's time."""
+
+    configuration: Configuration
+    seed: int
+    seconds: float
+
+
+class SoakRecord(NamedTuple):
     """What a long run has shown.
 
     Attributes
@@ -42,42 +53,59 @@ class Soak(NamedTuple):
     losses: tuple[str, ...]
     failure: str
 
-    @property
-    def missed(self) -> list[str]:
-        """What does not hold."""
-        found = [self.failure] if self.failure else []
-        if self.late - self.early > FAULTS.growth:
-            found.append(f"memory grew by {self.late - self.early:.1f} MB; allowed: {FAULTS.growth:g} MB")
-        return [*found, *self.losses]
 
-    def section(self, command: str) -> str:
-        """The section of docs/safety.md."""
-        growth = f"{self.early:.0f} MB after a tenth of the run, {self.late:.0f} MB at its end"
-        lost = " ".join(self.losses) or "none"
-        return (
-            f"Written by `{command}`.\n\n"
-            f"| quantity | value |\n| --- | --- |\n| time of the arm | {self.seconds:.0f} s |\n"
-            f"| real-time factor | {self.factor:.3f} |\n| memory | {growth} |\n"
-            f"| recorded messages | {self.messages} |\n| lost messages | {lost} |\n"
-            f"| faults | {self.failure or 'none'} |"
-        )
-
-
-def soak(configuration: Configuration, seconds: float, report: Callable[[int, int], None]) -> Soak:
-    """Run the configured nodes for `seconds` of the arm's time, in the configured mode."""
+def soak(case: SoakCase) -> SoakRecord:
+    """Run the configured nodes, in the configured mode."""
+    configuration = case.configuration
     with TemporaryDirectory(prefix="wam_soak_") as folder:
         script = Path(folder, "scenario.yaml")
-        script.write_text(yaml.safe_dump({"steps": _steps(configuration.shared.arm, seconds)}), encoding="utf-8")
+        script.write_text(yaml.safe_dump({"steps": _steps(configuration.shared.arm, case)}), encoding="utf-8")
         nodes = [*configuration.shared.nodes, "scenario", "recorder"]
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
-        memory: list[float] = []
         with Composition(configuration.with_values(own)) as composition:
-            clock = _Sampler(memory, seconds, report)
+            clock = _Sampler()
             failure = composition.play(clock).failure
         found = contents(Path(folder, "soak"))
-    early, late = memory[len(memory) // 10], memory[-1]
+    early, late = clock.memory[len(clock.memory) // 10], clock.memory[-1]
     count = sum(topic.messages for topic in found.topics.values())
-    return Soak(clock.seconds, clock.factor, early, late, count, tuple(lost_in(found)), failure)
+    return SoakRecord(clock.seconds, clock.factor, early, late, count, tuple(lost_in(found)), failure)
+
+
+@dataclass(frozen=True)
+class SoakStudy(Study[SoakCase, SoakRecord]):
+    """One run of each seed, which draws the postures."""
+
+    title: ClassVar[str] = "a long run: memory and lost messages"
+    page: ClassVar[str] = "docs/safety.md"
+    seeds: ClassVar[tuple[int, ...]] = (1,)
+    over_topics: ClassVar[bool] = True
+
+    seconds: float = option(600.0, "of the arm's time", 2.0)
+
+    run = staticmethod(soak)
+
+    def cases(self, seed: int) -> Iterator[SoakCase]:
+        """The run."""
+        yield SoakCase(self.configuration, seed, self.seconds)
+
+    def failure(self, record: SoakRecord) -> str:
+        """Why it stopped, and what the bag lacks."""
+        return "; ".join(filter(None, [record.failure, *record.losses]))
+
+    def score(self, records: Sequence[SoakRecord]) -> Scores:
+        """Growth of the memory, lost messages and ends before the time; the longest run."""
+        longest = max(records, key=lambda one: one.seconds)
+        growth = max(one.late - one.early for one in records)
+        counts = {
+            "memory, growth after a tenth of the run [MB]": (growth, (-np.inf, FAULTS.growth)),
+            "topics with lost messages": (sum(len(one.losses) for one in records), NONE_AT_ALL),
+            "runs that stopped": (sum(bool(one.failure) for one in records), NONE_AT_ALL),
+            "time of the arm [s]": (longest.seconds, ANY),
+            "real-time factor": (longest.factor, ANY),
+            "memory at the end [MB]": (longest.late, ANY),
+            "recorded messages": (longest.messages, ANY),
+        }
+        return Scores([Row(name, exact(v, len(records)), required=bound) for name, (v, bound) in counts.items()])
 
 
 def lost_in(found: Contents) -> list[str]:
@@ -86,13 +114,13 @@ def lost_in(found: Contents) -> list[str]:
     return losses(found.path, found.metadata, found.attachments, counts).sentences(found.first)
 
 
-def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
-    drawn = MoveGenerator(arm).moves(np.random.default_rng(FAULTS.seed), arm.joints.start, FAULTS.postures)
+def _steps(arm: Arm, case: SoakCase) -> list[dict[str, Any]]:
+    drawn = MoveGenerator(arm).moves(np.random.default_rng(case.seed), arm.joints.start, FAULTS.postures)
     postures = [list(move.posture) for move in drawn]
     push = {"cover": arm.covers.names[-1], "contact_position": FAULTS.along * arm.covers.length[-1], **PUSH}
     moves = [
         {"name": f"move {i}", "seconds": FAULTS.move, "posture": postures[i % FAULTS.postures], "push": push}
-        for i in range(max(1, int(seconds / FAULTS.move)))
+        for i in range(max(1, int(case.seconds / FAULTS.move)))
     ]
     return [
         {"name": "release", "seconds": 0.5, "request": "enable"},
@@ -104,8 +132,8 @@ def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
 class _Sampler:
     """Samples memory once in a second of wall time, and the real-time factor; never ends the run."""
 
-    def __init__(self, memory: list[float], seconds: float, report: Callable[[int, int], None]) -> None:
-        self._memory, self._seconds, self._report = memory, seconds, report
+    def __init__(self) -> None:
+        self.memory: list[float] = []
         self._next = self._begin = time.monotonic()
         self._first: float | None = None
         self.seconds = self.factor = 0.0
@@ -117,8 +145,7 @@ class _Sampler:
         if now >= self._next:
             self._next = now + 1.0
             pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
-            self._memory.append(pages * resource.getpagesize() / 1e6)
+            self.memory.append(pages * resource.getpagesize() / 1e6)
             self.seconds = seconds
             self.factor = (self.seconds - self._first) / max(now - self._begin, 1e-9)
-            self._report(min(int(self.seconds), int(self._seconds)), int(self._seconds))
         return False

@@ -1,7 +1,7 @@
-"""Trials of faults: what was tried, what escaped, and how far the arm moved."""
+"""Trials of faults: what is tried on which nodes, what escaped, and how far the arm moved."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,7 +19,6 @@ class FaultLimits:
     motion: float = 0.01  # rad, of a joint without a legitimate command
     held_motion: float = 0.2  # rad, of a joint that obeys one wrong message of its own commander until it is too old
     force: float = 15.0  # N, of the arm on the world without a legitimate command
-    most_escapes: int = 20  # of one kind; then the kind is stopped
 
     longest_start: float = 120.0  # s of a stack
     patience: float = 15.0  # s of work without progress and without a fault that is a hang
@@ -55,28 +54,40 @@ class FaultLimits:
     move: float = 2.0  # s of a move of the soak
     postures: int = 4  # that are gone to, one after the other
     along: float = 0.75  # of the last cover, where it is pushed
-    seed: int = 1  # of the postures
     growth: float = 20.0  # MB from a tenth of the run on to its end
 
 
 FAULTS = FaultLimits()
 
 
+class FaultCase(NamedTuple):
+    """One trial of a kind, by its number; it depends on kind, seed and number alone."""
+
+    configuration: Configuration
+    kind: str
+    seed: int
+    number: int
+    bag: str  # that is replayed
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.number}, seed {self.seed}"
+
+
 class FaultTrial(NamedTuple):
-    """One trial.
+    """What one trial has shown.
 
     Attributes
     ----------
-    number : of the trial among those of its kind and seed.
+    kind : of the fault.
     name : the fault, in words.
     size : messages, sets, losses and so on in it.
-    escapes : what went wrong, '' nowhere.
+    escapes : what went wrong.
     motion : rad, largest motion of a joint that nobody had commanded.
     force : N, largest true force on the world.
     delay : s of the arm's time from the loss to zero current, NaN where it does not apply.
     """
 
-    number: int
+    kind: str
     name: str
     size: int = 1
     escapes: tuple[str, ...] = ()
@@ -85,74 +96,31 @@ class FaultTrial(NamedTuple):
     delay: float = math.nan
 
 
-class FaultKind(NamedTuple):
-    """A kind of fault.
+class NodeKeeper:
+    """The nodes that trials run on, one set at a time in a network, kept from one trial to the next."""
 
-    Attributes
-    ----------
-    name : as on the command line.
-    doc : what is done, one line.
-    unit : of `FaultTrial.size`, plural.
-    full, short : number of trials.
-    play : makes trials from a configuration, a seed, the first index and the number.
-    """
+    def __init__(self) -> None:
+        self._key: Any = None
+        self._kept: Any = None
 
-    name: str
-    doc: str
-    unit: str
-    full: int
-    short: int
-    play: Callable[[Configuration, int, int, int], Iterator[FaultTrial]]
+    def ready(self, make: Callable[[Configuration], Any], configuration: Configuration) -> Any:
+        """The nodes that `make` makes of a configuration: those of the last trial where they are the same.
 
+        Parameters
+        ----------
+        make : makes what has a method `close`.
+        configuration : of the nodes.
+        """
+        if self._key != (make, configuration):
+            self.discard()
+            self._kept, self._key = make(configuration), (make, configuration)
+        return self._kept
 
-class KindResult(NamedTuple):
-    """All trials of one kind."""
-
-    kind: str
-    unit: str
-    seed: int
-    trials: list[FaultTrial]
-    seconds: float  # of wall time
-
-    @property
-    def tried(self) -> int:
-        """Number of messages, sets, losses and so on."""
-        return sum(trial.size for trial in self.trials)
-
-    @property
-    def escaped(self) -> list[FaultTrial]:
-        """Trials in which something went wrong."""
-        return [trial for trial in self.trials if trial.escapes]
-
-    def worst(self, quantity: str) -> float:
-        """Largest value of `motion`, `force` or `delay`, NaN where no trial has one."""
-        found = [value for trial in self.trials if not math.isnan(value := getattr(trial, quantity))]
-        return max(found, default=math.nan)
+    def discard(self) -> None:
+        """End the nodes: one has ended, their parameters have changed, or they cannot be enabled."""
+        if self._kept is not None:
+            self._kept.close()
+        self._key = self._kept = None
 
 
-def played(
-    kind: FaultKind,
-    configuration: Configuration,
-    seed: int,
-    first: int,
-    count: int,
-    clock: Callable[[], float],
-    report: Callable[[int, int], None] = lambda done, of: None,
-) -> KindResult:
-    """Play trials of one kind, at most until `FAULTS.most_escapes` have escaped."""
-    begin = clock()
-    trials: list[FaultTrial] = []
-    escaped = 0
-    report(0, count)
-    for trial in kind.play(configuration, seed, first, count):
-        trials.append(trial)
-        escaped += bool(trial.escapes)
-        report(len(trials), count)
-        if escaped >= FAULTS.most_escapes:
-            break
-    return KindResult(kind.name, kind.unit, seed, trials, clock() - begin)
-
-
-def finite(values: Iterable[Any]) -> bool:
-    """Whether all numbers are finite; their sum is not where one is not."""
-    return math.isfinite(math.fsum(values)) if (values := list(values)) else True
+KEPT = NodeKeeper()  # of this process

@@ -24,7 +24,7 @@ from wam_ros.topics import NAMESPACE, listening, qos
 from wam_ros.wire import encoder, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 from wam_studies.faults.message_faults import leaves
-from wam_studies.faults.trials import FAULTS, FaultTrial
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 SECOND: Final = 1_000_000_000
@@ -324,50 +324,32 @@ def _is_wrong(value: Any, may_be_unknown: bool) -> bool:
     return not math.isfinite(math.fsum(numbers)) if numbers else False
 
 
-class StackSource:
-    """One watched stack after another: a new one where the last was discarded."""
+def recorded_into(configuration: Configuration, folder: str) -> dict[str, Any]:
+    """Values that add a recorder, which writes into `folder`/bag."""
+    nodes = [*configuration.shared.nodes, "recorder"]
+    return {"nodes": nodes, "recorder:directory": folder, "recorder:name": "bag"}
 
-    def __init__(self, configuration: Configuration) -> None:
-        self._configuration = configuration
-        self._stack: WatchedStack | None = None
 
-    def ready(self) -> WatchedStack:
-        """The present stack, made if there is none."""
-        if self._stack is None:
-            self._stack = WatchedStack(self._configuration)
-        return self._stack
+def watched_trial(case: FaultCase, name: str, work: Callable[[WatchedStack], int]) -> FaultTrial:
+    """A trial on an enabled arm, which an operator must be able to enable afterwards.
 
-    def discard(self) -> None:
-        """Destroy the present stack: a node of it has ended, or it cannot be enabled."""
-        if self._stack is not None:
-            self._stack.close()
-            self._stack = None
-
-    def trial(self, number: int, name: str, work: Callable[[WatchedStack], int]) -> FaultTrial:
-        """A trial on an enabled arm, which an operator must be able to enable afterwards.
-
-        Parameters
-        ----------
-        number, name : of the trial.
-        work : does what is tried; returns how much of it there was.
-        """
-        stack = self.ready()
-        size, escapes = 1, []
-        reason = stack.begin()
-        try:
-            if not reason:
-                size = work(stack)
-                escapes = list(stack.escapes)
-                reason = stack.recover()
-        except NodeEndedError as error:
-            escapes, reason = list(stack.escapes), str(error)
-        if reason:
-            self.discard()
-            escapes.append(reason)
-        return FaultTrial(number, name, size, tuple(escapes), stack.motion, stack.force)
-
-    def __enter__(self) -> "StackSource":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.discard()
+    Parameters
+    ----------
+    case : whose nodes are watched.
+    name : of what is tried.
+    work : does it; returns how much of it there was.
+    """
+    stack: WatchedStack = KEPT.ready(WatchedStack, case.configuration)
+    size, escapes = 1, []
+    reason = stack.begin()
+    try:
+        if not reason:
+            size = work(stack)
+            escapes = list(stack.escapes)
+            reason = stack.recover()
+    except NodeEndedError as error:
+        escapes, reason = list(stack.escapes), str(error)
+    if reason:
+        KEPT.discard()
+        escapes.append(reason)
+    return FaultTrial(case.kind, name, size, tuple(escapes), stack.motion, stack.force)

@@ -41,8 +41,8 @@ def breakpoints() -> Panels:
     asymptote = float(hard_contact_bandwidth(inertias[0], stiffness))
     lines, points = crossover * np.geomspace(1e-3, 1e2, 301), crossover * np.geomspace(1.2e-3, 10.0, 14)
     both, measured = force_resonances(*inertias, stiffness, lines, RATIO), resonances(RATIO, points)
-    lower = Series(lines, both.lower, points, measured.lower.plant).scaled(1.0, HZ)
-    upper = Series(lines, both.upper, points, measured.upper.plant).scaled(1.0, HZ)
+    lower = Series(lines, both.lower, points, measured[0]).scaled(1.0, HZ)
+    upper = Series(lines, both.upper, points, measured[1]).scaled(1.0, HZ)
     simple = small_ratio_resonances(*inertias, stiffness, lines)
     limits = (
         ("ω₁, N = 14 (4.4)", lower),
@@ -52,7 +52,7 @@ def breakpoints() -> Panels:
     matched, family = float(matched_ratio(*inertias)), []
     for ratio in (RATIO / 4.0, RATIO, 0.4 * matched, matched, 3.0 * matched):
         exact = force_resonances(*inertias, stiffness, lines, ratio).lower
-        plant = resonances(ratio, points).lower.plant
+        plant = resonances(ratio, points)[0]
         one = Series(lines, exact, points, plant).scaled(1.0 / crossover, 1.0 / asymptote)
         family.append((f"N = {ratio / matched:.2g} N_m", one))
     axes, shown = ("contact stiffness at the joint [N m/rad]", "frequency [Hz]"), (np.nan, np.nan, 1.0, 2e3)

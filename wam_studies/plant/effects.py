@@ -5,7 +5,6 @@ has a rotor of practically infinite inertia.
 """
 
 from dataclasses import replace
-from functools import cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -30,8 +29,6 @@ from wam_studies.plant.ideal_testbed import (
 )
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
-from wam_theory.resonance import force_resonances
-from wam_theory.stick_slip import IntegralLoop, simulate
 from wam_theory.tension_element import coulomb_like_torque
 
 Numbers = NDArray[np.float64]
@@ -55,14 +52,6 @@ class PlantCurve(NamedTuple):
 def level(plant: float, theory: float) -> PlantCurve:
     """A single number."""
     return PlantCurve(np.zeros(1), np.array([plant]), np.array([theory]))
-
-
-class Resonance(NamedTuple):
-    """Both resonances over contact stiffness, for one transmission ratio, rad/s."""
-
-    ratio: float
-    lower: PlantCurve
-    upper: PlantCurve
 
 
 def _run(plant: Plant, seconds: float) -> None:
@@ -209,18 +198,13 @@ def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
     return PlantCurve(angle, np.array(torques), eccentric_ripple(eccentricity, circuit.pretension, angle / 3.0 + 0.5))
 
 
-def resonances(ratio: float, stiffness: Numbers) -> Resonance:
-    """Both resonances of (4.4) from the plant's own one-step map, over k_c at the joint, N m/rad."""
-    arm = ideal_testbed(ratio)
-    (circuit,) = arm.circuits
-    found = []
+def resonances(ratio: float, stiffness: Numbers) -> Numbers:
+    """Both resonances of (4.4) from the plant's own one-step map, (2, k), rad/s, over k_c at the joint, N m/rad."""
+    arm, found = ideal_testbed(ratio), []
     for k in stiffness:
         angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, against_spring(k))))))
         found.append(np.sort(angles)[[0, 2]] / STEP)
-    inertia = float(arm.motors.inertia[0]), link_inertia(arm)
-    theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)
-    lower, upper = np.array(found).T
-    return Resonance(ratio, PlantCurve(stiffness, lower, theory.lower), PlantCurve(stiffness, upper, theory.upper))
+    return np.array(found).T
 
 
 def surface(hardening: float) -> PlantCurve:
@@ -240,21 +224,6 @@ def surface(hardening: float) -> PlantCurve:
         (load,) = plant.loads()
         forces.append(float(np.linalg.norm(load.force)))
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
-
-
-@cache
-def stiction_cycle() -> PlantCurve:
-    """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
-    found = force_step(20.0, 1464.28, 2e-2, 12.0, (6.0, 4.0), 8.0)
-    exact = simulate(found.node, IntegralLoop(2e-2), 20.0, 8.0)
-    return PlantCurve(found.time, found.force, exact.at(found.time).contact_force)
-
-
-def actuator_cycle() -> PlantCurve:
-    """Motor position of a force loop with Coulomb friction, (5.20), rad over s; domain I, above gamma_b."""
-    found = force_step(20.0, 1464.28, 4.3e-2, 18.7, (6.0, 6.0), 6.0)
-    exact = simulate(found.node, IntegralLoop(4.3e-2), 20.0, 6.0)
-    return PlantCurve(found.time, found.motor, exact.at(found.time).x_m)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:

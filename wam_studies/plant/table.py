@@ -11,7 +11,7 @@ from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.sensors import Encoders
 from wam_studies.plant import effects
-from wam_studies.plant.effects import PlantCurve, breakaway, level, resonances, torque_loop, torque_loop_response
+from wam_studies.plant.effects import PlantCurve, breakaway, level, torque_loop, torque_loop_response
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     STEP,
@@ -21,15 +21,6 @@ from wam_studies.plant.ideal_testbed import (
     released_plant,
 )
 from wam_theory.backlash_cycle import exact_cycle
-
-RATIOS = (4.0, 14.0, 60.0)
-
-
-def tension_friction(coefficient: float = 1e-4) -> PlantCurve:
-    """Breakaway torque of the motor with friction proportional to the tension of both strands, c (T1 + T2), (6.5)."""
-    arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
-    plant = released_plant(arm, tension_friction=(coefficient,))
-    return level(breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
 
 
 def added_friction() -> PlantCurve:
@@ -72,25 +63,6 @@ def torque_cycle(hertz: float = 477.0) -> PlantCurve:
     return level(mean_cycle(*torque_loop_response(hertz)).peak_to_peak, exact_cycle(torque_loop(hertz)).torque)
 
 
-def stiction_size() -> PlantCurve:
-    """F_c of the stiction cycle, peak to peak, N m, (5.8)."""
-    plant, exact = (mean_cycle(effects.stiction_cycle().x, force) for force in effects.stiction_cycle()[1:])
-    return level(plant.peak_to_peak, exact.peak_to_peak)
-
-
-def stiction_period() -> PlantCurve:
-    """Period of the stiction cycle, s, (5.9)."""
-    plant, exact = (mean_cycle(effects.stiction_cycle().x, force) for force in effects.stiction_cycle()[1:])
-    return level(plant.period, exact.period)
-
-
-def worst_resonance(side: str) -> PlantCurve:
-    """The lower or upper frequency of (4.4) that is furthest from theory, rad/s, over ratios and contact stiffness."""
-    found = [getattr(resonances(ratio, np.geomspace(1e2, 1e5, 25)), side) for ratio in RATIOS]
-    errors = [(abs(p / t - 1.0), p, t) for curve in found for p, t in zip(curve.plant, curve.theory, strict=True)]
-    return level(*max(errors)[1:])
-
-
 EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "slack": effects.slack,
     "backlash": effects.backlash,
@@ -102,14 +74,8 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "linear surface": lambda: effects.surface(0.0),
     "hardening surface": lambda: effects.surface(50.0),
     "impact": effects.impact,
-    "actuator cycle": effects.actuator_cycle,
     "backlash in the loop": effects.actuator_cycle_with_backlash,
     "backlash in a torque loop": effects.backlash_in_a_torque_loop,
-    "stiction cycle, peak to peak": stiction_size,
-    "stiction cycle, period": stiction_period,
-    "lower resonance": lambda: worst_resonance("lower"),
-    "upper resonance": lambda: worst_resonance("upper"),
-    "friction by tension, breakaway": tension_friction,
     "added friction, breakaway": added_friction,
     "damping of the circuit, decay": circuit_damping,
     "amplifier, time to the continuous limit": heating,

@@ -9,10 +9,11 @@ import numpy as np
 
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.tasks.object_traces import ObjectTrace, object_traces, world_of
-from wam_studies.thesis.recording import Forces, Recording, Step
+from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result, below, near, noted
 
 NO_CLAIM = math.nan
+TRUE, ESTIMATED = "sim/contact/wrench", "contact/wrench"
 
 Runs = Mapping[str, Recording]
 
@@ -138,7 +139,7 @@ def following(runs: Runs) -> Result:
     (run,) = runs.values()
     press, follow = run.step("press 10 N"), run.step("follow the surface")
     surface = object_traces(run)["foam_box"].during(follow.begin + 1.0, follow.end)
-    force = _along(run.forces("sim/contact/wrench"), follow.begin + 1.0, follow.end)
+    force = run.forces(TRUE).during(follow.begin + 1.0, follow.end).across
     speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
     rows = [
         near("at rest, true force across", 10.0, _across(run, press), "N", "commanded", BOUNDS.force),
@@ -199,30 +200,21 @@ def _hinge_torque(run: Recording, door: ObjectTrace) -> Numbers:
     return torque
 
 
-def _along(forces: Forces, begin: float, end: float) -> Numbers:
-    """Force across the link, N, between two times."""
-    there = (forces.time >= begin) & (forces.time < end)
-    across: Numbers = np.hypot(forces.force[there, 1], forces.force[there, 2])
-    return across
-
-
 def _across(run: Recording, step: Step) -> float:
-    return float(_along(run.forces("sim/contact/wrench"), step.end - BOUNDS.steady, step.end).mean())
+    """True force across the link at the end of a step, mean, N."""
+    return float(run.forces(TRUE).during(step.end - BOUNDS.steady, step.end).across.mean())
 
 
 def _estimate(run: Recording, step: Step) -> list[Comparison]:
     """The estimate over a step next to the truth: the force across, and the time with the right link."""
-    truth, estimate = run.forces("sim/contact/wrench"), run.forces("contact/wrench")
-    there = (truth.time >= step.begin) & (truth.time < step.end)
-    at = np.searchsorted(estimate.time, truth.time[there]).clip(0, len(estimate.time) - 1)
-    force, frames = truth.force[there], np.array(truth.frames)[there]
+    truth, estimate = run.forces(TRUE).during(step.begin, step.end), run.forces(ESTIMATED)
+    at = np.searchsorted(estimate.time, truth.time).clip(0, len(estimate.time) - 1)
+    frames = np.array(truth.frames)
     touched = frames != "base"
     if not np.any(touched):
         return [Comparison(f"{step.name}, contact", "yes", "no")]
-    guess, found = estimate.force[at][touched], np.array(estimate.frames)[at][touched]
-    right = found == frames[touched]
-    true = float(np.hypot(force[touched][:, 1], force[touched][:, 2]).mean())
-    estimated = float(np.hypot(guess[:, 1], guess[:, 2]).mean())
+    right = np.array(estimate.frames)[at][touched] == frames[touched]
+    true, estimated = float(truth.across[touched].mean()), float(estimate.across[at][touched].mean())
     return [
         Comparison(f"{step.name}, estimated force across, mean", true, estimated, "N", NO_CLAIM, "true"),
         Comparison(f"{step.name}, time with the right link", 1.0, float(np.mean(right)), "of the contact", NO_CLAIM),
@@ -231,15 +223,13 @@ def _estimate(run: Recording, step: Step) -> list[Comparison]:
 
 def _forces(run: Recording, begin: float, end: float) -> Panel:
     curves = []
-    for topic, label in (("contact/wrench", "estimated"), ("sim/contact/wrench", "true")):
-        forces = run.forces(topic)
-        there = (forces.time >= begin) & (forces.time < end)
-        curves.append((label, measured(forces.time[there], _along(forces, begin, end))))
-    commanded = run.forces("force_command")
-    there = (commanded.time >= begin) & (commanded.time < end)
-    size = np.linalg.norm(commanded.force[there], axis=1)
+    for topic, label in ((ESTIMATED, "estimated"), (TRUE, "true")):
+        forces = run.forces(topic).during(begin, end)
+        curves.append((label, measured(forces.time, forces.across)))
+    commanded = run.forces("force_command").during(begin, end)
+    size = np.linalg.norm(commanded.force, axis=1)
     if np.any(size):
-        curves.append(("commanded", line_only(commanded.time[there], size)))
+        curves.append(("commanded", line_only(commanded.time, size)))
     return Panel("force across the link", "time [s]", "force [N]", curves)
 
 

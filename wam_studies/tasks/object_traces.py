@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_bag.bag import BagError, TableColumns
+from wam_bag.bag import TableColumns
 from wam_description.signals import ObjectState
 from wam_description.world import World
 from wam_studies.figures.panels import Numbers
@@ -49,7 +49,7 @@ def world_of(run: Recording) -> World:
 
 def object_states(run: Recording, time: float) -> list[ObjectState]:
     """Every object at a time, s, in the order of `World.objects`."""
-    table = _table(run)
+    table = run.columns(TOPIC, TableColumns)
     at = int(np.searchsorted(table.stamp_ns, round(time * 1e9)).clip(0, len(table.stamp_ns) - 1))
     there = table.message == at
     return [ObjectState._make(row) for row in zip(*(table.columns[n][there] for n in ObjectState._fields), strict=True)]
@@ -63,15 +63,8 @@ def object_traces(run: Recording) -> dict[str, ObjectTrace]:
     BagError
         if the truth about the objects was not recorded.
     """
-    table = _table(run)
+    table = run.columns(TOPIC, TableColumns)
     return {name: _trace(table, i) for i, name in enumerate(world_of(run).objects)}
-
-
-def _table(run: Recording) -> TableColumns:
-    table = run.bag.topics.get(f"{run.namespace}/{TOPIC}")
-    if not isinstance(table, TableColumns):
-        raise BagError(f"{run.bag.path} has no topic '{TOPIC}'; record it, in a world with objects")
-    return table
 
 
 def _trace(table: TableColumns, i: int) -> ObjectTrace:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_bag.bag import BagError, PointColumns
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Forces, Recording, Step
@@ -139,7 +138,7 @@ def _named(run: Recording, word: str) -> Sequence[Step]:
 
 def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
     """Greatest error of the estimated position, of the means of each step."""
-    true, estimated = _positions(run, "sim/contact/point"), _positions(run, "contact/point")
+    true, estimated = run.positions("sim/contact/point"), run.positions("contact/point")
     errors = []
     for step in steps:
         means = []
@@ -148,13 +147,6 @@ def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
             means.append(float(np.nanmean(position[late])))
         errors.append(abs(means[1] - means[0]))
     return below("position error, worst step", max(errors), "m", BOUNDS.position, "chapter 2")
-
-
-def _positions(run: Recording, topic: str) -> tuple[Numbers, Numbers]:
-    columns = run.bag.topics.get(f"{run.namespace}/{topic}")
-    if not isinstance(columns, PointColumns):
-        raise BagError(f"{run.bag.path} has no topic '{topic}'; record it")
-    return columns.stamp_ns / 1e9, columns.point[:, 0]
 
 
 def _panel(found: Along, steps: Sequence[Step]) -> Panel:
@@ -188,7 +180,7 @@ def pushed(runs: Mapping[str, Recording]) -> Result:
     estimated = float(np.linalg.norm(estimate.force[during & right], axis=1).mean())
     positions = [
         float(np.nanmedian(position[(time > begin + BOUNDS.latency) & (time <= end)]))
-        for time, position in (_positions(run, "sim/contact/point"), _positions(run, "contact/point"))
+        for time, position in (run.positions("sim/contact/point"), run.positions("contact/point"))
     ]
     quiet = estimate.time < begin
     before = float(np.mean([bool(frame) and frame != NO_CONTACT for frame in np.array(estimate.frames)[quiet]]))

@@ -54,9 +54,8 @@ def work(run: Recording, lift: Step, after: Step) -> tuple[float, float, float]:
 
 def load_torque(run: Recording, step: Step) -> float:
     """Torque of the push in a step at the joint, N m, positive against it."""
-    push = run.forces("sim/disturbance")
-    during = (push.time >= step.begin) & (push.time < step.end - BOUNDS.rounding)
-    return -float(np.median(push.torque[during, 2]))
+    push = run.forces("sim/disturbance").during(step.begin, step.end - BOUNDS.rounding)
+    return -float(np.median(push.torque[:, 2]))
 
 
 def creeping(runs: Mapping[str, Recording]) -> Result:

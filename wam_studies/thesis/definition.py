@@ -7,7 +7,7 @@ a scenario, and a sample: the part of a run that is kept in `bags/sample/NAME`, 
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import yaml
 
@@ -18,18 +18,16 @@ from wam_description.parameters import ParameterError, require
 FOLDER = "experiments"
 TASKS = "tasks"
 SETS = "experiments/sets"
-KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs", "sample")
-RUN_KEYS = ("name", "values", "steps", "stops")
-SAMPLE_KEYS = ("run", "shows", "seconds", "topics", "thinned", "evaluation")
+T = TypeVar("T")
 
 
 class Run(NamedTuple):
     """One recording: values in addition to those of the experiment, and the steps of its scenario."""
 
     name: str
-    values: Mapping[str, Any]
     steps: Sequence[Mapping[str, Any]]
-    stops: bool  # whether the driver is expected to stop the arm
+    values: Mapping[str, Any] = {}
+    stops: bool = False  # whether the driver is expected to stop the arm
 
     @property
     def seconds(self) -> float:
@@ -44,31 +42,32 @@ class SampleDefinition(NamedTuple):
     ----------
     run : its name.
     shows : description.
-    begin, end : s of the arm's time.
+    seconds : begin and end, of the arm's time.
     topics : kept of those recorded; None for all.
     thinned : of a topic, that the first of so many messages is kept.
-    evaluation : of the sample, from a mapping with this run only.
+    evaluation : of the sample, from a mapping with this run only; that of the experiment where it has none.
     """
 
     run: str
     shows: str
-    begin: float
-    end: float
-    topics: tuple[str, ...] | None
-    thinned: Mapping[str, int]
-    evaluation: str
+    seconds: tuple[float, float]
+    topics: tuple[str, ...] | None = None
+    thinned: Mapping[str, int] = {}
+    evaluation: str = ""
 
 
 class Experiment(NamedTuple):
     """Runs and their evaluation: `MODULE.FUNCTION` of `wam_studies.thesis` or `PACKAGE.MODULE:FUNCTION`."""
 
-    name: str
     title: str
     section: str
     configuration: str
     evaluation: str
     runs: tuple[Run, ...]
-    sample: SampleDefinition | None
+    include: tuple[str, ...] = ()
+    values: Mapping[str, Any] = {}
+    sample: SampleDefinition | None = None
+    name: str = ""
 
     def run(self, name: str) -> Run:
         """The run of a name."""
@@ -108,19 +107,17 @@ def load(name: str) -> Experiment:
         known = [*names(), *tasks()]
         require(name in known, f"no experiment is named '{name}'; choose from {', '.join(known)}")
         path = packaged(f"{TASKS if name in tasks() else FOLDER}/{name}")
-    tree = _mapping(path)
-    _keys(str(path), tree, KEYS, ("title", "section", "configuration", "evaluation", "runs"))
-    shared: dict[str, Any] = {}
-    for included in tree.get("include", ()):
-        shared.update(_mapping(packaged(f"{SETS}/{included}")))
-    shared.update(tree.get("values", {}))
-    require(isinstance(tree["runs"], list) and bool(tree["runs"]), f"{path}: 'runs' must be a list with at least one")
-    runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(tree["runs"]))
+    experiment = _built(str(path), _tree(path), Experiment)
+    require(bool(experiment.runs), f"{path}: 'runs' must be a list with at least one")
+    sets = [_tree(packaged(f"{SETS}/{included}")) for included in experiment.include]
+    shared = {key: value for values in (*sets, experiment.values) for key, value in values.items()}
+    runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(experiment.runs))
     doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
     require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
-    title, section, configuration, evaluation = (str(tree[key]) for key in KEYS[:4])
-    sample = _sample(str(path), tree["sample"], evaluation, [run.name for run in runs]) if "sample" in tree else None
-    return Experiment(path.stem, title, section, configuration, evaluation, runs, sample)
+    sample = None if experiment.sample is None else _sample(f"{path}, sample", experiment.sample, runs)
+    if sample is not None and not sample.evaluation:
+        sample = sample._replace(evaluation=experiment.evaluation)
+    return experiment._replace(name=path.stem, section=str(experiment.section), runs=runs, sample=sample)
 
 
 def configured(experiment: Experiment, run: Run, directory: Path) -> Configuration:
@@ -158,48 +155,42 @@ def with_run(base: Configuration, run: Run, directory: Path) -> Configuration:
 
 
 def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
-    require(isinstance(body, dict), f"{where} is {body!r}; it must be a mapping with name and steps")
-    _keys(where, body, RUN_KEYS, ("name", "steps"))
-    name = str(body["name"])
+    run = _built(where, body, Run)
+    name = str(run.name)
     require(name == Path(name).name and name != "..", f"{where}: name is '{name}'; it must be valid for a directory")
+    require(bool(run.steps), f"{where}: 'steps' must be a list with at least one")
+    return run._replace(name=name, values={**shared, **run.values})
+
+
+def _sample(where: str, body: Any, runs: Sequence[Run]) -> SampleDefinition:
+    sample, names = _built(where, body, SampleDefinition), [run.name for run in runs]
+    require(sample.run in names, f"{where}: no run is named '{sample.run}'; choose from {', '.join(names)}")
+    seconds = list(sample.seconds)
     require(
-        isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one"
+        len(seconds) == 2 and 0.0 <= seconds[0] < seconds[1],
+        f"{where}: 'seconds' is {seconds!r}; it must be start and end, [0.0, 4.0]",
     )
-    return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
-
-
-def _sample(where: str, body: Any, evaluation: str, runs: Sequence[str]) -> SampleDefinition:
-    require(isinstance(body, dict), f"{where}: 'sample' is {body!r}; it must be a mapping with run, shows and seconds")
-    _keys(f"{where}, sample", body, SAMPLE_KEYS, ("run", "shows", "seconds"))
-    name, seconds, topics = str(body["run"]), body["seconds"], body.get("topics")
-    require(name in runs, f"{where}, sample: no run is named '{name}'; choose from {', '.join(runs)}")
+    topics = None if sample.topics is None else tuple(sample.topics)
     require(
-        isinstance(seconds, list) and len(seconds) == 2 and 0.0 <= seconds[0] < seconds[1],
-        f"{where}, sample: 'seconds' is {seconds!r}; it must be start and end, [0.0, 4.0]",
+        all(each > 0 for each in sample.thinned.values()) and set(sample.thinned) <= set(topics or sample.thinned),
+        f"{where}: 'thinned' is {sample.thinned}; give each of some of the topics a number above 0",
     )
-    chosen = None if topics is None else tuple(map(str, topics))
-    begin, end = map(float, seconds)
-    thinned = {str(topic): int(each) for topic, each in body.get("thinned", {}).items()}
-    require(
-        all(each > 0 for each in thinned.values()) and set(thinned) <= set(chosen or thinned),
-        f"{where}, sample: 'thinned' is {thinned}; give each of some of the topics a number above 0",
-    )
-    return SampleDefinition(
-        name, str(body["shows"]), begin, end, chosen, thinned, str(body.get("evaluation", evaluation))
-    )
+    return sample._replace(seconds=(float(seconds[0]), float(seconds[1])), topics=topics)
 
 
-def _mapping(path: Path) -> dict[str, Any]:
+def _tree(path: Path) -> Any:
     try:
-        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
+        return yaml_text.parse(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
-    require(isinstance(tree, dict), f"{path} is not a mapping of names to values")
-    return dict(tree)
 
 
-def _keys(where: str, body: Mapping[str, Any], allowed: Sequence[str], needed: Sequence[str]) -> None:
+def _built(where: str, body: Any, kind: type[T]) -> T:
+    """A tuple of this kind with the fields that a mapping gives."""
+    fields, optional = kind._fields, kind._field_defaults  # type: ignore[attr-defined]
+    require(isinstance(body, dict), f"{where} is {body!r}; it must be a mapping with {', '.join(fields)}")
     for key in body:
-        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
-    for key in needed:
-        require(key in body, f"{where}: '{key}' is missing")
+        require(key in fields, f"{where}: unknown key '{key}'; allowed: {', '.join(fields)}")
+    for key in fields:
+        require(key in body or key in optional, f"{where}: '{key}' is missing")
+    return kind(**body)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wam_bag.bag import BagError, PointColumns
+from wam_bag.bag import BagError
 from wam_description.rigid_body import RigidBody
 from wam_description.world import World
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
@@ -52,11 +52,9 @@ def touched(run: Recording, step: Step) -> Numbers:
     """
     arm, time = run.shared.arm, step.end + BOUNDS.position_known_after
     joints, wrench = run.joints("joint_states"), run.forces("contact/wrench")
-    points = run.bag.topics.get(f"{run.namespace}/contact/point")
-    if not isinstance(points, PointColumns):
-        raise BagError(f"{run.bag.path} has no topic 'contact/point'; record it")
+    times, places = run.positions("contact/point")
     q = joints.position[_last(joints.time, time)]
-    place = float(points.point[_last(points.stamp_ns / 1e9, time), 0])
+    place = float(places[_last(times, time)])
     at = _last(wrench.time, time)
     cover, push = wrench.frames[at], wrench.force[at]
     if cover not in arm.covers.names or np.isnan(place):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.cut import CUT
 from wam_description.arm import Shared
 from wam_sim.recorded_parameters import RecordedParameters
@@ -33,6 +33,18 @@ class Forces(NamedTuple):
     force: Numbers
     torque: Numbers
     frames: tuple[str, ...]
+
+    def during(self, begin: float, end: float) -> "Forces":
+        """The part between two times, s."""
+        there = (self.time >= begin) & (self.time < end)
+        frames = tuple(np.array(self.frames, dtype=str)[there].tolist())
+        return Forces(self.time[there], self.force[there], self.torque[there], frames)
+
+    @property
+    def across(self) -> Numbers:
+        """Size across the link's axis, (k,) N."""
+        found: Numbers = np.hypot(self.force[:, 1], self.force[:, 2])
+        return found
 
 
 class Step(NamedTuple):
@@ -79,17 +91,17 @@ class Recording(NamedTuple):
 
     def joints(self, topic: str) -> RecordedJoints:
         """A JointState topic."""
-        columns = self._columns(topic, JointColumns)
+        columns = self.columns(topic, JointColumns)
         return RecordedJoints(columns.stamp_ns / 1e9, columns.position, columns.velocity, columns.effort)
 
     def forces(self, topic: str) -> Forces:
         """A WrenchStamped topic."""
-        columns = self._columns(topic, WrenchColumns)
+        columns = self.columns(topic, WrenchColumns)
         return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, tuple(columns.frames))
 
     def table(self, topic: str) -> tuple[Numbers, Mapping[str, Numbers]]:
         """Times (p,) s and columns (p,) of the rows of a table."""
-        found = self._columns(topic, TableColumns)
+        found = self.columns(topic, TableColumns)
         return found.stamp_ns[found.message] / 1e9, found.columns
 
     def step(self, name: str) -> Step:
@@ -99,7 +111,19 @@ class Recording(NamedTuple):
                 return step
         raise BagError(f"{self.bag.path}: step '{name}' was not played; steps: {', '.join(s.name for s in self.steps)}")
 
-    def _columns(self, topic: str, kind: type[T]) -> T:
+    def positions(self, topic: str) -> tuple[Numbers, Numbers]:
+        """Times (k,) s and positions along the link (k,) m of a topic of contact points."""
+        found = self.columns(topic, PointColumns)
+        return found.stamp_ns / 1e9, found.point[:, 0]
+
+    def columns(self, topic: str, kind: type[T]) -> T:
+        """The columns of a topic.
+
+        Raises
+        ------
+        BagError
+            if there are none of this kind.
+        """
         columns = self.bag.topics.get(f"{self.namespace}/{topic}")
         if not isinstance(columns, kind):
             raise BagError(f"{self.bag.path} has no topic '{topic}' of {kind.__name__}; record it")

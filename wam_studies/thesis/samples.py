@@ -83,7 +83,7 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
     require(sample is not None, f"experiment {experiment.name} declares no sample; add one to its YAML")
     assert sample is not None  # for mypy
     bag = directory / FOLDER / experiment.name
-    part = Cut(round(1e9 * sample.begin), round(1e9 * sample.end), sample.topics, sample.thinned)
+    part = Cut(round(1e9 * sample.seconds[0]), round(1e9 * sample.seconds[1]), sample.topics, sample.thinned)
     cut(whole, bag, part)
     of_whole = {row.quantity: row for row in evaluate_sample(experiment, recording(whole)).rows}
     rows = tuple(
@@ -98,7 +98,7 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
         sample.run,
         sample.shows,
         f"wam experiment {experiment.name} --samples make",
-        (sample.begin, sample.end),
+        sample.seconds,
         count,
         sum(file.stat().st_size for file in files_of(bag)),
         {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(bag)},

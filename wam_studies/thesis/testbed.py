@@ -200,9 +200,7 @@ def verdicts(run: Recording, name: str) -> list[Comparison]:
 
 
 def _is_pushed(run: Recording, step: Step) -> bool:
-    push = run.forces("sim/disturbance")
-    during = (push.time >= step.begin) & (push.time < step.end - BOUNDS.rounding)
-    return bool(push.force[during].any())
+    return bool(run.forces("sim/disturbance").during(step.begin, step.end - BOUNDS.rounding).force.any())
 
 
 def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> Panel:

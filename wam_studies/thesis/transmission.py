@@ -1,12 +1,12 @@
 """Chapter 4: the force response of a transmission by chirp, and the position of its reducer."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_studies.figures.panels import Numbers, Panel, line_only, measured
+from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
 from wam_studies.thesis.recording import Recording
@@ -46,14 +46,11 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
     ]
     curves = [
-        ("measured", measured(found.frequency[inside], gain[inside])),
+        _gain("measured", found, low, high),
         ("(4.3) with damping", line_only(found.frequency[inside], predicted[inside])),
     ]
     coherence = [("", measured(found.frequency[inside], found.coherence[inside]))]
-    panels = [
-        Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", curves, "xy"),
-        Panel("coherence", "frequency [Hz]", "coherence [-]", coherence, "x"),
-    ]
+    panels = [_gains(curves), Panel("coherence", "frequency [Hz]", "coherence [-]", coherence, "x")]
     count = BOUNDS.averaged_frequencies
     remark = f"low coherence: the response changes within the {count} averaged neighbouring frequencies"
     return Result(rows, panels, (remark,))
@@ -64,11 +61,18 @@ def resonances_sample(runs: Mapping[str, Recording]) -> Result:
     (run,) = runs.values()
     found = transfer(run)
     rows = _resonance_rows(run, found)
-    inside = (found.frequency > 0.5 * float(rows[0].predicted)) & (found.frequency < 1.5 * float(rows[1].predicted))
-    gain = ("measured", measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
-    return Result(
-        rows, [Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", [gain], "xy")]
-    )
+    low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
+    return Result(rows, [_gains([_gain("measured", found, low, high)])])
+
+
+def _gain(label: str, found: Transfer, low: float, high: float) -> Line:
+    """Joint angle over motor torque between two frequencies, Hz."""
+    inside = (found.frequency > low) & (found.frequency < high)
+    return label, measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
+
+
+def _gains(lines: Sequence[Line]) -> Panel:
+    return Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", lines, "xy")
 
 
 def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
@@ -86,7 +90,7 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
         rows.append(_lower_resonance(run, found, label))
         low, high = swept(run)
         inside = (found.frequency > low) & (found.frequency < high)
-        curves.append((label, measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))))
+        curves.append(_gain(label, found, low, high))
         predicted = np.abs(response_of(run, found.frequency[inside]))
         curves.append(("(4.3)", line_only(found.frequency[inside], predicted)))
     for ratio in (14, 30):
@@ -103,8 +107,7 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
                 1e-3,
             )
         )
-    panel = Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", curves, "xy")
-    return Result(rows, [panel])
+    return Result(rows, [_gains(curves)])
 
 
 def allocation_sample(runs: Mapping[str, Recording]) -> Result:
@@ -112,11 +115,8 @@ def allocation_sample(runs: Mapping[str, Recording]) -> Result:
     ((name, run),) = runs.items()
     found = transfer(run)
     row = _lower_resonance(run, found, name.replace("_", " "))
-    inside = (found.frequency > 0.5 * float(row.predicted)) & (found.frequency < 3.0 * float(row.predicted))
-    gain = ("measured", measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
-    return Result(
-        [row], [Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", [gain], "xy")]
-    )
+    line = _gain("measured", found, 0.5 * float(row.predicted), 3.0 * float(row.predicted))
+    return Result([row], [_gains([line])])
 
 
 def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
@@ -159,10 +159,10 @@ def _lead(run: Recording) -> float:
 def swept(run: Recording) -> tuple[float, float]:
     """Lowest and highest frequency of the chirp, Hz, from the crossings of its force with the steady force."""
     command, sweep = run.forces("force_command"), run.step("sweep")
-    during = (command.time >= sweep.begin) & (command.time < sweep.end)
+    during = command.during(sweep.begin, sweep.end)
     after = command.force[int(np.searchsorted(command.time, sweep.end + BOUNDS.rounding))]
-    force = np.linalg.norm(command.force[during], axis=1) - np.linalg.norm(after)
-    crossings = command.time[during][np.flatnonzero(force[:-1] * force[1:] < 0.0)]
+    force = np.linalg.norm(during.force, axis=1) - np.linalg.norm(after)
+    crossings = during.time[np.flatnonzero(force[:-1] * force[1:] < 0.0)]
     lengths = np.diff(crossings)
     return 0.5 / float(lengths[:2].mean()), 0.5 / float(lengths[-10:].mean())
 

@@ -1,0 +1,280 @@
+"""What the estimator reports of true contacts, between them, and of torques: the same for every way to play an arm."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact.contact_estimator import ContactEstimate
+from wam_control.contact.contact_inference import Hypothesis
+
+Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
+PAYLOAD = "payload"  # how hypotheses, reasons and warnings name a mass at the tool
+
+
+@dataclass(frozen=True)
+class EvaluationLimits:
+    """Which true contacts count, when an estimate is evaluated, and what counts as motion."""
+
+    least_force: float = 0.3  # N, of a true contact
+    gap: int = 1  # moments without force within one contact
+    greatest_force: float = 25.0  # N; contacts with a greater force are excluded
+    settled: float = 0.2  # s from the start of a contact until the estimate is evaluated
+    settled_in_foam: float = 0.12  # s, the same in foam, which soon stops the arm
+    settled_at_rest: float = 0.4  # s, the same at rest, where the estimate averages over the dither
+    shortest: float = 0.12  # s; shorter contacts are excluded
+    edge: float = 0.1  # s after the start or end of a contact in which the observer lags
+    moving: float = 0.1  # rad/s of the fastest joint
+    sure: float = 0.95  # probability of a link
+    outside: float = 0.1  # largest probability of what a 90 % set may lack
+
+
+EVALUATION = EvaluationLimits()
+
+
+class EstimatedMoment(NamedTuple):
+    """One outer period.
+
+    Attributes
+    ----------
+    time : s.
+    estimate : of the estimator.
+    is_moving : whether a joint truly moves.
+    slowest : rad/s, of the slowest motor.
+    """
+
+    time: float
+    estimate: ContactEstimate
+    is_moving: bool
+    slowest: float
+
+
+class TrueContact(NamedTuple):
+    """A contact as it truly was.
+
+    Attributes
+    ----------
+    kind, cover, friction : of the scenario or the drawn contact; coefficient.
+    position, force, moment : at the evaluation; m, N, N m about the link's origin.
+    first, due, last : numbers of the moments of its start, of the evaluation, and until which it may be detected.
+    since : s, from which on the latency counts.
+    mass : kg, of a mass at the tool.
+    """
+
+    kind: str
+    cover: str
+    friction: float
+    position: float
+    force: float
+    first: int
+    due: int
+    last: int
+    since: float
+    moment: tuple[float, float, float] = (math.nan,) * 3
+    mass: float = 0.0
+
+
+class ContactOutcome(NamedTuple):
+    """One contact: the truth, and the estimate a fixed time after its start.
+
+    Attributes
+    ----------
+    kind, cover, position, force, friction : true.
+    moving : whether the arm moved at the start and at the evaluation.
+    latency : s to the detection; inf without one, NaN if there was one before the contact.
+    detected, probability, right_link, link : of the most probable link, '' and NaN without any.
+    error, position_sd : m; inf on the wrong link or without a position; NaN sd without a position.
+    in_set : whether the 90 % set contains the truth.
+    moment_error : of the moment about the link's origin on the right link, per moment.
+    least_force : N, size of the estimated force, a lower bound where the position is unknown.
+    sure_and_wrong : s of the contact in which another link is reported with certainty.
+    """
+
+    kind: str
+    cover: str
+    position: float
+    force: float
+    friction: float
+    moving: bool
+    latency: float
+    detected: bool
+    probability: float
+    right_link: bool
+    link: str
+    error: float
+    position_sd: float
+    in_set: bool
+    moment_error: float = math.nan
+    least_force: float = math.nan
+    sure_and_wrong: float = 0.0
+
+
+def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length: float, acting: Mask) -> ContactOutcome:
+    """What was reported of a contact.
+
+    Parameters
+    ----------
+    moments : of the whole run.
+    length : of the cover, m.
+    acting : of each moment, whether the contact acts.
+    """
+    now = moments[contact.due].estimate
+    best = now.hypotheses[0] if now.hypotheses else None
+    carries = payload_probability(now) if contact.mass else 0.0
+    is_named = best is not None and best.cover == contact.cover
+    own = [one for one in now.hypotheses if one.cover == contact.cover]
+    right = is_named or (best is not None and carries > best.probability)
+    known = best if is_named and best is not None and not math.isnan(best.position) else None
+    times = [m.time - contact.since for m in moments[contact.first : contact.last + 1] if m.estimate.in_contact]
+    already = contact.first > 0 and moments[contact.first - 1].estimate.in_contact
+    place = min(contact.position, length)
+    wrong = [is_sure_and_wrong(m.estimate, contact.cover) for m, acts in zip(moments, acting, strict=True) if acts]
+    return ContactOutcome(
+        kind=contact.kind,
+        cover=contact.cover,
+        position=contact.position,
+        force=contact.force,
+        friction=contact.friction,
+        moving=moments[contact.first].is_moving and moments[contact.due].is_moving,
+        latency=math.nan if already else times[0] if times else math.inf,
+        detected=now.in_contact,
+        probability=best.probability if best else math.nan,
+        right_link=right,
+        link=best.cover if best else "",
+        error=abs(known.position - contact.position) if known else math.inf,
+        position_sd=best.position_sd if right and best else math.nan,
+        in_set=carries > EVALUATION.outside or any(one.low - 1e-6 <= place <= one.high + 1e-6 for one in own),
+        moment_error=_moment_error(own[0], contact) if is_named else math.nan,
+        least_force=math.hypot(*own[0].force) if own else math.nan,
+        sure_and_wrong=sum(wrong) * (moments[1].time - moments[0].time),
+    )
+
+
+def _moment_error(found: Hypothesis, contact: TrueContact) -> float:
+    return math.dist(found.moment, contact.moment) / math.hypot(*contact.moment)
+
+
+def is_sure_and_wrong(estimate: ContactEstimate, cover: str) -> bool:
+    """Whether a link is reported with certainty that is not the touched one."""
+    return estimate.in_contact and estimate.probability > EVALUATION.sure and estimate.link != cover
+
+
+def payload_probability(estimate: ContactEstimate) -> float:
+    """Probability of a mass at the tool: what those of the links lack to 1; 0 without any hypothesis."""
+    links = [h.probability for h in estimate.hypotheses if h.cover != PAYLOAD]
+    return max(0.0, 1.0 - sum(links)) if estimate.hypotheses else 0.0
+
+
+class TorqueErrors(NamedTuple):
+    """Errors of the external torques of one run.
+
+    Attributes
+    ----------
+    moving, still, sliding : (n,), sums of squares, N^2 m^2, over the moments in which the arm moves, is at rest, and
+        in which every motor slides.
+    moving_z : (n,), sum of squared errors over reported variances, moving.
+    moving_count, still_count, sliding_count : of moments.
+    """
+
+    moving: tuple[float, ...]
+    still: tuple[float, ...]
+    sliding: tuple[float, ...]
+    moving_z: tuple[float, ...]
+    moving_count: int
+    still_count: int
+    sliding_count: int
+
+    def rms(self, state: str) -> Array:
+        """Root mean squares of the joints, (n,), N m, of 'moving', 'still' or 'sliding'."""
+        found: Array = np.sqrt(np.array(getattr(self, state)) / max(1, getattr(self, f"{state}_count")))
+        return found
+
+
+def torque_errors(moments: Sequence[EstimatedMoment], truth: Array, counts: Mask, sliding: float) -> TorqueErrors:
+    """Errors of the external torques.
+
+    Parameters
+    ----------
+    truth : (k, n), true torques, N m.
+    counts : (k,), whether a moment counts.
+    sliding : rad/s, of the slowest motor where every motor slides.
+    """
+    square = (np.array([one.estimate.external_torques for one in moments]) - truth) ** 2
+    variance = np.array([one.estimate.torque_sd for one in moments]) ** 2
+    is_moving = np.array([one.is_moving for one in moments])
+    moving, still = counts & is_moving, counts & ~is_moving
+    slides = counts & (np.array([one.slowest for one in moments]) > sliding)
+    return TorqueErrors(
+        _sums(square[moving]),
+        _sums(square[still]),
+        _sums(square[slides]),
+        _sums(square[moving] / variance[moving]),
+        *(int(there.sum()) for there in (moving, still, slides)),
+    )
+
+
+def _sums(squares: Array) -> tuple[float, ...]:
+    return tuple(squares.sum(axis=0).tolist())
+
+
+def alarms(moments: Sequence[EstimatedMoment], busy: Mask) -> int:
+    """Detections that start without contact; one that continues from a true contact ends late, and is no new alarm."""
+    alarm = np.array([one.estimate.in_contact for one in moments])
+    return int((alarm[1:] & ~alarm[:-1] & ~busy[1:]).sum())
+
+
+class MassOutcome(NamedTuple):
+    """What was reported of a mass while the tool carried it.
+
+    Attributes
+    ----------
+    mass : kg.
+    detected : whether there was any report, of a contact or of a payload.
+    named : whether it was reported as a payload: the most probable hypothesis, its reason, or the warning.
+    wrong : whether a link was ever reported with certainty that the tool is not on.
+    lasting : whether it is reported as a contact of a link at the end.
+    """
+
+    mass: float
+    detected: bool
+    named: bool
+    wrong: bool
+    lasting: bool
+
+
+class ContactScore(NamedTuple):
+    """One run, scored.
+
+    Attributes
+    ----------
+    name : of the scenario, or of the degradation.
+    group : 'moving', 'rest', 'dither' or 'free' of a scenario; of a drive the contacts that were drawn, 'identified'
+        where the arm was identified before.
+    outcomes : of the contacts.
+    free_seconds, alarms : time without contact; detections that start in it.
+    torques : errors of the external torques.
+    excluded, not_made : contacts that were too short or too hard; that were planned and did not happen.
+    warnings : share of the time without contact with a warning that the model is off.
+    contact_seconds : time with a contact.
+    masses : of each mass that was picked up.
+    started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
+    failure : why the run ended early.
+    """
+
+    name: str
+    group: str
+    outcomes: list[ContactOutcome]
+    free_seconds: float
+    alarms: int
+    torques: TorqueErrors
+    excluded: int = 0
+    not_made: int = 0
+    warnings: float = 0.0
+    contact_seconds: float = 0.0
+    masses: tuple[MassOutcome, ...] = ()
+    started: tuple[tuple[bool, bool], ...] = ()
+    failure: str = ""
