@@ -23,13 +23,12 @@ from wam_analysis import arm_picture, demo_report
 from wam_analysis.contact_list import NOT_PLACED, CutBy, certainty_of, listed_contacts
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import report
-from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
+from wam_analysis.demo_traces import RECORDED, TOPICS_READ
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.contact import contact_numbers
 from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.held_force import Theory
-from wam_analysis.findings.steps import VerdictResult
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.recorded import RecordedArm, recorded_arm
@@ -43,7 +42,7 @@ from wam_description.event_text import REASONS
 from wam_description.reasons import Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
-from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
+from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
 from wam_sim.reactions import RecordedReaction, sentences
 from wam_sim.recorded_parameters import recorded_parameters
 from wam_sim.recording import recorded_run
@@ -313,19 +312,6 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     assert math.isnan(inner.force_error)
 
 
-def test_a_lower_bound_has_no_error_in_the_median_either():
-    recording = Recording()
-    recording.set(recording.true, 2.1, 3.9, "inner_link", (0.0, 15.0, 0.0), 0.4)  # nearly half of all contact
-    recording.set(recording.estimated, 2.1, 3.9, "inner_link", (0.0, 5.0, 0.0))
-    recording.set(recording.true, 4.5, 10.0, "base", (0.0, 0.0, 0.0))
-    name = "size of the force error, median"
-    (error,) = (one for one in contact_section(recording).findings if one.name == name)
-    assert error.measured == pytest.approx(1.0)
-    recording.without = ("contact/point", "contact/hypotheses")
-    (error,) = (one for one in contact_section(recording).findings if one.name == name)
-    assert math.isnan(error.measured)
-
-
 def with_limits(recording: Recording) -> Bag:
     """The same, with the parameters of the force loop and a status of it in the last step."""
     sections = Configuration.load(packaged("wam")).sections
@@ -368,22 +354,6 @@ def nothing_but(true: tuple[float, float, str, float], estimated: tuple[float, f
     return recording
 
 
-@pytest.mark.parametrize(
-    ("steps", "name"),
-    [((), ""), ((0.0, 0.9), ""), ((1.5, 5.0), "move"), ((0.0, 1.2), "move"), ((0.0, 5.0), "move")],
-    ids=["no scenario", "after it", "begins before", "goes on after", "in it"],
-)
-def test_a_contact_is_too_hard_whenever_it_is(steps, name):
-    hit = (1.0, 2.0, "outer_link", 200.0)
-    recording = nothing_but(hit, hit)
-    stamps = [START + round(1e9 * at) for at in steps]
-    recording.statuses = [(said, stamp, 0) for said, stamp in zip(("move", "done"), stamps, strict=False)]
-    summary = summarize(with_limits(recording))
-    assert name in [hard.step for hard in summary.unplanned.hard]
-    assert answers(summary)[-1].result is VerdictResult.NO
-    assert "TOO HARD: a contact with 200 N" in demo_report.text(summary)
-
-
 def test_where_the_allowed_force_is_not_known_no_contact_is_shown_to_be_soft_enough():
     hit = (1.0, 2.0, "outer_link", 200.0)
     recording = nothing_but(hit, hit)
@@ -406,23 +376,6 @@ def test_where_the_allowed_force_is_not_known_no_contact_is_shown_to_be_soft_eno
     elsewhere = with_limits(recording)  # a setting of a node that was not recorded
     elsewhere.topics["/wam/status"].messages[0].values.append(SimpleNamespace(key="driver:world.box", value="1"))
     assert len(summarize(elsewhere).unplanned.hard) == 1
-
-
-@pytest.mark.parametrize("lost", ["sim/disturbance", "force_command", "task_command"])
-def test_a_hard_contact_that_may_have_been_commanded_is_not_shown_to_be_too_hard(lost):
-    hit = (1.0, 2.0, "outer_link", 120.0)
-    bag = with_limits(nothing_but(hit, hit))
-    assert len(summarize(bag).unplanned.hard) == 1
-    del bag.topics[f"/wam/{lost}"]
-    summary = summarize(bag)
-    assert summary.unplanned.hard == ()
-    assert str(answers(summary)[-1]) == NO_LIMIT
-    sentence = f"one had 120 N, and what may have been commanded then was not recorded ({lost})"
-    assert sentence in " ".join(demo_report.text(summary).split())
-    soft = (1.0, 2.0, "outer_link", 80.0)
-    bag = with_limits(nothing_but(soft, soft))
-    del bag.topics[f"/wam/{lost}"]
-    assert summarize(bag).unplanned == ((), "")  # allowed in any case
 
 
 def without_rows(bag: Bag, topic: str, begin: float, end: float) -> Bag:
@@ -488,30 +441,6 @@ def test_a_force_is_not_held_through_a_gap_of_its_command():
     assert times == [(5.0, 5.5), (6.5, 7.0), (7.0, 9.0)]
 
 
-def test_the_force_of_a_task_is_not_held_through_a_gap_of_its_command():
-    sections = Configuration.load(packaged("wam")).sections
-    content = yaml.safe_dump({"/wam/driver": {"ros__parameters": {**sections["/**"], **sections["driver"]}}})
-    row = dict(zip(TASK_COLUMNS, (1.0, -1.0, 1.0, 0.25, 0.0, -1.0, 0.0, 8.0, 0.0, 0.0, 0.0), strict=True))
-    columns = {name: np.full(len(STAMPS), value) for name, value in row.items()}
-    task = TableColumns(STAMPS, STAMPS, ("outer_link",) * len(STAMPS), np.arange(len(STAMPS)), columns)
-    bag = Recording().bag()._replace(attachments={"parameters.yaml": content.encode()})
-    bag = without_rows(bag._replace(topics={**bag.topics, "/wam/task_command": task}), "task_command", 2.0, 5.0)
-    times = [((one.begin - START) // MS, (one.end - START) // MS) for one in summarize(bag).tasks]
-    assert times == [(0, 1995), (5000, 9995)]
-
-
-@pytest.mark.parametrize("every", [1, 2, 3, 5])
-def test_a_lower_bound_stays_one_where_positions_are_recorded_less_often(every):
-    bag = Recording().bag()
-    points = bag.topics["/wam/contact/point"]
-    kept = np.arange(0, len(STAMPS), every)
-    few = PointColumns(STAMPS[kept], STAMPS[kept], tuple(points.frames[i] for i in kept), points.point[kept])
-    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/point": few}))
-    assert summary.contacts[1].estimate.is_lower_bound
-    assert not summary.contacts[0].estimate.is_lower_bound
-    assert math.isnan(summary.contacts[1].force_error)
-
-
 def test_a_contact_that_is_seen_for_a_moment_is_missed():
     recording = nothing_but((1.0, 4.0, "outer_link", 10.0), (1.0, 1.1, "outer_link", 9.0))
     recording.set(recording.push, 1.0, 4.0, "outer_link", (0.0, 10.0, 0.0))
@@ -521,17 +450,6 @@ def test_a_contact_that_is_seen_for_a_moment_is_missed():
     assert "right link: NO (missed)" in verdict(summary)
     recording.set(recording.estimated, 1.0, 2.6, "outer_link", (0.0, 9.0, 0.0), 0.28)
     assert "right link: YES" in verdict(recording.summary())
-
-
-def test_contacts_are_counted_by_link_wherever_they_are():
-    recording = nothing_but((1.0, 3.0, "outer_link", 10.0), (1.0, 3.0, "outer_link", 10.0))
-    recording.set(recording.true, 3.0, 4.0, "inner_link", (0.0, 10.0, 0.0), 0.28)
-    recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
-    bag = recording.bag()
-    summary = summarize(bag)
-    found = analyse_bag(bag, lambda doing: None)
-    assert "Something touched the arm 2 times." in [line for one in found.sections for line in one.sentences]
-    assert [missed.link for missed in summary.missed] == ["inner_link"]
 
 
 def test_without_truth_the_estimate_shows_what_was_too_hard():
@@ -546,16 +464,6 @@ def test_without_truth_the_estimate_shows_what_was_too_hard():
     own["nodes"] = ["bus_driver:OwnInterface" if node == "driver" else node for node in own["nodes"]]
     (hard,) = summarize(bag._replace(attachments={"parameters.yaml": yaml.safe_dump(of_bus).encode()})).unplanned.hard
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
-
-
-def test_what_a_step_sets_is_what_is_allowed_from_then_on():
-    recording = Recording()
-    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
-    bag = with_limits(recording)
-    stated = bag.topics["/wam/status"].messages
-    setting = SimpleNamespace(key="force_loop:limits.contact_force", value="200.0")
-    stated[3].values.append(setting)  # of a step before
-    assert summarize(bag).unplanned == ((), "")
 
 
 def test_a_contact_in_a_task_is_not_unplanned():
@@ -748,22 +656,6 @@ def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
     assert recording.summary().contacts[0].estimate.position == pytest.approx(0.30)
 
 
-def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
-    recording = Recording()
-    for series in (recording.true, recording.push, recording.estimated):
-        recording.set(series, 0.0, 1.5, "outer_link", (0.0, 12.0, 0.0), 0.28)
-    recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
-    recording.set(recording.estimated, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.26)
-    summary = recording.summary()
-    cut = [(one.before, one.after) for one in summary.contacts]
-    whole = (CutBy.NOTHING, CutBy.NOTHING)
-    assert cut == [(CutBy.RECORDING, CutBy.NOTHING), whole, whole, whole, (CutBy.NOTHING, CutBy.RECORDING)]
-    assert math.isnan(summary.contacts[0].latency)
-    sentences = contact_section(recording).sentences
-    assert "1 outer_link: it began before the recording." in sentences
-    assert "5 outer_link: it goes past the end of the recording." in sentences
-
-
 def test_a_contact_is_cut_where_the_estimate_was_lost():
     bag = Recording().bag()
     kept = np.r_[0:1200, 1260:2000]  # from 6.0 to 6.3 s nothing came
@@ -837,18 +729,6 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     assert answer in verdict(recording.summary())
 
 
-def test_a_press_on_nothing_is_neither_a_contact_nor_a_missed_one():
-    recording = Recording()
-    recording.set(recording.true, 4.8, 9.5, "base", (0.0, 0.0, 0.0))
-    recording.set(recording.estimated, 4.8, 9.5, "base", (0.0, 0.0, 0.0))
-    summary = recording.summary()
-    assert "right link: YES" in verdict(summary)
-    found = analyse_bag(recording.bag(), lambda doing: None)
-    sentences = [line for section in found.sections for line in section.sentences]
-    assert "Something touched the arm 2 times." in sentences
-    assert not any("MISSED" in line for line in sentences)
-
-
 def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another_is_none():
     recording = Recording()
     recording.set(recording.estimated, 1.0, 1.55, "inner_link", (0.0, 25.0, 0.0))
@@ -892,22 +772,6 @@ def test_empty_bag_gives_a_report_and_a_picture(tmp_path):
     assert "none was recorded" in demo_report.text(summary)
     assert save(tmp_path / "demo.png", summary, arm_of(empty), gl=())
     assert (tmp_path / "demo.png").stat().st_size > 10_000
-
-
-def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was_recorded_before_it():
-    """Latched topics are kept from before the part; no joint state is."""
-    recording, kept = Recording(), slice(1200, 2000)  # from 6.0 s
-    bag = recording.bag()
-    holds = status("force_loop", "not sensed", **event("refused"))
-    logged = [*(at for _, at, _ in recording.statuses[:4]), START + 5002 * MS, recording.statuses[4][1]]
-    stated = [*itertools.starmap(said, recording.statuses[:4]), holds, said(*recording.statuses[4])]
-    states = JointColumns(*(column[kept] for column in joints()[:3]), joints().names, *(c[kept] for c in joints()[4:7]))
-    topics = {"/wam/status": Messages(np.array(logged), tuple(stated)), "/wam/joint_states": states}
-    run = recorded_run(bag._replace(topics={**bag.topics, **topics}))
-    assert [stamp for stamp, _ in run.stamped_statuses()][-2:] == [START + 5000 * MS, START + 7000 * MS]
-    (reaction,) = summary_of(run).reactions
-    assert reaction.begin == START + 5000 * MS
-    assert "lower: refused" not in demo_report.text(summary_of(run))
 
 
 def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
@@ -960,28 +824,6 @@ def test_of_several_arms_one_is_chosen_and_the_others_are_named():
         recorded_run(bag, "middle")
 
 
-@pytest.mark.parametrize("namespace", ["", "/left", "/lab/left"])
-def test_namespace_is_found(namespace):
-    recording = Recording()
-    recording.namespace = namespace
-    assert recording.summary().namespace == namespace
-    assert len(recording.summary().held) == 2
-
-
-def test_timing_is_that_of_the_driver():
-    recording = Recording()
-    recording.timing = [
-        {"latency p50 [us]": p50, "latency p99 [us]": p99, "rate [Hz]": "998.5", "missed periods": m, "periods": n}
-        for p50, p99, m, n in (("300", "900", "5", "1000"), ("nan", "nan", "6", "2000"), ("500", "1500", "9", "3000"))
-    ]
-    recording.recording = {"mode": "realtime", "/a b received": "10", "/a b dropped": "2", "/c d received": "5"}
-    summary = recording.summary()
-    assert summary.loop[:7] == ("realtime", 998.5, 400.0, 1200.0, 1500.0, 9, 3000)
-    assert (summary.received, summary.dropped) == (15, 2)
-    assert "missed 9 of 3000 periods (0.3 %)" in " ".join(demo_report.text(summary).split())
-    assert "15 recorded, 2 dropped" in demo_report.text(summary)
-
-
 def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
     recording = Recording()
     recording.recording = {"mode": "lockstep"}
@@ -1023,19 +865,6 @@ def test_a_force_that_points_out_of_the_view_of_the_arm_is_drawn_whole_with_its_
     for label in labels.values():
         assert box.contains(*axes.transData.transform(label.xy))  # else nothing of it is drawn
         assert box.contains(*label.get_window_extent(renderer).max)
-
-
-def test_a_recording_that_begins_later_than_its_scenario_is_drawn_from_its_begin():
-    recording = Recording()
-    summary = recording.summary()
-    later = summary.traces.stamp >= START + 6_000 * MS
-    part = [ForceSignal(*(column[later] for column in signal)) for signal in summary.traces[1:]]
-    axes = Figure().add_subplot()
-    draw_forces(axes, summary._replace(traces=Traces(summary.traces.stamp[later], *part)))
-    assert axes.get_xlim() == pytest.approx((6.0, 10.0))
-    shown = [text.get_text().replace("\n", " ") for text in axes.texts]
-    assert "press 4 N" in shown
-    assert "push outer" not in shown
 
 
 def with_outcome(folder, *statuses: tuple[str, str, int]):

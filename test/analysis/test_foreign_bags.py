@@ -402,17 +402,6 @@ def test_two_publishers_of_the_same_joints_are_said_and_make_no_cycle(late: floa
     assert not numbers
 
 
-def test_a_command_that_is_sent_only_when_it_changes_is_one(tmp_path: Path) -> None:
-    time = times(20.0)
-    force = np.zeros((len(time), 3))
-    force[:, 2] = np.where(time < 5.0, 1.0, 19.0) + 0.02 * chance(46).normal(size=len(time))
-    asked = wrenches("/force_command", np.array([0.5, 5.0]), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 20.0]]))
-    given = TopicMap(commands=("/force_command",))
-    _, numbers = found((by_mcap_ros2(tmp_path / "bag", asked + wrenches("/ft", time, force)), given))
-    steady = next(value for name, value in numbers.items() if "steady state" in name)
-    assert steady == pytest.approx(19.0, rel=CLOSE)
-
-
 def quiet(path: Path, *commands: str) -> Analysis:
     return analyse(path, lambda doing: None, TopicMap(commands=commands))
 
@@ -486,35 +475,6 @@ def test_a_command_by_another_clock_is_that_of_the_motion(clock: str, whose: str
     assert (topics[whose] if clock == "never set" else "/joint_") in told[0]
 
 
-def test_receptions_of_a_converted_bag_shift_no_clock(tmp_path: Path) -> None:
-    """Its receptions are those of the conversion, topic after topic."""
-    time = np.arange(0.0, 20.0, 0.01)
-    both = {
-        topic: joints(topic, time, ["a", "b"], position=cycling(time - late, 0.8, 0.3))
-        for topic, late in (("/joint_states", 0.05), ("/joint_command", 0.0))
-    }
-    sent = [
-        one._replace(received=100.0 + 0.2 * k + 1e-5 * i)
-        for k, those in enumerate(both.values())
-        for i, one in enumerate(those)
-    ]
-    found = quiet(by_rosbags(tmp_path / "bag", sent), "/joint_command")
-    assert "clock" not in " ".join(section(found, "happened"))
-    assert "as it was commanded" in " ".join(section(found, "stability"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("rate", "frequency"), [(10.0, 0.8), (100.0, 2.7)])
-def test_a_slow_recording_of_a_motion_back_and_forth_shows_no_rest(
-    rate: float, frequency: float, tmp_path: Path
-) -> None:
-    time = np.arange(0.0, 60.0, 1.0 / rate)
-    bag = by_mcap_ros2(
-        tmp_path / "bag", joints("/s", time, ["a", "b"], position=cycling(time, frequency, 0.05, 2, 1e-4))
-    )
-    assert section(quiet(bag), "stick_slip") == ("a: moved all the time.", "b: never moved.")
-
-
 @pytest.mark.parametrize("frames", [("tool", "tool"), ("base", "tool"), ("", "tool")])
 def test_a_frame_that_changes_with_the_force_neither_hides_its_steps_nor_makes_gaps(
     frames: tuple[str, str], tmp_path: Path
@@ -531,18 +491,6 @@ def test_a_frame_that_changes_with_the_force_neither_hides_its_steps_nor_makes_g
     assert len(section(found, "force")) == 5
     assert section(found, "verdict")[2].startswith("Shows: 5 force steps; ")
     assert section(found, "timing") == ("Every period has its message.",)
-
-
-def test_a_sender_that_goes_over_to_another_frame_has_no_gaps(tmp_path: Path) -> None:
-    time, names = np.arange(0.0, 9.0, 0.01), ["a", "b"]
-    force, moving = np.tile([0.0, 0.0, 5.0], (len(time), 1)), cycling(time, 2.2, 0.02)
-    frames = np.where((time > 3.0) & (time < 6.0), "tool", "base").tolist()
-    sent = [*wrenches("/ft/wrench", time, force), *joints("/joint_states", time, names, position=moving)]
-    found = quiet(
-        by_rosbags(tmp_path / "bag", [one._replace(frame=frame) for one, frame in zip(sent, 2 * frames, strict=True)])
-    )
-    assert section(found, "timing") == ("Every period has its message.",)
-    assert "from 0.0 to 9.0 s" in section(found, "stability")[0]
 
 
 def test_friction_comes_from_the_messages_that_have_an_effort(tmp_path: Path) -> None:
@@ -604,21 +552,6 @@ def test_a_step_ends_where_command_or_force_goes_over_to_another_frame(
     assert numbers[f"{name}: rise time 10-90 %"] == pytest.approx(math.log(9.0) * 0.2, rel=0.01)
     assert numbers[f"{name}: force in the steady state"] == pytest.approx(10.0, abs=1e-3)
     assert numbers[f"{name}: overshoot"] == pytest.approx(0.0, abs=0.1)
-
-
-@pytest.mark.parametrize("topic", ["/ft/command", "/ft/wrench"])
-@pytest.mark.parametrize("share", [1, 2])
-def test_a_force_of_which_an_axis_is_no_number_is_evaluated_by_the_others(
-    topic: str, share: int, tmp_path: Path
-) -> None:
-    sent = following(99.0, 99.0)
-    for i, one in enumerate(sent):
-        if one.topic == topic and not i % share:
-            one.fields["force"][1] = math.nan
-    found = quiet(by_rosbags(tmp_path / "bag", sent), "/ft/command")
-    assert section(found, "verdict")[2].startswith("Shows: 2 force steps; ")
-    left_out = f"{topic}: force.y in only 50 % of the messages."
-    assert (left_out in section(found, "happened")) == (share == 2)
 
 
 # ways in

@@ -17,16 +17,16 @@ from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.contradictions import Mistake, contradictions
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import evenly, motion, recorded_motion
-from wam_analysis.identification.overlay import HEADING, estimator_values, model_values, write_overlay
+from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
 from wam_analysis.identification.parameters import DIRECTIONS as WAYS
-from wam_analysis.identification.regressor import Regressor, about_origin
+from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.report import report
 from wam_bag.bag import BagError, read
 from wam_cli.main import main
 from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_control.task.scenario import load
 from wam_control.velocity.gravity_node import GravityNode
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError, build
@@ -172,17 +172,6 @@ def test_gravity_depends_on_as_many_combinations_as_its_torque_has_ranks() -> No
     rows = np.vstack([body.inverse_dynamics_regressor(random.uniform(-2, 2, 4), rest, rest) for _ in range(40)])
     assert len(found) == np.linalg.matrix_rank(rows, 1e-9)
     assert any("moment_z.link3 " in text and "+ 0.5588 mass.link4" in text for text in found)
-
-
-def test_the_regressor_of_the_links_is_their_inverse_dynamics() -> None:
-    random = np.random.Generator(np.random.PCG64(4))
-    q, qd, qdd = random.uniform(-1, 1, (3, 4))
-    links = WAM.links
-    centres, inertias = np.reshape(links.centre, (4, 3)), np.reshape(links.inertia, (4, 3))
-    ten = [about_origin(np.array([m, *(m * c), *i]))[0] for m, c, i in zip(links.mass, centres, inertias, strict=True)]
-    body = RigidBody(WAM)
-    torque = body.inverse_dynamics_regressor(q, qd, qdd) @ np.concatenate(ten)
-    assert torque == pytest.approx(body.inverse_dynamics(q, qd, qdd))
 
 
 def overlaid(found: Identification) -> Configuration:
@@ -403,26 +392,6 @@ def test_a_wrong_bag_is_refused(bag: str, text: str) -> None:
         pytest.skip(f"no sample {bag}")
     with pytest.raises(BagError, match=text):
         recorded_motion(recorded_run(read(folder, ["motor_states", "status"], may_lack=True)), WAM)
-
-
-def test_nothing_of_somebody_elses_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    own, steps, above = tmp_path / "own.yaml", tmp_path / "steps.yaml", tmp_path / "above.yaml"
-    written = f"{HEADING}\nbase: wam\n"
-    own.write_text(written)
-    above.write_text("base: own.yaml\n")
-    steps.write_text("steps: []\n")
-    read, foreign = "would be written over, and this command reads it", "exists, and this command did not write it"
-    for words, reason in (
-        (["bag", "--config", str(own), "--write", str(own)], read),
-        (["bag", "--config", str(above), "--write", str(own)], read),
-        (["bag", "--write", str(packaged("wam"))], foreign),
-        (["--excite", str(steps), "--only-write"], foreign),
-    ):
-        with pytest.raises(SystemExit) as ended:
-            main(["identify", *words])
-        assert ended.value.code in (1, 2)
-        assert reason in capsys.readouterr().err
-    assert (own.read_text(), steps.read_text()) == (written, "steps: []\n")
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wam_analysis.findings.transmission import _friction_of_joints, _friction_of_motors
+from wam_analysis.findings.transmission import _friction_of_joints
 from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
@@ -18,7 +18,7 @@ from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycl
 from wam_analysis.measures.loop_timing import latency, stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
-from wam_analysis.measures.runs import after_gaps, without_short
+from wam_analysis.measures.runs import without_short
 from wam_analysis.measures.stability import stability
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
@@ -356,24 +356,6 @@ def test_a_planted_response_and_its_coherence_are_recovered_from_noise():
     assert found.coherence[found.frequency > 300.0].mean() < 0.3
 
 
-def test_no_segment_of_a_frequency_response_extends_over_a_gap():
-    """Joined, a slow motion with gaps has jumps, which look like coherent motion of every frequency."""
-    rate, time = 500.0, np.arange(40_000) / 500.0
-    put = np.sin(2.0 * math.pi * 0.13 * time) + 0.01 * draws(14, len(time), 1.0)
-    got = np.sin(2.0 * math.pi * 0.13 * (time - 0.05)) + 0.01 * draws(15, len(time), 1.0)
-    kept = np.mod(time, 8.3) > 1.7
-    gaps = after_gaps(time[kept])
-    assert np.count_nonzero(gaps) == 9
-    joined = frequency_response(rate, put[kept], got[kept], 1000)
-    divided = frequency_response(rate, put[kept], got[kept], 1000, gaps)
-    high = (joined.frequency > 10.0) & (joined.frequency < 30.0)
-    assert np.median(joined.coherence[high]) > 0.5
-    assert np.median(divided.coherence[high]) < 0.1
-    assert divided.segments < joined.segments
-    with pytest.raises(ValueError, match="two segments of 4000"):
-        frequency_response(rate, put[kept], got[kept], 4000, gaps)
-
-
 # stability
 
 
@@ -431,18 +413,6 @@ def test_ripple_of_each_order_is_recovered_at_any_speed():
     assert by_order[1] == PRECISE((0.05, -1.0), rel=0.02)
     assert max(amplitude for order, (amplitude, _) in by_order.items() if order not in {1, 24}) < 0.002
     assert found.turns > 2.0
-
-
-def test_angles_with_a_gap_in_every_turn_have_no_spectrum():
-    """The orders are not independent there: what is no ripple at all came out as thousands of times its size."""
-    angle = np.linspace(0.0, 4.0 * np.pi, 20_000)
-    torque = 0.01 * np.tanh(angle - 6.0) + draws(18, len(angle), 1e-3)
-    whole = ripple_spectrum(angle, torque, 48)
-    assert np.max(whole.amplitude) < 0.005
-    seen = angle % (2.0 * np.pi) > 0.6
-    found = ripple_spectrum(angle[seen], torque[seen], 48)
-    assert not len(found.order)
-    assert found.turns == pytest.approx(2.0, abs=0.1)
 
 
 # timing
@@ -575,49 +545,6 @@ def test_viscous_friction_of_few_speeds_has_the_error_of_an_uneven_dry_friction(
     assert found.dynamic_error < 0.05
 
 
-def repeated_move() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, velocity and angle of a motor that goes 0.12 rad quickly and returns slowly, eight times; 1 kHz."""
-    time = np.arange(8_000) / 1e3
-    phase = time % 1.0
-    out = 0.12 / 0.25 * math.pi / 2.0 * np.sin(math.pi * phase / 0.25)
-    back = -0.12 / 0.75 * math.pi / 2.0 * np.sin(math.pi * (phase - 0.25) / 0.75)
-    velocity = np.where(phase < 0.25, out, back)
-    return time, velocity, np.cumsum(velocity) / 1e3
-
-
-def test_viscous_friction_of_a_small_move_that_is_repeated_has_the_error_of_its_cogging() -> None:
-    """24 cycles a turn: the same angles return, and the cogging looks like viscous friction in each of them."""
-    time, velocity, angle = repeated_move()
-    waves = 9.1e-4 / math.sqrt(2.0) * np.column_stack([np.sin(24.0 * angle), np.cos(24.0 * angle)])
-    off = []
-    for phase in np.arange(8) * math.pi / 4.0:
-        torque = 0.0324 * np.sign(velocity) + 1e-4 * velocity + 9.1e-4 * np.sin(24.0 * angle + phase)
-        found = identify_friction(time, velocity, torque, rest=0.05, window=0.03, waves=waves)
-        off.append(abs(found.viscous - 1e-4) / found.viscous_error)
-    assert max(off) < 3.0, off
-    smooth = 0.0324 * np.sign(velocity) + 1e-4 * velocity
-    without, *added = (
-        identify_friction(time, velocity, torque, rest=0.05, window=0.03).viscous
-        for torque in (smooth, *(smooth + wave for wave in waves.T))
-    )
-    told = identify_friction(time, velocity, smooth, rest=0.05, window=0.03, waves=waves)
-    plain = identify_friction(time, velocity, smooth, rest=0.05, window=0.03).viscous_error
-    assert told.viscous_error == pytest.approx(math.hypot(plain, *(one - without for one in added)), rel=1e-3)
-    assert told.viscous_error > 1.005 * plain
-
-
-def test_dry_friction_is_not_halved_where_the_other_direction_was_left_out_as_outliers() -> None:
-    """A long slide and one short move back that does not fit: dry friction and offset looked the same, half each."""
-    time = np.arange(6_000) / 1e3
-    velocity = 0.1 + 0.05 * np.sin(1.7 * time)
-    velocity[5_900:] = -0.05
-    torque = 0.2093 * np.sign(velocity) + 0.05 * velocity + draws(3, len(time), 1e-5)
-    torque[5_900:] -= np.linspace(0.5, 3.0, 100)
-    found = identify_friction(time, velocity, torque, rest=0.002, window=0.03)
-    assert abs(found.dynamic - 0.2093) < 3.0 * found.dynamic_error < 0.05
-    assert math.isnan(found.offset)
-
-
 def stops(dynamic: float, breakaway: float, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, velocity and torque of a shaft that moves to both sides and rests, at the end of which torque rises."""
     time = np.arange(16_000) / 1e3
@@ -686,24 +613,3 @@ def test_friction_of_a_joint_is_not_that_of_a_torque_between_its_samples() -> No
     found = _friction_of_joints(signals, ONE_JOINT)["joint1"]
     assert found.dynamic == PRECISE(0.45, rel=0.002)
     assert found.viscous == PRECISE(0.05, rel=0.02)
-
-
-def test_errors_of_a_motor_hold_its_friction_under_a_dither_between_samples_of_its_load() -> None:
-    """Links that a dither of 25 Hz shakes: their torque is a straight line between samples, half a period early."""
-    time, shaken = np.arange(12_000) / 1e3, 2.0 * math.pi * 25.0
-
-    def speed(at: np.ndarray) -> np.ndarray:
-        return np.asarray(6.0 * np.sin(1.3 * at) + 1.5 * np.sin(0.7 * at) + 2.0 * np.sin(shaken * at))
-
-    early = time - 0.5e-3
-    load = 4e-4 * 2.0 * shaken * np.cos(shaken * early)
-    signals = signals_of(
-        time,
-        sampled=np.arange(len(time)) % 5 == 0,
-        velocity=speed(time)[:, np.newaxis],
-        torque=(load + 0.02 * np.sign(speed(early)) + 1e-3 * speed(early))[:, np.newaxis],
-        load=every_fifth(load),
-    )
-    found = _friction_of_motors(signals, ONE_JOINT, SMOOTH)["motor1"]
-    assert abs(found.viscous - 1e-3) < 3.0 * found.viscous_error
-    assert abs(found.dynamic - 0.02) < 3.0 * found.dynamic_error

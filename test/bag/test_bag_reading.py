@@ -42,7 +42,6 @@ from wam_bag.bag import (
 from wam_bag.contents import contents, mode_of
 from wam_bag.cut import Cut, cut
 from wam_bag.limits import READING_LIMITS
-from wam_bag.losses import losses
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
 from wam_bag.repair import repair
 from wam_studies.faults.bag_faults import MEMORY, limits
@@ -349,18 +348,6 @@ def test_serialized_messages_are_handed_out_too(tmp_path: Path, kind: str, field
     assert field.split(".")[0] in series.decode(series.data[0])._fields
 
 
-def test_any_field_of_other_messages_is_a_column(tmp_path: Path) -> None:
-    samples = random_samples(["sensor_msgs/msg/Imu", "std_msgs/msg/String"], 40, seed=4)
-    bag = read(write(tmp_path / "bag.mcap", samples))
-    imu, text = bag.topics["/imu"], bag.topics["/string"]
-    assert isinstance(imu, Messages)
-    assert isinstance(text, Messages)
-    expected = decoded(in_order(samples)["/imu"])
-    np.testing.assert_array_equal(imu.column("angular_velocity.x"), [m.angular_velocity.x for m in expected])
-    assert imu.column("orientation_covariance").shape == (40, 9)
-    assert text.column("data").tolist() == [m.data for m in decoded(in_order(samples)["/string"])]
-
-
 def split_bag(path: Path) -> list[Sample]:
     """A bag of three files, as rosbag2 splits it."""
     path.mkdir()
@@ -495,21 +482,6 @@ def test_a_hostile_schema_is_refused_in_no_time(schema: str, reason: str, tmp_pa
     path = hostile(tmp_path / "bag.mcap", schema, b"\xff" * 4 + bytes(100))
     with limits(MEMORY // 16), pytest.raises(BagError, match=reason):
         list(read(path).topics["/a"].messages)  # type: ignore[union-attr]
-
-
-def test_hostile_records_of_the_recorder_are_no_more_than_text(tmp_path: Path) -> None:
-    digits = "9" * 6000
-    path = hostile(
-        tmp_path / "bag.mcap",
-        "uint8 z",
-        b"\0",
-        recording={"/a d received": digits, "/a d dropped": digits, "/a d lost_at_end": digits},
-        repaired={"f": "[" * 100_000},
-        rosbag2={"serialized_metadata": "a: " + "[" * 50_000},
-    )
-    bag = read(path)
-    found = losses(path, bag.metadata, bag.attachments, bag.counts)
-    assert found.sentences(0) == ["f was repaired; the record of its losses cannot be read."]
 
 
 def test_a_file_that_decompresses_to_a_thousand_times_its_size_is_refused(
