@@ -140,9 +140,8 @@ def _accuracy(one: HeldForce) -> ForceAccuracy:
 
 
 def _press_sentence(one: HeldForce) -> str:
+    """What the numbers of a commanded force do not show."""
     hold, response = one.hold, one.response
-    accuracy = _accuracy(one)
-    whose = "true" if len(one.true) else "measured"
     where = hold.cover or hold.frame
     text = (
         f"{hold.name}: {shown(hold.commanded, 'N')} commanded {'in the base frame' if where == BASE else f'on {where}'}"
@@ -151,22 +150,13 @@ def _press_sentence(one: HeldForce) -> str:
         return f"{text}, and not controlled, so nothing of it is measured."
     if hold.is_short:
         return f"{text} for less than {STEADY:g} s, so it has no steady state."
-    if math.isnan(accuracy.bias):
+    if math.isnan(_accuracy(one).bias):
         return f"{text}; the resulting force was not recorded."
-    text += f", {whose} force {shown(hold.commanded + accuracy.bias, 'N')} in the steady state"
-    text += f" ({100.0 * accuracy.bias / hold.commanded:+.1f} %, ripple {shown(accuracy.ripple, 'N')})"
+    remarks = [text]
     if response is not None and math.isfinite(response.rise):
-        sentences = [f"settled to 5 % after {shown(response.settling, 's')}"]
-        if not math.isfinite(response.settling):
-            sentences = ["did not settle to 5 %"]
-        if impact := _impact(one):
-            sentences[0] += " from there" if one.touched > 0.0 and math.isfinite(response.settling) else ""
-            sentences.insert(0, f"{impact}, which is why rise and overshoot are left out")
-        else:
-            sentences.insert(0, f"rose in {shown(response.rise, 's')}")
-            sentences += [f"overshot by {100.0 * response.overshoot:.0f} %"] if response.overshoot > 0.01 else []
-        text += f"; it {', '.join(sentences)}"
-    return text + ("; the arm was pushed meanwhile." if hold.disturbed else ".")
+        remarks += [f"it {why}, which is why rise and overshoot are left out" for why in [_impact(one)] if why]
+        remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
+    return "; ".join([*remarks, *["the arm was pushed meanwhile"] * hold.disturbed]) + "."
 
 
 def _impact(one: HeldForce) -> str:
