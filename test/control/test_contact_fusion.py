@@ -10,7 +10,7 @@ from contact_truth import torques
 from scipy.stats import multivariate_normal
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
-from wam_control.contact.contact_fusion import ContactFusion, Guess, Torques, probability_of_slide
+from wam_control.contact.contact_fusion import ContactFusion, Torques, probability_of_slide
 from wam_control.contact.contact_inference import ContactInference, Hypothesis
 from wam_control.contact.thresholds import CONTACT
 from wam_description.configuration import Configuration
@@ -43,7 +43,7 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
         moments.append((rows, at))
     fusion = ContactFusion(1.0)
     for rows, at in moments[:-1]:
-        fusion.remember(rows, at, [Guess(0.2, 0.0)], 0.0)
+        fusion.remember(rows, at, np.array([0.2]), np.zeros(1), 0.0)
     rows, now = moments[-1]
     gram = fusion.gram(rows, now)
     assert gram is not None

@@ -22,7 +22,6 @@ computed when one joins them; with the present one, of covariance C_nn, they are
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,13 +54,6 @@ class Torques(NamedTuple):
     covariance: Array
     own: Array
     pose: Array
-
-
-class Guess(NamedTuple):
-    """Position of a contact on a link, m, and its probability."""
-
-    position: float
-    probability: float
 
 
 class _Seen(NamedTuple):
@@ -141,12 +133,12 @@ class ContactFusion:
         self.count = 1 + past.moments
         return found
 
-    def remember(self, rows: Array, now: Torques, guess: Sequence[Guess], residual: float) -> None:
+    def remember(self, rows: Array, now: Torques, places: Array, probabilities: Array, residual: float) -> None:
         """Take the present moment, with what was fitted to it.
 
         Parameters
         ----------
-        guess : of each link.
+        places, probabilities : (links,), m, of each link.
         residual : chi^2 of all moments that the fit does not explain.
         """
         if self._past is not None and self.count > 1:
@@ -166,19 +158,18 @@ class ContactFusion:
         while moments and (len(moments) > CONTACT.moments or now.time - moments[0].torques.time > self._duration):
             moments.popleft()
         if has_moved or len(moments) < count:
-            self._past = self._of(list(moments), now, guess) if moments else None
+            self._past = self._of(list(moments), now, places, np.sqrt(probabilities)) if moments else None
 
-    def _of(self, moments: list[_Seen], now: Torques, guess: Sequence[Guess]) -> _Past:
+    def _of(self, moments: list[_Seen], now: Torques, places: Array, chances: Array) -> _Past:
         n, last = len(now.residual), moments[-1].torques
         effects = np.concatenate([moment.torques.effects for moment in moments])
         shared = effects @ last.covariance
         common = shared @ effects.T
-        found, count = len(guess), len(moments)
+        found, count = len(places), len(moments)
         rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
         for j, moment in enumerate(moments):
             rows[:, :, j] = moment.rows
-        chances = np.sqrt([each.probability for each in guess])
-        sides, slopes = _sides(rows[:found, :, -1:], guess)
+        sides, slopes = _sides(rows[:found, :, -1:], places)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
         forces = solutions(levers, present @ last.residual)  # (links, 3), N
@@ -192,7 +183,7 @@ class ContactFusion:
             for moment, way in zip(moments, ways, strict=True)
         ]
         rows[:, 1:] *= np.array(sizes)[:, None]
-        sides, slopes = _sides(rows[:found], guess)
+        sides, slopes = _sides(rows[:found], places)
         for j, moment in enumerate(moments):
             common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
         covariance = common.copy()
@@ -233,11 +224,10 @@ class ContactFusion:
         )
 
 
-def _sides(rows: Array, guess: Sequence[Guess]) -> tuple[Array, Array]:
+def _sides(rows: Array, places: Array) -> tuple[Array, Array]:
     """Torques of a force across a link and along it, (links, 3, moments, n), m, and those across per metre, (2)."""
-    places = np.array([each.position for each in guess])[:, None, None, None]
     sides, slopes = rows[:, [1, 2, 6]], rows[:, 3:5]
-    sides[:, :2] += places * slopes
+    sides[:, :2] += places[:, None, None, None] * slopes
     return sides, slopes
 
 

@@ -7,25 +7,28 @@ moment only.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence_of_weight
-from wam_control.contact.contact_fusion import ContactFusion, Guess, Torques
+from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, require
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
+from wam_description.small_matrices import inverse
 from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
+# how close to an ambiguous pose or direction that is given as the reason, and to one at right angles
+NEAR, FAR = math.cos(math.radians(20.0)), math.sin(math.radians(20.0))
 
 
 class Hypothesis(NamedTuple):
@@ -68,30 +71,12 @@ class Hypothesis(NamedTuple):
 
 class _Cover(NamedTuple):
     name: str
-    start: Triple  # m, ends of the tube's axis in the cover's frame
-    end: Triple
+    start: list[float]  # (3,), m, ends of the tube's axis in the cover's frame
+    end: list[float]
     wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
-    across: Array  # (3, 2), directions across the tube, near the cover's y and z
-    directions: list[list[float]]  # the same
-    hinge: Array  # (3,), axis of the link's joint in the cover's frame
+    across: list[list[float]]  # (3, 2), directions across the tube, near the cover's y and z
     joints: int  # number of joints that move the cover
     is_moment_only: bool
-
-
-class _Elbow(NamedTuple):
-    """Indices of the covers at both sides of an elbow."""
-
-    inner: int
-    outer: int
-
-
-def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
-    """The one joint between a cover of which a moment alone is measured and one that is located, None without one."""
-    for i, outer in enumerate(covers[1:], start=1):
-        inner = covers[i - 1]
-        if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1:
-            return _Elbow(i - 1, i)
-    return None
 
 
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
@@ -113,22 +98,19 @@ class ContactInference:
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
-        self._covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
-        covers = self._covers
+        self._covers = covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
         lengths("inference", arm.covers.names, {"weights": parameters.weights})
-        self._fit = ContactFit(
-            [cover.start[0] for cover in covers],
-            [cover.end[0] for cover in covers],
-            arm.covers.radius,
-            parameters.weights,
-            force_scale=parameters.force_scale,
-            moment_arm_offset=parameters.moment_arm_offset,
-            friction=parameters.friction,
-            positions=parameters.positions,
-            end_weight=parameters.end_weight,
-            along_weight=parameters.along_weight,
+        start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
+        self._fit = ContactFit(start, end, arm.covers.radius, parameters)
+        # of the one joint between a cover of which a moment alone is measured and one that is located
+        self._elbow = next(
+            (
+                i
+                for i, (inner, outer) in enumerate(pairwise(covers), start=1)
+                if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1
+            ),
+            None,
         )
-        self._elbow = _elbow(covers)
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
@@ -157,61 +139,56 @@ class ContactInference:
         tuple of Hypothesis
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
-        if (size := sum(precision.diagonal().tolist())) > (10.0 * CONTACT.smallest_sd) ** -2:
+        given, links = self._parameters, len(self._covers)
+        if (size := float(precision.trace())) > (10.0 * CONTACT.smallest_sd) ** -2:
             fusion = None  # together they would be as exact
         if size > CONTACT.smallest_sd**-2:
-            precision = np.asarray(
-                np.linalg.inv(np.linalg.inv(precision) + CONTACT.smallest_sd**2 * np.eye(len(torques))), np.float64
-            )
-        at, links = np.array(q), len(self._covers)
+            precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(torques)))
+        at = np.array(q)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
         rows = np.zeros((links + 1, 7, len(torques)))  # the last are those of a payload
         rows[:, 0] = torques
         np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
-        weight = self._parameters.payload_weight if load is not None else 0.0
         if load is not None:
             rows[links, 1] = load
         gram = fusion.gram(rows, now) if fusion is not None and now is not None else None
         if gram is None:
             gram = rows @ precision @ rows.transpose(0, 2, 1)
-        picked = -math.inf
-        if weight:
-            least = (STANDARD_GRAVITY / self._parameters.force_scale) ** 2
-            picked = math.log(weight) + log_evidence_of_weight(gram[links], least)
-        fits = self._fit(gram[:links], picked)
-        moments = 1
+        payload = -math.inf
+        if load is not None and given.payload_weight:
+            payload = math.log(given.payload_weight)
+            (rr, ra), (_, aa) = gram[links, :2, :2].tolist()
+            payload += log_evidence_of_weight(rr, ra, aa, given.force_scale / STANDARD_GRAVITY)
+        fits = self._fit(gram[:links], payload)
+        order = sorted(range(links), key=lambda i: -fits[i].probability)
+        best, moments = fits[order[0]], 1
         if fusion is not None and now is not None:
             moments = fusion.count
-            best = max(fits, key=lambda fit: fit.probability)
-            fusion.remember(rows, now, [Guess(fit.position, fit.probability) for fit in fits], best.residual)
-        is_payload = 1.0 - sum(fit.probability for fit in fits) > CONTACT.noted_probability
-        ambiguity = (
-            self._ambiguity(q, fits)
-            if max(fit.probability for fit in fits) < self._parameters.identification_threshold
-            else NO_REASON
-        )
-        each = zip(self._covers, fits, strict=True)
-        found = [self._hypothesis(q, cover, fit, ambiguity, is_payload, moments) for cover, fit in each]
-        return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
-
-    def _hypothesis(
-        self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: Reason, is_payload: bool, moments: int
-    ) -> Hypothesis:
-        start, end = cover.start, cover.end
-        length = end[0] - start[0]
-        is_unknown = cover.is_moment_only or fit.torque_position_sd > length
-        reasons = ambiguity | (self._why_unknown(q, cover, fit) if is_unknown else NO_REASON)
-        if fit.along > (CONTACT.noted_probability if ambiguity else 0.5):
-            reasons |= Reason.ALONG
-        if fit.residual > moments * self._parameters.largest_residual:
-            reasons |= Reason.MORE
-        if is_payload:
+            places, probabilities = np.array([(fit.position, fit.probability) for fit in fits]).T
+            fusion.remember(rows, now, places, probabilities, best.residual)
+        reasons = NO_REASON
+        if best.probability < given.identification_threshold:
+            reasons = self._why_ambiguous(q, set(order[:2]), fits)
+        if 1.0 - sum([fit.probability for fit in fits]) > CONTACT.noted_probability:
             reasons |= Reason.PAYLOAD
-        place = end[0] if is_unknown else fit.position
+        return tuple([self._hypothesis(q, i, fits[i], reasons, moments) for i in order])
+
+    def _hypothesis(self, q: Sequence[float], i: int, fit: Fit, reasons: Reason, moments: int) -> Hypothesis:
+        cover = self._covers[i]
+        start, end = cover.start[0], cover.end[0]
+        is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
+        residual = fit.residual / moments
+        if fit.along > (CONTACT.noted_probability if reasons & ~Reason.PAYLOAD else 0.5):
+            reasons |= Reason.ALONG
+        if is_unknown:
+            reasons |= self._why_unknown(q, i, fit)
+        if residual > self._parameters.largest_residual:
+            reasons |= Reason.MORE
+        place = end if is_unknown else fit.position
         f1, f2 = fit.force_at_end if is_unknown else fit.force
-        force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.directions])
-        share = (place - start[0]) / length
-        point = _triple([first + share * (last - first) for first, last in zip(start, end, strict=True)])
+        share = (place - start) / (end - start)
+        force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.across])
+        point = _triple([first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)])
         return Hypothesis(
             cover=cover.name,
             probability=fit.probability,
@@ -225,47 +202,47 @@ class ContactInference:
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
             moment=_cross(point, force),
-            residual=fit.residual / moments,
+            residual=residual,
             reasons=reasons,
         )
 
-    def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> Reason:
-        if cover.is_moment_only:
+    def _why_unknown(self, q: Sequence[float], i: int, fit: Fit) -> Reason:
+        """Why the position on a cover is unknown."""
+        if self._covers[i].is_moment_only:
             return Reason.MOMENT_ONLY
-        if self._elbow is None or cover is not self._covers[self._elbow.outer]:
-            return Reason.WEAK
-        in_plane, straight, bent = self._at_elbow(q, self._elbow, fit)
-        if in_plane > NEAR and bent > NEAR:
-            return Reason.BENT
-        if in_plane < math.sqrt(1.0 - NEAR**2) and straight > NEAR:
-            return Reason.STRAIGHT
-        axes = self.jacobians[self._elbow.inner][3:, : self._covers[self._elbow.inner].joints]
-        if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:  # of three axes 1 - cos of the angle of two, as theta2
-            return Reason.SHOULDER
+        if i == self._elbow:
+            in_plane, straight, bent = self._at_elbow(q, i, fit)
+            if in_plane > NEAR and bent > NEAR:
+                return Reason.BENT
+            if in_plane < FAR and straight > NEAR:
+                return Reason.STRAIGHT
+            axes = self.jacobians[i - 1][3:, : self._covers[i - 1].joints]
+            # of three axes 1 - cos of the angle of two, as theta2
+            if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:
+                return Reason.SHOULDER
         return Reason.WEAK
 
-    def _ambiguity(self, q: Sequence[float], fits: list[Fit]) -> Reason:
+    def _why_ambiguous(self, q: Sequence[float], likeliest: set[int], fits: list[Fit]) -> Reason:
         """Why the link is not identified."""
-        likely = sorted(range(len(fits)), key=lambda i: -fits[i].probability)[:2]
-        if self._elbow is None or set(likely) != set(self._elbow):
-            return Reason.LINKS
-        outer, fit = self._covers[self._elbow.outer], fits[self._elbow.outer]
-        in_plane, straight, _ = self._at_elbow(q, self._elbow, fit)
-        if straight > NEAR and in_plane < math.sqrt(1.0 - NEAR**2):
-            return Reason.STRAIGHT_LINK
-        if fit.position - outer.start[0] < 2.0 * fit.position_sd:
-            return Reason.ELBOW
+        i = self._elbow
+        if i is not None and likeliest == {i - 1, i}:
+            fit = fits[i]
+            in_plane, straight, _ = self._at_elbow(q, i, fit)
+            if straight > NEAR and in_plane < FAR:
+                return Reason.STRAIGHT_LINK
+            if fit.position - self._covers[i].start[0] < 2.0 * fit.position_sd:
+                return Reason.ELBOW
         return Reason.LINKS
 
-    def _at_elbow(self, q: Sequence[float], elbow: _Elbow, fit: Fit) -> tuple[float, float, float]:
+    def _at_elbow(self, q: Sequence[float], i: int, fit: Fit) -> tuple[float, float, float]:
         """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
-        cover = self._covers[elbow.outer]
-        inner = self._body.cover_pose(q, self._covers[elbow.inner].name).rotation[:, 0]
-        outer = self._body.cover_pose(q, cover.name).rotation[:, 0]
-        cosine = min(1.0, abs(float(inner @ outer)))
-        vector = cover.across @ np.array(fit.force)
-        size = float(np.linalg.norm(vector))
-        out_of_plane = abs(float(vector @ cover.hinge)) / size if size > 0.0 else 1.0
+        cover = self._covers[i]
+        inner, outer = (self._body.cover_pose(q, self._covers[j].name).rotation for j in (i - 1, i))
+        cosine = min(1.0, abs(float(inner[:, 0] @ outer[:, 0])))
+        force = np.array(cover.across) @ fit.force
+        hinge = self.jacobians[i][3:, cover.joints - 1]
+        size = float(np.linalg.norm(force))
+        out_of_plane = abs(float(force @ hinge)) / size if size > 0.0 else 1.0
         return math.sqrt(max(0.0, 1.0 - out_of_plane**2)), cosine, math.sqrt(1.0 - cosine**2)
 
 
@@ -279,7 +256,7 @@ def _cross(a: Triple, b: Triple) -> Triple:
 
 def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
     covers = arm.covers
-    name, joints = covers.names[i], arm.links.names.index(covers.links[i]) + 1
+    name = covers.names[i]
     start, end = np.array(covers.start[3 * i : 3 * i + 3]), np.array(covers.end[3 * i : 3 * i + 3])
     require(
         end[0] > start[0],
@@ -289,30 +266,18 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
     axis = slope / np.linalg.norm(slope)
     first = np.array([0.0, 1.0, 0.0]) - axis[1] * axis
     first /= np.linalg.norm(first)
-    across = np.stack((first, np.cross(axis, first)), axis=1)
-    origin = start - start[0] * slope
+    across = np.stack((first, np.cross(axis, first)))
+    origin, none = start - start[0] * slope, np.zeros((3, 3))
+    forces = np.concatenate((across, none, axis[None]))
+    moments = np.concatenate(
+        (np.cross(origin, across), np.cross(slope, across), axis[None], np.cross(origin, axis)[None])
+    )
     return _Cover(
         name=name,
-        start=_triple(start.tolist()),
-        end=_triple(end.tolist()),
-        wrenches=_wrenches(origin, slope, axis, across),
-        across=across,
-        directions=across.tolist(),
-        hinge=_hinge(body, name, joints),
-        joints=joints,
+        start=start.tolist(),
+        end=end.tolist(),
+        wrenches=np.hstack((forces, moments)),
+        across=across.T.tolist(),
+        joints=arm.links.names.index(covers.links[i]) + 1,
         is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
     )
-
-
-def _wrenches(origin: Array, slope: Array, axis: Array, across: Array) -> Array:
-    """Rows A_1, A_2, B_1, B_2, twist, axial of `ContactFit`, as wrenches about the origin of the cover's frame."""
-    at = [np.concatenate((e, np.cross(origin, e))) for e in across.T]
-    per_metre = [np.concatenate((np.zeros(3), np.cross(slope, e))) for e in across.T]
-    twist = np.concatenate((np.zeros(3), axis))
-    axial = np.concatenate((axis, np.cross(origin, axis)))
-    return np.stack((*at, *per_metre, twist, axial))
-
-
-def _hinge(body: RigidBody, name: str, joints: int) -> Array:
-    """Axis of the joint that carries the cover, in the cover's frame."""
-    return body.cover_jacobian([0.0] * len(body.arm.joints.names), name)[3:, joints - 1]

@@ -21,7 +21,8 @@ class ContactThresholds:
     smallest_force: float = 1e-6  # N, avoids a division by zero where there is no force
     search_depth: float = 8.0  # of the log of probability; positions further below the maximum are neglected
     few_positions: int = 6  # positions in a peak; with fewer, it is refined
-    peak_positions: int = 12  # pieces of a refined peak, two thirds of a standard deviation each
+    peak_positions: int = 12  # pieces of a refined peak
+    refinements: int = 4  # of a peak, each by a factor of two or more
     weak_prior: float = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
     end_length: float = 0.01  # m, length of the end of a link
     end_slopes: tuple[float, ...] = (0.05, 0.5)  # force across the tube per force along it, on its end
