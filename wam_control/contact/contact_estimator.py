@@ -192,7 +192,7 @@ class ContactEstimator:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
             self._fusion.reset()
-            return _nothing(torques, sd, 0.0, Reason.BRAKED if self._is_blind else Reason.TOO_EARLY)
+            return _estimate(torques, sd, 0.0, reasons=Reason.BRAKED if self._is_blind else Reason.TOO_EARLY)
         precision = inverse(covariance)
         late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
@@ -208,28 +208,12 @@ class ContactEstimator:
         if not self._in_contact:
             if was_in_contact:
                 self._fusion.reset()
-            return _nothing(torques, sd, statistic, NO_REASON, observer.warning)
+            return _estimate(torques, sd, statistic, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None
         hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
-        best = hypotheses[0]
-        return ContactEstimate(
-            external_torques=torques,
-            torque_sd=sd,
-            statistic=statistic,
-            in_contact=True,
-            link=best.cover,
-            position=best.position,
-            position_sd=best.position_sd,
-            probability=best.probability,
-            direction_sd=best.direction_sd,
-            force=best.force,
-            moment=best.moment,
-            hypotheses=hypotheses,
-            reasons=best.reasons,
-            warning=observer.warning,
-        )
+        return _estimate(torques, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
 
     def _late(self, torques: list[float], precision: Array) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
@@ -272,22 +256,32 @@ def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
     return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))
 
 
-def _nothing(
-    torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reasons: Reason, warning: Event | None = None
+NOTHING = Hypothesis("", *[math.nan] * 5, ZERO, math.nan, False, *[math.nan] * 2, ZERO, math.nan, NO_REASON)
+
+
+def _estimate(
+    torques: tuple[float, ...],
+    sd: tuple[float, ...],
+    statistic: float,
+    hypotheses: tuple[Hypothesis, ...] = (),
+    reasons: Reason = NO_REASON,
+    warning: Event | None = None,
 ) -> ContactEstimate:
+    """The estimate with the most probable of the hypotheses, or without contact."""
+    best = hypotheses[0] if hypotheses else NOTHING
     return ContactEstimate(
         external_torques=torques,
         torque_sd=sd,
         statistic=statistic,
-        in_contact=False,
-        link="",
-        position=math.nan,
-        position_sd=math.nan,
-        probability=math.nan,
-        direction_sd=math.nan,
-        force=ZERO,
-        moment=ZERO,
-        hypotheses=(),
+        in_contact=bool(hypotheses),
+        link=best.cover,
+        position=best.position,
+        position_sd=best.position_sd,
+        probability=best.probability,
+        direction_sd=best.direction_sd,
+        force=best.force,
+        moment=best.moment,
+        hypotheses=hypotheses,
         reasons=reasons,
         warning=warning,
     )

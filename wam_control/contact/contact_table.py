@@ -6,8 +6,7 @@ from wam_control.contact.contact_inference import Hypothesis
 from wam_control.contact.model_errors import TrackedError
 from wam_control.contact.model_prior import WAYS, friction_error, load_error
 from wam_description.arm import Arm
-from wam_description.reasons import Reason
-from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
 _COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
@@ -18,26 +17,13 @@ _LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
     """Rows in the order of `HYPOTHESIS_COLUMNS`, the most probable hypothesis first."""
-    rows = tuple(
-        (
-            float(covers.index(h.cover)),
-            h.probability,
-            h.position,
-            h.position_sd,
-            h.low,
-            h.high,
-            *h.force,
-            h.force_sd,
-            float(h.is_lower_bound),
-            h.direction,
-            h.direction_sd,
-            *h.moment,
-            h.residual,
-            float(h.reasons),
-        )
-        for h in hypotheses
-    )
-    return Table(hypotheses[0].cover if hypotheses else BASE, rows)
+    rows = []
+    for cover, *numbers, residual, reasons in hypotheses:
+        row = [float(covers.index(cover))]
+        for value in numbers:
+            row += value if isinstance(value, tuple) else [float(value)]
+        rows.append((*row, residual, float(reasons)))
+    return Table(hypotheses[0].cover if hypotheses else BASE, tuple(rows))
 
 
 def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
@@ -55,35 +41,6 @@ def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, 
     rows = () if table is None else table.rows
     parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
     return tuple(part for part in parts if part.low < part.high)
-
-
-def hypotheses_of(table: Table, covers: Sequence[str]) -> tuple[Hypothesis, ...]:
-    """The hypotheses that the rows of a table describe; the inverse of `hypothesis_table`."""
-    return tuple(_hypothesis(row, covers) for row in table.rows)
-
-
-def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
-    value = dict(zip(HYPOTHESIS_COLUMNS, row, strict=True))
-
-    def vector(name: str) -> Triple:
-        return value[f"{name}_x"], value[f"{name}_y"], value[f"{name}_z"]
-
-    return Hypothesis(
-        cover=covers[int(value["link"])],
-        probability=value["probability"],
-        position=value["position"],
-        position_sd=value["position_sd"],
-        low=value["low"],
-        high=value["high"],
-        force=vector("force"),
-        force_sd=value["force_sd"],
-        is_lower_bound=bool(value["is_lower_bound"]),
-        direction=value["direction"],
-        direction_sd=value["direction_sd"],
-        moment=vector("moment"),
-        residual=value["residual"],
-        reasons=Reason(int(value["reasons"])),
-    )
 
 
 def friction_table(errors: Mapping[str, TrackedError], arm: Arm, scale: float) -> Table:

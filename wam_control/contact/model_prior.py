@@ -1,5 +1,6 @@
 """What is known of the errors of the model before any motion: as configured, or as identified from a recording."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -46,62 +47,57 @@ def load_error(shaft: str) -> str:
     return f"load friction of {shaft}"
 
 
-def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None) -> ModelPrior:
-    """The errors of the model of an arm; `payload_sd` in kg; `model` is the identified one, if there is any."""
-    n = len(arm.joints.names)
-    motors, joints = arm.motors.names, arm.joints.names
+def model_prior(
+    arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None, use_joint_sensors: bool = False
+) -> ModelPrior:
+    """The errors of the model of an arm; joint sensors show those of masses, centres of mass and payload alone.
+
+    Parameters
+    ----------
+    arm, given : the arm as modelled, and how certain that is.
+    payload_sd : kg.
+    model : the identified one, if there is any.
+    use_joint_sensors : whether the torques are those of joint sensors.
+    """
+    n, shafts, joints = len(arm.joints.names), [*arm.motors.names, *arm.joints.names], arm.joints.names
     # the load friction of a joint that one motor drives is that of the motor
     driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
-    covariance = np.diag(
-        np.square(
-            [
-                *[np.hypot(given.moving_uncertainty, given.asymmetry_uncertainty)] * (4 * n),
-                *[given.mass_uncertainty] * n,
-                *[given.load_uncertainty] * n,
-                *np.where(driven_by > 1, given.load_uncertainty, 0.0),
-                *[given.torque_scale_uncertainty] * n,
-                *[given.centre_uncertainty] * (3 * n),
-                given.torque_delay_uncertainty,
-                payload_sd,
-            ]
-        )
+    loads = [*[given.load_uncertainty] * n, *np.where(driven_by > 1, given.load_uncertainty, 0.0)]
+    # of each kind: names, standard deviations, what is tolerable
+    kinds: list[tuple[list[str], float | list[float], float]] = [
+        (
+            [friction_error(name, way) for way in WAYS for name in shafts],
+            math.hypot(given.moving_uncertainty, given.asymmetry_uncertainty),
+            CONTACT.tolerable_friction,
+        ),
+        ([f"masses at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_mass),
+        ([*map(load_error, shafts)], loads, CONTACT.tolerable_torque),
+        (
+            [f"torque constant of {name}" for name in arm.motors.names],
+            given.torque_scale_uncertainty,
+            CONTACT.tolerable_torque,
+        ),
+        (
+            [f"centre of mass of {name} along {axis}" for name in arm.links.names for axis in "xyz"],
+            given.centre_uncertainty,
+            CONTACT.tolerable_centre,
+        ),
+        (["delay of the torques"], given.torque_delay_uncertainty, CONTACT.tolerable_delay),
+        (["payload"], payload_sd, CONTACT.tolerable_payload + given.payload[1] - given.payload[0]),
+    ]
+    if use_joint_sensors:
+        kinds = [kinds[1], kinds[4], kinds[6]]
+    names = tuple(name for each, _, _ in kinds for name in each)
+    sds, tolerable = (
+        np.concatenate([np.broadcast_to(kind[which], len(kind[0])) for kind in kinds]) for which in (1, 2)
     )
-    both = np.arange(2 * n)
-    covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
-    limit, errors = covariance.diagonal().copy(), np.zeros(len(covariance))
-    if model is not None and model.is_identified:
-        _identify(arm, model, errors, covariance)
-    shafts = [*motors, *joints]
-    names = (
-        *(friction_error(name, way) for way in WAYS for name in shafts),
-        *_masses(arm),
-        *map(load_error, shafts),
-        *(f"torque constant of {name}" for name in motors),
-        *_centres(arm),
-        "delay of the torques",
-        "payload",
-    )
-    return ModelPrior(names, errors, covariance, limit, np.repeat(CONTACT.tolerable, [4 * n, n, 2 * n, n, 3 * n, 1, 1]))
-
-
-def weight_prior(arm: Arm, given: ObserverParameters, payload_sd: float) -> ModelPrior:
-    """The errors of the model that joint sensors show: masses, centres of mass, and a payload in kg."""
-    n = len(arm.joints.names)
-    counts = [n, 3 * n, 1]
-    sds = np.repeat([given.mass_uncertainty, given.centre_uncertainty, payload_sd], counts)
-    _, masses, _, _, centres, _, payload = CONTACT.tolerable
-    payload += given.payload[1] - given.payload[0]
-    names = (*_masses(arm), *_centres(arm), "payload")
-    tolerable = np.repeat([masses, centres, payload], counts)
-    return ModelPrior(names, np.zeros(len(sds)), np.diag(sds**2), sds**2, tolerable)
-
-
-def _masses(arm: Arm) -> list[str]:
-    return [f"masses at {name}" for name in arm.joints.names]
-
-
-def _centres(arm: Arm) -> list[str]:
-    return [f"centre of mass of {name} along {axis}" for name in arm.links.names for axis in "xyz"]
+    errors, covariance = np.zeros(len(names)), np.diag(np.square(sds))
+    if not use_joint_sensors:
+        both = np.arange(2 * n)
+        covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
+        if model is not None and model.is_identified:
+            _identify(arm, model, errors, covariance)
+    return ModelPrior(names, errors, covariance, np.square(sds), tolerable)
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wam_control.contact.contact_fusion import Torques
 from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
-from wam_control.contact.model_prior import model_prior, weight_prior
+from wam_control.contact.model_prior import model_prior
 from wam_control.contact.motor_side import JointSample, MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.thresholds import CONTACT
@@ -91,24 +91,23 @@ class MomentumObserver:
         payload_sd = (high - low) / math.sqrt(3.0)
         if not high and not use_joint_sensors:
             payload_sd = parameters.payload_uncertainty
-        self._load = ToolLoad(arm) if payload_sd > 0.0 or high > 0.0 else None
+        self._load = ToolLoad(arm, times) if payload_sd > 0.0 or high > 0.0 else None
         centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
         self._effects: GaugeEffects | ErrorEffects
         if use_joint_sensors:
-            self._effects = GaugeEffects(n, parameters.joint_torque_sd, centres)
-            prior = weight_prior(arm, parameters, payload_sd)
+            self._effects = GaugeEffects(n, parameters, centres)
         else:
             self._effects = ErrorEffects(side.map, parameters, side.motors, side.joints, times, cycle > 0, centres)
-            prior = model_prior(arm, parameters, payload_sd, model)
+        prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
         noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
-        self._filters = _Filters(n, times, cycle)
+        self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
-        n = self._n
-        self._filters = _Filters(n, self._filters.times, self._filters.cycle)
+        n, before = self._n, self._filters
+        self._filters = _Filters(n, (14 if self._side else 3) * n, before.times, before.cycle)
         self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [0.0] * n, [0.0] * n)
         if self._load is not None:
             self._load.reset()
@@ -183,9 +182,9 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        keep = self._filters.take(external + model + q, signals, span, is_first, span > self._parameters.time_constant)
+        self._filters.take([*external, *model, *q, *signals], span)
         if self._load is not None:
-            self._load.observe(q, qd, span, keep)
+            self._load.observe(q, qd, span)
         self._last, self._gap = _Sample(q, momentum, inertia, known, bias, max(map(abs, qd))), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
@@ -237,7 +236,7 @@ class MomentumObserver:
     @property
     def load_torques(self) -> Array | None:
         """External torques of a mass of 1 kg at the tool, (n,), N m, through the filter; None where not followed."""
-        return None if self._load is None else np.array(self._load.torque)
+        return None if self._load is None else self._load.torques()[0]
 
     @property
     def model_errors(self) -> dict[str, TrackedError]:
@@ -253,10 +252,11 @@ class MomentumObserver:
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
         effects, load = self._effects, self._load
+        means, added = self._filters.means(which), None if load is None else load.torques()[which]
         if isinstance(effects, GaugeEffects):
-            return effects.observation(self._filters.of_links, load, self._parameters.payload[0])
+            return effects.observation(means, added)
         velocity_sd = self._side.velocity_sd if self._side else ()
-        return effects.observation(self._filters.means(which), load, self._last.inertia, velocity_sd, which)
+        return effects.observation(means, added, self._last.inertia, velocity_sd, which)
 
     def zero(self) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
@@ -302,88 +302,47 @@ class _Filters:
     """First-order filters of what a sample shows, and its mean over a cycle of a dither.
 
     Each number is filtered with every time constant: the residual and the torque of the model, (2 n,), N m, the pose,
-    (n,), rad, then the signals of the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s.  Strain gauges
-    lie behind the friction: no signals, and so few numbers that a list takes half the time.
+    (n,), rad; on the motor side also the signals of the shafts, (11 n,).
 
     Parameters
     ----------
     n : number of joints.
+    size : of a sample.
     times : time constants, s.
     cycle : samples in a cycle of the dither, 0 where there is none.
 
     Attributes
     ----------
-    of_links : (3 n,), residual, torque of the model and pose on the link side.
-    count : samples in the means over a cycle.
+    count : number of samples.
     """
 
-    def __init__(self, n: int, times: list[float], cycle: int) -> None:
-        self.times, self.of_links, self.count = times, [0.0] * (3 * n), 0
-        self._n, self.cycle = n, cycle
-        self._values = np.zeros((len(times), 14 * n))
-        self._ring = np.zeros((max(1, cycle), 13 * n))
-        self._decay = _Decay.over(math.inf, times, 14 * n)
+    def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
+        self.times, self.cycle, self.count = times, cycle, 0
+        self._n = n
+        self._values = np.zeros((len(times), size))
+        self._ring = np.zeros((cycle, size))
+        self._span = math.inf
+        self._keeps = self._takes = self._values  # one for each number: numpy multiplies by a single one more slowly
 
-    def take(self, torques: list[float], signals: list[float], span: float, is_first: bool, is_gap: bool) -> float:
-        """Take a sample; what the first filter keeps of the one before, 0..1.
-
-        Parameters
-        ----------
-        torques : residual, torque of the model and pose, (3 n,).
-        signals : of the shafts, (11 n,); empty on the link side.
-        span : time since the sample before, s.
-        is_first : whether there was none before.
-        is_gap : whether the span is so long that the torques in it are unknown.
-        """
-        if span != self._decay.span:
-            self._decay = _Decay.over(span, self.times, 14 * self._n)
-        keep = 0.0 if is_first else self._decay.keep
-        if not signals:
-            if is_first:
-                self.of_links = torques
-            elif not is_gap:
-                take = 1.0 - keep
-                self.of_links = [keep * old + take * new for old, new in zip(self.of_links, torques)]  # noqa: B905
-            return keep
-        values, n, present = self._values, self._n, np.array(torques + signals)
-        if is_first:
-            values[:] = present
+    def take(self, values: list[float], span: float) -> None:
+        """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
+        present, before, n = np.array(values), self._values, self._n
+        if not self.count:
+            self._values = present + np.zeros_like(before)
         else:
-            before_gap = values[:, : 3 * n].copy() if is_gap else None
-            values *= self._decay.keeps
-            values += self._decay.takes * present
-            if before_gap is not None:  # continue from here
-                values[:, : 3 * n] = before_gap
+            if span != self._span:
+                keep = [[math.exp(-span / time)] for time in self.times]
+                self._span, self._keeps = span, np.repeat(keep, len(present), axis=1)
+                self._takes = 1.0 - self._keeps
+            self._values = self._keeps * before + self._takes * present
+            if span > self.times[0]:  # continue from here
+                self._values[:, : 3 * n] = before[:, : 3 * n]
         if self.cycle:
-            kept = self._ring[self.count % self.cycle]
-            kept[:n], kept[n:] = values[0, :n], values[0, 2 * n :]
-            self.count += 1
-        return keep
+            self._ring[self.count % self.cycle] = self._values[0]
+        self.count += 1
 
-    def means(self, which: int) -> tuple[Array, list[float], Array, Array]:
-        """Residual and torque of the model, N m, pose, rad, each (n,), and signals, (11 n,), of one time constant."""
-        n, filtered = self._n, self._values[which].copy()
-        model: list[float] = filtered[n : 2 * n].tolist()
-        if not (self.cycle and self.count):
-            return filtered[:n], model, filtered[2 * n : 3 * n], filtered[3 * n :]
-        mean = self._ring[: self.count].mean(axis=0)
-        return mean[:n], model, mean[n : 2 * n], mean[2 * n :]
-
-
-class _Decay(NamedTuple):
-    """What the filters keep and take of a sample over a period of `span` seconds; what the first one keeps.
-
-    There is one for each number: numpy multiplies by a single one two to three times as slowly.
-    """
-
-    span: float
-    keep: float
-    keeps: Array
-    takes: Array
-
-    @classmethod
-    def over(cls, span: float, times: Sequence[float], size: int) -> "_Decay":
-        """The decay of filters of `size` numbers with these time constants, s."""
-        keep = [math.exp(-span / time) for time in times]
-        keeps = np.repeat(np.array(keep)[:, None], size, axis=1)
-        return cls(span, keep[0], keeps, 1.0 - keeps)
+    def means(self, which: int) -> tuple[Array, Array, Array, Array]:
+        """Residual and torque of the model, N m, pose, rad, each (n,), and signals of one time constant."""
+        n, filtered = self._n, self._values[which]
+        mean = self._ring[: self.count].mean(axis=0) if self.cycle and self.count else filtered
+        return mean[:n], filtered[n : 2 * n], mean[2 * n : 3 * n], mean[3 * n :]

@@ -113,8 +113,8 @@ class MotorSide:
         transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*motor.friction, *through], strict=True)]
         loaded = [abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)]
         signals = [
-            *sliding,
-            *map(abs, sliding),
+            *[max(0.0, share) for share in sliding],
+            *[max(0.0, -share) for share in sliding],
             *motor.resting,
             *joint.resting,
             *motor.shape,

@@ -15,7 +15,7 @@ class ContactThresholds:
     alone: float = 2.0
     smallest_statistic: float = 1e-12  # of the statistic of the torques, for a division
     settled: float = 2.0  # time constants of the observer, from the first sample until the estimate is ready
-    load_divisor: int = 4  # samples per update of the payload's torque, which changes slowly
+    load_span: float = 0.5  # time constants, in which the torque of a payload is that of its mean motion
     smallest_mass: float = 1e-6  # kg, the smallest mass that a link may have
     # position, force and link of one contact
     smallest_force: float = 1e-6  # N, avoids a division by zero where there is no force
@@ -70,9 +70,13 @@ class ContactThresholds:
     largest_size: float = 4.0  # of that size
     least_variance: float = 1e-30  # variance: avoids a division by zero for errors that are none
     sure: float = 2.0  # sd of an error that it must have beyond what is tolerable
-    # friction, masses, load friction and torque constants per torque; centres, m; delay, s; payload, kg: beyond, a
-    # warning
-    tolerable: tuple[float, ...] = (0.2, 0.04, 0.05, 0.05, 0.02, 3e-3, 0.05)
+    # errors of the model above which it is off
+    tolerable_friction: float = 0.2  # per friction
+    tolerable_mass: float = 0.04  # per torque
+    tolerable_torque: float = 0.05  # of load friction and torque constants, per torque
+    tolerable_centre: float = 0.02  # m, of a centre of mass
+    tolerable_delay: float = 3e-3  # s, of the torques
+    tolerable_payload: float = 0.05  # kg
     # sd of an identified friction, per friction: what changes from the identification to the use
     identified_friction_sd: float = 0.02
     at_rest: float = 0.02  # rad/s, of every joint, below which torques show the weights of the arm
