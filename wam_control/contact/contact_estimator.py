@@ -256,7 +256,22 @@ def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
     return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))
 
 
-NOTHING = Hypothesis("", *[math.nan] * 5, ZERO, math.nan, False, *[math.nan] * 2, ZERO, math.nan, NO_REASON)
+NOTHING = Hypothesis(
+    cover="",
+    probability=math.nan,
+    position=math.nan,
+    position_sd=math.nan,
+    low=math.nan,
+    high=math.nan,
+    force=ZERO,
+    force_sd=math.nan,
+    is_lower_bound=False,
+    direction=math.nan,
+    direction_sd=math.nan,
+    moment=ZERO,
+    residual=math.nan,
+    reasons=NO_REASON,
+)
 
 
 def _estimate(

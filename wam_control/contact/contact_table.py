@@ -17,13 +17,19 @@ _LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
     """Rows in the order of `HYPOTHESIS_COLUMNS`, the most probable hypothesis first."""
-    rows = []
-    for cover, *numbers, residual, reasons in hypotheses:
-        row = [float(covers.index(cover))]
-        for value in numbers:
-            row += value if isinstance(value, tuple) else [float(value)]
-        rows.append((*row, residual, float(reasons)))
-    return Table(hypotheses[0].cover if hypotheses else BASE, tuple(rows))
+    rows = tuple(
+        (
+            float(covers.index(h.cover)),
+            *(h.probability, h.position, h.position_sd, h.low, h.high),
+            *h.force,
+            *(h.force_sd, float(h.is_lower_bound), h.direction, h.direction_sd),
+            *h.moment,
+            h.residual,
+            float(h.reasons),
+        )
+        for h in hypotheses
+    )
+    return Table(hypotheses[0].cover if hypotheses else BASE, rows)
 
 
 def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:

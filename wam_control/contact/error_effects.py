@@ -75,7 +75,7 @@ class ErrorEffects:
         centres: CentreEffects,
     ) -> None:
         inverse, n = transmission.motor_from_joint, len(transmission.motor_from_joint)
-        levels = np.array([*motors.dynamic, *joints.dynamic])
+        levels = 0.5 * np.array([*motors.dynamic, *joints.dynamic])
         self._n, self._map, self._parameters, self._times = n, transmission, parameters, times
         statics = np.array([*motors.static, *joints.static])
         self._sds = np.concatenate((parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics))
@@ -99,16 +99,15 @@ class ErrorEffects:
         """
         n, given, time = self._n, self._parameters, self._times[which]
         residual, model, pose, signals = means
-        turning, uncertain = signals[: 4 * n], signals[4 * n : 8 * n]
+        sliding, moving, uncertain = signals[: 2 * n], signals[2 * n : 4 * n], signals[4 * n : 8 * n]
         if self._has_dither:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting, shape = uncertain.reshape(2, -1)
-            sliding = np.abs(turning[: 2 * n] - turning[2 * n :])
-            uncertain = np.concatenate((resting * resting, np.minimum(shape, sliding)))
+            uncertain = np.concatenate((resting * resting, np.minimum(shape, np.abs(sliding))))
         modelled = self._map.joint_from_motor.T.dot(model)
         driving = modelled - self._map.joint_from_motor.T.dot(residual)
         effects = np.zeros((n, 11 * n + 2))
-        sizes = np.concatenate((turning, model, signals[8 * n : 10 * n], driving))
+        sizes = np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n : 10 * n], driving))
         np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
         effects[:, 8 * n : -2] = self._centres.at(pose)
         effects[:, -2] = self._to_joints.dot(signals[10 * n :])
@@ -121,4 +120,4 @@ class ErrorEffects:
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))
         momentum = inertia.dot(self._map.joint_from_motor * (np.array(velocity_sd) / time))
         rest = (self._through * variance).dot(self._through.T) + momentum.dot(momentum.T)
-        return Observation(residual, effects, rest, less * (turning[:n] + turning[2 * n : 3 * n]), pose, lasting)
+        return Observation(residual, effects, rest, less * moving[:n], pose, lasting)

@@ -52,8 +52,7 @@ class MotorSide:
     def __init__(self, arm: Arm, parameters: ObserverParameters, has_dither: bool, model: ArmModel | None) -> None:
         self.map = TransmissionMap.of(arm)
         self._squared = np.square(self.map.joint_from_motor)
-        inverse = self.map.motor_from_joint
-        self.inertia: Array = inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
+        self.inertia: Array = self.map.at_joints(arm.motors.inertia) + np.diag(arm.joints.armature)
         is_identified = model is not None and model.is_identified
         at_motors, at_joints = (model.motors, model.joints) if model else (None, None)
         self.motors, self.joints = (
@@ -63,7 +62,7 @@ class MotorSide:
                 (arm.joints, parameters.joint_rest_velocity, at_joints),
             )
         )
-        self._velocity = VelocityFit(len(inverse), parameters.motor_rest_velocity)
+        self._velocity = VelocityFit(len(self._squared), parameters.motor_rest_velocity)
         self._parameters, self._has_dither = parameters, has_dither
         self._torque: Sequence[float] = ()
 
@@ -113,8 +112,8 @@ class MotorSide:
         transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*motor.friction, *through], strict=True)]
         loaded = [abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)]
         signals = [
-            *[max(0.0, share) for share in sliding],
-            *[max(0.0, -share) for share in sliding],
+            *sliding,
+            *map(abs, sliding),
             *motor.resting,
             *joint.resting,
             *motor.shape,
