@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.model_errors import Observation
+from wam_control.contact.motor_side import MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
-from wam_control.contact.shaft_friction import ShaftFriction
 from wam_description.rigid_body import RigidBody
-from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 Means = tuple[Array, Array, Array, Array]
@@ -43,9 +42,9 @@ class GaugeEffects:
         self._rest, self._still = np.square(self._lasting), np.zeros(n)
         self._centres, self._payload = centres, parameters.payload[0]
 
-    def observation(self, means: Means, load: Array | None) -> Observation:
+    def observation(self, means: Means, load: Array | None, *_: object) -> Observation:
         """See `ErrorEffects.observation`."""
-        residual, model, pose, _ = means
+        residual, model, pose = means[:3]
         added = self._still if load is None else load
         effects = np.hstack((np.diag(model), self._centres.at(pose), added[:, None]))
         return Observation(residual - self._payload * added, effects, self._rest, self._still, pose, self._lasting)
@@ -56,9 +55,8 @@ class ErrorEffects:
 
     Parameters
     ----------
-    transmission : between motors and joints.
+    side : motors, cables and their nominal friction.
     parameters : the uncertainty of the nominal model.
-    motors, joints : their nominal friction.
     times : time constants of the observer's filters, s.
     has_dither : whether torques and signals are means over a cycle of a dither.
     centres : effects of the centres of mass.
@@ -66,17 +64,16 @@ class ErrorEffects:
 
     def __init__(
         self,
-        transmission: TransmissionMap,
+        side: MotorSide,
         parameters: ObserverParameters,
-        motors: ShaftFriction,
-        joints: ShaftFriction,
         times: Sequence[float],
         has_dither: bool,
         centres: CentreEffects,
     ) -> None:
-        inverse, n = transmission.motor_from_joint, len(transmission.motor_from_joint)
+        inverse, motors, joints = side.map.motor_from_joint, side.motors, side.joints
+        n = self._n = len(inverse)
+        self._from_motors, self._parameters, self._times = side.map.joint_from_motor, parameters, times
         levels = 0.5 * np.array([*motors.dynamic, *joints.dynamic])
-        self._n, self._map, self._parameters, self._times = n, transmission, parameters, times
         statics = np.array([*motors.static, *joints.static])
         self._sds = np.concatenate((parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics))
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
@@ -104,8 +101,8 @@ class ErrorEffects:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting, shape = uncertain.reshape(2, -1)
             uncertain = np.concatenate((resting * resting, np.minimum(shape, np.abs(sliding))))
-        modelled = self._map.joint_from_motor.T.dot(model)
-        driving = modelled - self._map.joint_from_motor.T.dot(residual)
+        modelled = self._from_motors.T.dot(model)
+        driving = modelled - self._from_motors.T.dot(residual)
         effects = np.zeros((n, 11 * n + 2))
         sizes = np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n : 10 * n], driving))
         np.multiply(self._errors, sizes, out=effects[:, : 8 * n])
@@ -118,6 +115,6 @@ class ErrorEffects:
         lasting = self._through * np.sqrt(variance)
         less = self._times[0] / time  # a faster filter averages less of what is noise
         variance[:n] += less * (given.motor_torque_sd**2 + np.square(given.motor_torque_fraction * modelled))
-        momentum = inertia.dot(self._map.joint_from_motor * (np.array(velocity_sd) / time))
+        momentum = inertia.dot(self._from_motors * (np.array(velocity_sd) / time))
         rest = (self._through * variance).dot(self._through.T) + momentum.dot(momentum.T)
         return Observation(residual, effects, rest, less * moving[:n], pose, lasting)

@@ -81,8 +81,8 @@ class MomentumObserver:
         self._n, self._parameters = n, parameters
         self._body = RigidBody(arm, parameters.mass_scale)
         cycle = 0 if use_joint_sensors else dither_cycle
-        side = MotorSide(arm, parameters, cycle > 0, model)
-        self._side = None if use_joint_sensors else side
+        self._side = side = MotorSide(arm, parameters, cycle > 0, model)
+        self._is_link_side = use_joint_sensors
         fast, times = parameters.detection_time, [parameters.time_constant]
         if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not cycle:
             times.append(fast)
@@ -93,30 +93,33 @@ class MomentumObserver:
             payload_sd = parameters.payload_uncertainty
         self._load = ToolLoad(arm, times) if payload_sd > 0.0 or high > 0.0 else None
         centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
-        self._effects: GaugeEffects | ErrorEffects
-        if use_joint_sensors:
-            self._effects = GaugeEffects(n, parameters, centres)
-        else:
-            self._effects = ErrorEffects(side.map, parameters, side.motors, side.joints, times, cycle > 0, centres)
+        self._effects: GaugeEffects | ErrorEffects = (
+            GaugeEffects(n, parameters, centres)
+            if use_joint_sensors
+            else ErrorEffects(side, parameters, times, cycle > 0, centres)
+        )
         prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
         noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
         self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
-        self.reset()
+        self.seen = self._begin()
 
     def reset(self) -> None:
         """Forget all samples."""
-        n, before = self._n, self._filters
-        self._filters = _Filters(n, (14 if self._side else 3) * n, before.times, before.cycle)
-        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [0.0] * n, [0.0] * n)
+        self.seen = self._begin()
+
+    def _begin(self) -> Observation:
+        """Forget all samples; the moment before them."""
+        n = self._n
+        self._filters = self._filters.empty_copy()
+        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [], [], math.inf)
         if self._load is not None:
             self._load.reset()
-        if self._side is not None:
-            self._side.reset()
+        self._side.reset()
         self._errors.reset()
         self._gap = self.age = self._followed = 0.0
-        self.seen: Observation | None = None
         self.is_ready = False
+        return self._observation()
 
     @property
     def q(self) -> list[float]:
@@ -126,8 +129,7 @@ class MomentumObserver:
     def learn(self, other: "MomentumObserver") -> None:
         """Take over what another one of the same parameters has learned and keeps at a reset."""
         self._errors.learn(other._errors)
-        if self._side is not None and other._side is not None:
-            self._side.learn(other._side)
+        self._side.learn(other._side)
 
     def observe(self, state: State, dt: float) -> bool:
         """Take one sample.
@@ -152,7 +154,7 @@ class MomentumObserver:
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
-        if self._side is None:
+        if self._is_link_side:
             return self._update(JointSample(position, velocity, effort, [], [], dt))
         if self._side.carries_nothing(state):
             self.reset()
@@ -164,20 +166,19 @@ class MomentumObserver:
     def _update(self, sample: JointSample) -> bool:
         """Take a sample of the joints."""
         q, qd, tau, friction, signals, dt = sample
-        body, at, speed = self._body, np.array(q), np.array(qd)
-        inertia = body.mass_matrix(at) if self._side is None else body.mass_matrix(at) + self._side.inertia
+        body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
+        inertia = body.mass_matrix(at) if self._is_link_side else body.mass_matrix(at) + self._side.inertia
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
-        known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
-        last, span, n = self._last, dt + self._gap, self._n
-        is_first = not last.momentum
+        known = list(map(sub, bias, friction)) if friction else bias
+        span = dt + self._gap
+        is_first = not self._filters.count
         if is_first:
-            external, model = [0.0] * n, [-torque for torque in bias]
+            external, model = [0.0] * self._n, [-torque for torque in bias]
         else:
             # map and a plain zip: strict=True takes as long as the work on four numbers
             rates = [change / span for change in map(sub, momentum, last.momentum)]
-            left = model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
-            if friction:
-                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
+            model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
+            left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
             external = list(map(sub, left, tau))
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
@@ -189,11 +190,9 @@ class MomentumObserver:
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
-        settled = (
-            self.age > CONTACT.settled * self._parameters.time_constant
-            and self._filters.count >= 2 * self._filters.cycle
-        )
-        self.is_ready = self.is_ready or (settled and not is_first)
+        settled = CONTACT.settled * self._parameters.time_constant
+        if not is_first and self.age > settled and self._filters.count >= 2 * self._filters.cycle:
+            self.is_ready = True
         return True
 
     def torques(self) -> tuple[list[float], Array]:
@@ -201,8 +200,7 @@ class MomentumObserver:
 
         See `ModelErrors`; from joint sensors its errors are those of masses, centres of mass and payload.
         """
-        if self._side is not None:
-            self._side.expect()
+        self._side.expect()
         self.seen = self._observation()
         torques, covariance = self._errors.corrected(self.seen)
         return torques.tolist(), self._errors.size * covariance
@@ -210,8 +208,6 @@ class MomentumObserver:
     def moment(self) -> Torques:
         """The external torques last given, with what is known of their errors."""
         seen = self.seen
-        if seen is None:
-            raise RuntimeError("nothing has been observed")
         torques = seen.residual - seen.effects.dot(self._errors.errors)
         return Torques(self.age, torques, *self._errors.parts(seen), seen.pose)
 
@@ -224,14 +220,15 @@ class MomentumObserver:
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
-        if self.seen is not None and self.is_ready and self._side is not None:
+        if self.is_ready and not self._is_link_side:
             self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
 
     @property
     def pose(self) -> list[float]:
         """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
-        return self.q if self.seen is None else self.seen.pose.tolist()
+        pose: list[float] = self.seen.pose.tolist()
+        return pose
 
     @property
     def load_torques(self) -> Array | None:
@@ -241,7 +238,7 @@ class MomentumObserver:
     @property
     def model_errors(self) -> dict[str, TrackedError]:
         """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
-        return {} if self._side is None else self._errors.by_name
+        return {} if self._is_link_side else self._errors.by_name
 
     @property
     def warning(self) -> Event | None:
@@ -251,19 +248,16 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        effects, load = self._effects, self._load
-        means, added = self._filters.means(which), None if load is None else load.torques()[which]
-        if isinstance(effects, GaugeEffects):
-            return effects.observation(means, added)
-        velocity_sd = self._side.velocity_sd if self._side else ()
-        return effects.observation(means, added, self._last.inertia, velocity_sd, which)
+        load = None if self._load is None else self._load.torques()[which]
+        means, velocity_sd = self._filters.means(which), self._side.velocity_sd
+        return self._effects.observation(means, load, self._last.inertia, velocity_sd, which)
 
     def zero(self) -> str:
         """Take the torques of joint sensors at rest as those of an arm that nothing touches; '' or why not.
 
         Masses, centres of mass and payload are known better then, in other poses, too.
         """
-        if self._side is not None:
+        if not self._is_link_side:
             error = self._errors.by_name["payload"]
             mass = self._parameters.payload[0] + error.value
             return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
@@ -272,8 +266,7 @@ class MomentumObserver:
         if self._last.speed > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
-        if self.seen is not None:
-            self._errors.zero(self.seen)
+        self._errors.zero(self.seen)
         return ""
 
 
@@ -283,7 +276,7 @@ class _Sample(NamedTuple):
     Attributes
     ----------
     q : joint angles, (n,), rad.
-    momentum : (n,), N m s; empty before the first sample.
+    momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
@@ -295,7 +288,7 @@ class _Sample(NamedTuple):
     inertia: Array
     known: list[float]
     bias: list[float]
-    speed: float = math.inf
+    speed: float
 
 
 class _Filters:
@@ -323,6 +316,10 @@ class _Filters:
         self._ring = np.zeros((cycle, size))
         self._span = math.inf
         self._keeps = self._takes = self._values  # one for each number: numpy multiplies by a single one more slowly
+
+    def empty_copy(self) -> "_Filters":
+        """The same without samples."""
+        return _Filters(self._n, self._values.shape[1], self.times, self.cycle)
 
     def take(self, values: list[float], span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
