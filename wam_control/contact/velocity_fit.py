@@ -5,12 +5,10 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.thresholds import CONTACT
 from wam_description.signals import State
 
-Array = NDArray[np.float64]
 THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
 
 
@@ -37,7 +35,6 @@ class VelocityFit:
     def __init__(self, n: int, rest_velocity: float) -> None:
         self._third, self._rest = [0.0] * n, rest_velocity
         self._choice = 0
-        self._kept: tuple[int, float, Array] = (0, 0.0, np.zeros((2, 1)))
         self.reset()
 
     def reset(self) -> None:
@@ -67,24 +64,16 @@ class VelocityFit:
         if len(samples) <= 2 * half:
             return None
         window = list(samples)[-2 * half - 1 :]
-        first = window[0][0]
-        if abs(self._time - first - 2.0 * half * dt) <= CONTACT.uniform * dt:
-            middle, weights = self._time - half * dt, self._uniform(half, dt)
-        else:  # a sample was lost
-            times = np.array([time for time, _ in window])
-            middle = float(times.mean())
-            weights = _weights(times - middle)
-        before = self._middle
+        times, angles = np.array([time for time, _ in window]), np.array([each.position for _, each in window])
+        middle, before = float(times.mean()), self._middle
         if middle <= before:
             return None
         self._middle, self.delay = middle, self._time - middle
-        angle, slope = (weights @ [each.position for _, each in window]).tolist()
-        return FittedState(State(angle, slope, window[half][1].effort), dt if math.isnan(before) else middle - before)
-
-    def _uniform(self, half: int, dt: float) -> Array:
-        if self._kept[:2] != (half, dt):
-            self._kept = half, dt, _weights(np.array([dt * k for k in range(-half, half + 1)]))
-        return self._kept[2]
+        times -= middle
+        fitted = State(
+            angles.mean(axis=0).tolist(), (times @ angles / (times @ times)).tolist(), window[half][1].effort
+        )
+        return FittedState(fitted, dt if math.isnan(before) else middle - before)
 
     def _follow(self, dt: float) -> None:
         """Follow the error of the angles, and take a longer window where it calls for one."""
@@ -118,8 +107,3 @@ class VelocityFit:
         # half a window and more: sum of the squared distances from the middle; none: a difference of two
         squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
         return THIRD / (math.sqrt(squares) * dt)
-
-
-def _weights(times: Array) -> Array:
-    """Weights, (2, w), of the angles at times, (w,), s from their middle: for their mean and for their slope."""
-    return np.stack((np.full(len(times), 1.0 / len(times)), times / (times @ times)))
