@@ -43,7 +43,7 @@ def test_the_present_moment_and_the_past_are_the_whole_covariance_at_once() -> N
         moments.append((rows, at))
     fusion = ContactFusion(1.0)
     for rows, at in moments[:-1]:
-        fusion.remember(rows, at, np.array([0.2]), np.zeros(1), 0.0)
+        fusion.remember(rows, at, [(0.2, 0.0)], 0.0)
     rows, now = moments[-1]
     gram = fusion.gram(rows, now)
     assert gram is not None

@@ -404,7 +404,7 @@ def test_odds_of_a_force_along_the_tube_are_those_of_quadrature() -> None:
     size = abs(g[0, 1]) / (g[1, 1] + scale**-2)
     logs = []
     for lean in CONTACT.end_slopes:
-        ((rr, ra), (_, aa)), volume = contact_fit.widened(g.tolist(), [(2, lean * size)], [(3, lean * size)], (0, 1))
+        ((rr, ra), (_, aa)), volume = contact_fit.widened(g.tolist(), [(2, lean * size)], [(3, lean * size)], slice(2))
         logs.append(contact_fit.log_evidence(rr, ra, aa, scale) - 0.5 * volume)
     found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * g[0, 0]
     assert found == pytest.approx(along_by_quadrature(q, tau), abs=1e-3)
@@ -440,7 +440,7 @@ def test_evidence_is_finite_where_rounding_would_make_a_determinant_negative() -
         [1e6, 1e9, 1e12, 1e12],
         [1e6, 1e9, 1e12 * (1 + 1e-13), 1e12],
     ]
-    wide, volume = contact_fit.widened(g.tolist(), [(2, 5.0)], [(3, 5.0)], (0, 1))
+    wide, volume = contact_fit.widened(g.tolist(), [(2, 5.0)], [(3, 5.0)], slice(2))
     assert np.isfinite([*wide[0], *wide[1], volume]).all()
 
 

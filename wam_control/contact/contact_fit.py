@@ -69,7 +69,7 @@ class Fit(NamedTuple):
     residual: float
 
 
-def widened(gram: Gram, one: Torques, two: Torques, kept: Sequence[int]) -> tuple[Gram, float]:
+def widened(gram: Gram, one: Torques, two: Torques, kept: slice) -> tuple[Gram, float]:
     """Gram matrix, and log |S'| / |S|, if two torques of unit variance are in the covariance, too.
 
     Of the Gram matrix only the rows and columns `kept` are computed.
@@ -78,10 +78,11 @@ def widened(gram: Gram, one: Torques, two: Torques, kept: Sequence[int]) -> tupl
     w11, w12 = 1.0 + sum([part * u[i] for i, part in one]), sum([part * u[i] for i, part in two])
     w22 = 1.0 + sum([part * v[i] for i, part in two])
     determinant = max(w11 * w22 - w12 * w12, w11 + w22 - 1.0)  # at least this, but for rounding
+    u, v, w11, w12, w22 = u[kept], v[kept], w11 / determinant, w12 / determinant, w22 / determinant
     found = []
-    for i in kept:
-        row, p, q = gram[i], (w22 * u[i] - w12 * v[i]) / determinant, (w11 * v[i] - w12 * u[i]) / determinant
-        found.append([row[j] - p * u[j] - q * v[j] for j in kept])
+    for row, a, b in zip(gram[kept], u, v):  # noqa: B905
+        p, q = w22 * a - w12 * b, w11 * b - w12 * a
+        found.append([g - p * x - q * y for g, x, y in zip(row[kept], u, v)])  # noqa: B905
     return found, math.log(determinant)
 
 
@@ -117,7 +118,7 @@ class _Link(NamedTuple):
 
     Attributes
     ----------
-    gram : 5 by 5.
+    gram : 5 by 5, or larger.
     precision : 1/N^2, of the prior of each component of the force.
     constant : log of the probability of the torques without a force across.
     terms : (15,), coefficients of 1, x, x^2 in G^T W G + precision, 11, 12, 22, and in G^T W r, 1, 2, with G = A + x B.
@@ -131,11 +132,10 @@ class _Link(NamedTuple):
     @classmethod
     def of(cls, gram: Gram, precision: float, volume: float) -> "_Link":
         """The link of the first five columns of Z."""
-        five = [row[:5] for row in gram[:5]]
-        (rr, ra1, ra2, rb1, rb2), (_, a11, a12, a1b1, a1b2), (*_, a22, a2b1, a2b2), (*_, b11, b12), (*_, b22) = five
-        across = a11 + precision, 2.0 * a1b1, b11, a12, a1b2 + a2b1, b12, a22 + precision, 2.0 * a2b2, b22
-        terms = (*across, ra1, rb1, 0.0, ra2, rb2, 0.0)
-        return cls(five, precision, math.log(precision) - 0.5 * (rr + volume), terms)
+        r, a1, a2, b1, b2 = gram[:5]
+        n11, n12 = (a1[1] + precision, 2.0 * a1[3], b1[3]), (a1[2], a1[4] + a2[3], b1[4])
+        terms = (*n11, *n12, a2[2] + precision, 2.0 * a2[4], b2[4], r[1], r[3], 0.0, r[2], r[4], 0.0)
+        return cls(gram, precision, math.log(precision) - 0.5 * (r[0] + volume), terms)
 
     def force(self, x: float) -> tuple[Pair, float, Triple]:
         """Most likely force at position x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
@@ -152,14 +152,18 @@ class _Link(NamedTuple):
         return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
 
     def torque_position_sd(self, x: float, force: Pair) -> float:
-        """Standard deviation of the position, m, by the torques alone, the force unknown.
+        """Standard deviation of the position, m, by the torques alone, the force unknown: a Schur complement.
 
-        By a prior of the force so wide that it does not count.  Not by a pseudo-inverse of the whole information, which
-        is small exactly where the position is undetermined.
+        Not by a pseudo-inverse of the whole information, which is small exactly where the position is undetermined.
         """
-        (f1, f2), wide = force, (CONTACT.weak_prior * self.precision) ** -0.5
-        free, _ = widened(self.gram, [(1, wide), (3, x * wide)], [(2, wide), (4, x * wide)], (3, 4))
-        information = f1 * (f1 * free[0][0] + 2.0 * f2 * free[0][1]) + f2 * f2 * free[1][1]
+        p0, p1, p2, q0, q1, q2, s0, s1, s2, *_ = self.terms
+        _, a1, a2, b1, b2 = self.gram[:5]
+        (f1, f2), less = force, self.precision * (1.0 - CONTACT.weak_prior)
+        n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
+        v1 = f1 * (a1[3] + x * b1[3]) + f2 * (a1[4] + x * b1[4])
+        v2 = f1 * (a2[3] + x * b1[4]) + f2 * (a2[4] + x * b2[4])
+        known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
+        information = f1 * f1 * b1[3] + 2.0 * f1 * f2 * b1[4] + f2 * f2 * b2[4] - known
         return information**-0.5 if information > 0.0 else math.inf
 
 
@@ -234,7 +238,7 @@ class ContactFit:
         size, turn = math.hypot(f1, f2) + CONTACT.smallest_force, given.friction * radius
         twist = [(TWIST, given.moment_arm_offset * radius * size)]
         axial = [(AXIAL, given.friction * size), (3, turn * f1), (4, turn * f2)]
-        wide, volume = widened(gram, twist, axial, range(5))
+        wide, volume = widened(gram, twist, axial, slice(5))
         return _Link.of(wide, min(precision, 1.0 / (largest * largest + CONTACT.smallest_force)), volume)
 
     def _log_density(self, links: Sequence[_Link]) -> list[list[float]]:
@@ -288,7 +292,7 @@ class ContactFit:
                 ([(1, lean), (3, far)], [(2, lean), (4, far)], end, CONTACT.end_length, len(CONTACT.end_slopes))
             )
         for one, two, x, width, count in pieces:
-            ((rr, ra), (_, aa)), volume = widened(gram, one, two, (0, AXIAL))
+            ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
             value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume
             found.append((value + math.log(weight / (count * width)), x, width, i, True))
         return found

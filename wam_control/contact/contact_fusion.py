@@ -22,6 +22,7 @@ computed when one joins them; with the present one, of covariance C_nn, they are
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -133,12 +134,12 @@ class ContactFusion:
         self.count = 1 + past.moments
         return found
 
-    def remember(self, rows: Array, now: Torques, places: Array, probabilities: Array, residual: float) -> None:
+    def remember(self, rows: Array, now: Torques, guess: Sequence[tuple[float, float]], residual: float) -> None:
         """Take the present moment, with what was fitted to it.
 
         Parameters
         ----------
-        places, probabilities : (links,), m, of each link.
+        guess : of each link position of the contact, m, and probability.
         residual : chi^2 of all moments that the fit does not explain.
         """
         if self._past is not None and self.count > 1:
@@ -158,13 +159,14 @@ class ContactFusion:
         while moments and (len(moments) > CONTACT.moments or now.time - moments[0].torques.time > self._duration):
             moments.popleft()
         if has_moved or len(moments) < count:
-            self._past = self._of(list(moments), now, places, np.sqrt(probabilities)) if moments else None
+            self._past = self._of(list(moments), now, np.array(guess)) if moments else None
 
-    def _of(self, moments: list[_Seen], now: Torques, places: Array, chances: Array) -> _Past:
+    def _of(self, moments: list[_Seen], now: Torques, guess: Array) -> _Past:
         n, last = len(now.residual), moments[-1].torques
         effects = np.concatenate([moment.torques.effects for moment in moments])
         shared = effects @ last.covariance
         common = shared @ effects.T
+        places, chances = guess[:, 0], np.sqrt(guess[:, 1])
         found, count = len(places), len(moments)
         rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
         for j, moment in enumerate(moments):

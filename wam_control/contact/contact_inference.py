@@ -164,8 +164,7 @@ class ContactInference:
         best, moments = fits[order[0]], 1
         if fusion is not None and now is not None:
             moments = fusion.count
-            places, probabilities = np.array([(fit.position, fit.probability) for fit in fits]).T
-            fusion.remember(rows, now, places, probabilities, best.residual)
+            fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
         reasons = NO_REASON
         if best.probability < given.identification_threshold:
             reasons = self._why_ambiguous(q, set(order[:2]), fits)
