@@ -74,15 +74,15 @@ class ContactEstimate(NamedTuple):
     torque_sd: tuple[float, ...]
     statistic: float
     in_contact: bool
-    link: str
-    position: float
-    position_sd: float
-    probability: float
-    direction_sd: float
-    force: tuple[float, float, float]
-    moment: tuple[float, float, float]
-    hypotheses: tuple[Hypothesis, ...]
-    reasons: Reason
+    link: str = ""
+    position: float = math.nan
+    position_sd: float = math.nan
+    probability: float = math.nan
+    direction_sd: float = math.nan
+    force: tuple[float, float, float] = ZERO
+    moment: tuple[float, float, float] = ZERO
+    hypotheses: tuple[Hypothesis, ...] = ()
+    reasons: Reason = NO_REASON
     warning: Event | None = None
 
 
@@ -192,7 +192,8 @@ class ContactEstimator:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
             self._fusion.reset()
-            return _estimate(torques, sd, 0.0, reasons=Reason.BRAKED if self._is_blind else Reason.TOO_EARLY)
+            reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
+            return ContactEstimate(torques, sd, 0.0, False, reasons=reason)
         precision = inverse(covariance)
         late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
@@ -208,12 +209,28 @@ class ContactEstimator:
         if not self._in_contact:
             if was_in_contact:
                 self._fusion.reset()
-            return _estimate(torques, sd, statistic, warning=observer.warning)
+            return ContactEstimate(torques, sd, statistic, False, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None
         hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
-        return _estimate(torques, sd, statistic, hypotheses, hypotheses[0].reasons, observer.warning)
+        best = hypotheses[0]
+        return ContactEstimate(
+            external_torques=torques,
+            torque_sd=sd,
+            statistic=statistic,
+            in_contact=True,
+            link=best.cover,
+            position=best.position,
+            position_sd=best.position_sd,
+            probability=best.probability,
+            direction_sd=best.direction_sd,
+            force=best.force,
+            moment=best.moment,
+            hypotheses=hypotheses,
+            reasons=best.reasons,
+            warning=observer.warning,
+        )
 
     def _late(self, torques: list[float], precision: Array) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
@@ -254,49 +271,3 @@ def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
     if hypothesis.is_lower_bound:
         return hypothesis
     return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))
-
-
-NOTHING = Hypothesis(
-    cover="",
-    probability=math.nan,
-    position=math.nan,
-    position_sd=math.nan,
-    low=math.nan,
-    high=math.nan,
-    force=ZERO,
-    force_sd=math.nan,
-    is_lower_bound=False,
-    direction=math.nan,
-    direction_sd=math.nan,
-    moment=ZERO,
-    residual=math.nan,
-    reasons=NO_REASON,
-)
-
-
-def _estimate(
-    torques: tuple[float, ...],
-    sd: tuple[float, ...],
-    statistic: float,
-    hypotheses: tuple[Hypothesis, ...] = (),
-    reasons: Reason = NO_REASON,
-    warning: Event | None = None,
-) -> ContactEstimate:
-    """The estimate with the most probable of the hypotheses, or without contact."""
-    best = hypotheses[0] if hypotheses else NOTHING
-    return ContactEstimate(
-        external_torques=torques,
-        torque_sd=sd,
-        statistic=statistic,
-        in_contact=bool(hypotheses),
-        link=best.cover,
-        position=best.position,
-        position_sd=best.position_sd,
-        probability=best.probability,
-        direction_sd=best.direction_sd,
-        force=best.force,
-        moment=best.moment,
-        hypotheses=hypotheses,
-        reasons=reasons,
-        warning=warning,
-    )

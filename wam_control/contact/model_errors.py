@@ -88,8 +88,8 @@ class ModelErrors:
         self._prior = prior
         self._walk = drift**2 * np.diag(prior.limit)
         self._through, self._to_motors = through, np.linalg.inv(through)
-        self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
-        self.noise, self.size = noise.copy(), 1.0
+        # arrays are replaced, never changed: others may keep them
+        self.errors, self.covariance, self.noise, self.size = prior.errors, prior.covariance, noise, 1.0
         self.beyond = self._beyond()
         self._waiting: deque[Observation] = deque()
         self._pose = _Pose(np.full(len(through), np.inf))
@@ -108,10 +108,8 @@ class ModelErrors:
 
     def learn(self, other: "ModelErrors") -> None:
         """Take over what another one has learned."""
-        self.errors, self.covariance = other.errors.copy(), other.covariance.copy()
-        self.noise, self.size, self.beyond = other.noise.copy(), other.size, other.beyond
-        pose = other._pose
-        self._pose = pose._replace(elsewhere=pose.elsewhere and (pose.elsewhere[0].copy(), pose.elsewhere[1].copy()))
+        self.errors, self.covariance, self._pose = other.errors, other.covariance, other._pose
+        self.noise, self.size, self.beyond = other.noise, other.size, other.beyond
 
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
@@ -179,7 +177,7 @@ class ModelErrors:
                 before = self._waiting.popleft()
                 pose = self._pose = self._pose._replace(samples=self._pose.samples + 1)
                 if pose.samples > CONTACT.correlated and pose.elsewhere is None:
-                    self._pose = pose._replace(elsewhere=(self.errors.copy(), self.covariance.copy()), rested=0.0)
+                    self._pose = pose._replace(elsewhere=(self.errors, self.covariance), rested=0.0)
                 self._learn(before, self._since)
         self._since = 0.0
 
@@ -193,11 +191,9 @@ class ModelErrors:
             self._waiting.clear()
 
     def _grow(self, span: float) -> None:
-        covariance = self.covariance
-        covariance += span * self._walk
+        covariance = self.covariance + span * self._walk
         scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), CONTACT.least_variance)))
-        covariance *= scale
-        covariance *= scale[:, None]
+        self.covariance = covariance * scale * scale[:, None]
 
     def _learn(self, seen: Observation, span: float) -> None:
         innovation, covariance = self.corrected(seen)
@@ -209,8 +205,7 @@ class ModelErrors:
         at_motors = self._to_motors @ innovation
         known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
         # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
-        self.noise += rate * seen.moving * (at_motors * at_motors - known - self.noise)
-        self.noise = np.maximum(0.0, self.noise)
+        self.noise = np.maximum(0.0, self.noise + rate * seen.moving * (at_motors * at_motors - known - self.noise))
         rest = covariance - seen.effects @ (self.covariance @ seen.effects.T)
         self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
 
