@@ -195,8 +195,8 @@ class ContactEstimator:
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
             return ContactEstimate(torques, sd, 0.0, False, reasons=reason)
         precision = inverse(covariance)
-        late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
+        late = self._late(residual, precision, statistic)
         is_calm = self._in_contact or observer.age - self._ended > CONTACT.shaking_time
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
@@ -232,15 +232,15 @@ class ContactEstimator:
             warning=observer.warning,
         )
 
-    def _late(self, torques: list[float], precision: Array) -> float:
+    def _late(self, torques: list[float], precision: Array, statistic: float) -> float:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
         then, before, late = self._before
         passed = self._observer.age - then
         if before and not passed:
             return late
-        weighted = precision.dot(torques)
-        size, change = float(weighted.dot(torques)), float(weighted.dot(np.subtract(torques, before or torques)))
-        late = self._delay / passed * abs(change) / max(size, CONTACT.smallest_statistic) if passed > 0.0 else 0.0
+        late, change = 0.0, float(precision.dot(torques).dot(np.subtract(torques, before or torques)))
+        if passed > 0.0:
+            late = self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
         self._before = self._observer.age, torques, late
         return late
 

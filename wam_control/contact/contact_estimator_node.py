@@ -3,19 +3,16 @@
 from collections.abc import Sequence
 from typing import Any
 
-from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact.contact_table import friction_table, hypothesis_table
+from wam_control.contact.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.contact.contact_table import contact_of, friction_table, hypothesis_table, likely_of
 from wam_control.force.task import is_pressing
 from wam_description.arm import Shared, seconds
 from wam_description.event import Event, Level
 from wam_description.event_text import sentences
 from wam_description.signals import (
     BASE,
-    NO_CONTACT,
     Answer,
-    Contact,
     ContactView,
-    LikelyRange,
     NodeStatus,
     Point,
     State,
@@ -72,15 +69,17 @@ class ContactEstimatorNode:
         self._follow_zero(inputs["external_torque_zero"])
         self.estimate = estimate = self._estimator.estimate(_is_pressing(inputs))
         frame = estimate.link or BASE
+        hypotheses = hypothesis_table(estimate.hypotheses, self._covers)
         outputs: dict[str, Any] = {
             "external_joint_torques": State([], [], list(estimate.external_torques)),
             "external_joint_torques_sd": State([], [], list(estimate.torque_sd)),
             "contact/wrench": Wrench(frame, estimate.force, estimate.moment),
             "contact/point": Point(frame, (estimate.position, 0.0, 0.0)),
-            "contact/hypotheses": hypothesis_table(estimate.hypotheses, self._covers),
+            "contact/hypotheses": hypotheses,
         }
         if self._timing.is_display(inputs.stamp):
-            outputs["contact/markers"] = _view(estimate)
+            contact, likely = contact_of(hypotheses, self._covers), likely_of(hypotheses, self._covers)
+            outputs["contact/markers"] = ContactView(contact, likely)
         second = int(seconds(inputs.stamp))
         if second != self._second and (errors := self._estimator.model_errors):
             self._second = second
@@ -131,9 +130,3 @@ def _is_pressing(inputs: Inputs) -> bool:
     """Whether a force is commanded, alone or along an axis of a task."""
     force, task = inputs["force_command"], inputs["task_command"]
     return bool(force and any(force.force)) or bool(task and is_pressing(task))
-
-
-def _view(estimate: ContactEstimate) -> ContactView:
-    likely = tuple(LikelyRange(h.cover, h.low, h.high) for h in estimate.hypotheses if h.low < h.high)
-    contact = Contact(estimate.link, estimate.position, estimate.force) if estimate.link else NO_CONTACT
-    return ContactView(contact, likely)
