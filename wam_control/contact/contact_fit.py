@@ -254,17 +254,17 @@ class ContactFit:
         """Pieces with a contact from the side; a peak that is narrower than some is divided into pieces of its own."""
         x, (start, end) = self._row[i], self._ends[i]
         width = (end - start) / len(x)
-        for _ in range(CONTACT.refinements):
+        for refined in range(CONTACT.refinements + 1):
             floor = max(values) - CONTACT.search_depth
-            likely = [place for place, value in zip(x, values) if value > floor]  # noqa: B905
-            if len(likely) >= CONTACT.few_positions:
+            likely = [(value, place) for value, place in zip(values, x) if value > floor]  # noqa: B905
+            if len(likely) >= CONTACT.few_positions or refined == CONTACT.refinements:
                 break
-            low, high = max(likely[0] - width, start), min(likely[-1] + width, end)
+            low, high = max(likely[0][1] - width, start), min(likely[-1][1] + width, end)
             width = (high - low) / CONTACT.peak_positions
             x = [low + (k + 0.5) * width for k in range(CONTACT.peak_positions)]
             values = [link.log_density(place) for place in x]
         constant = link.constant + self._frequency[i]
-        return [(value + constant, place, width, i, False) for value, place in zip(values, x)]  # noqa: B905
+        return [(value + constant, place, width, i, False) for value, place in likely]
 
     def _at_ends(self, i: int, link: _Link) -> list[Piece]:
         """A contact where two links meet, which is more frequent there than elsewhere along them."""
