@@ -89,21 +89,19 @@ class ShaftFriction:
         friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
         slowest = self._rest_velocity
         for i, v in enumerate(velocity):
-            share, fraction, rests = v / self._rest[i], 1.0, 0.0
+            share = v / self._rest[i]
             if share >= 1.0 or share <= -1.0:
-                held[i] = acting = share = 1.0 if share > 0.0 else -1.0
+                held[i] = share = 1.0 if share > 0.0 else -1.0
                 # counted in the direction of the motion
                 travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
             else:
                 held[i] *= keep
-                fraction = abs(share)
-                acting, rests = share + (1.0 - fraction) * held[i], 1.0 - share * share
-            level, turned = self.dynamic[i], abs(v) / self._stribeck[i]
+            fraction, level, turned = abs(share), self.dynamic[i], abs(v) / self._stribeck[i]
             if self._rise[i] and turned < LONGEST:
                 level += self._rise[i] * math.exp(-turned * turned)
-            friction.append(level * acting + self._viscous[i] * v)
+            friction.append(level * (share + (1.0 - fraction) * held[i]) + self._viscous[i] * v)
             sliding.append(share)
-            resting.append(rests)
+            resting.append(1.0 - share * share)
             slow, since = turned / self._slow, abs(travel[i]) / slowest
             if travel[i] * v < 0.0 < keep:
                 since = 0.0  # it turns back; a dither ends each of its swings in that way
