@@ -66,13 +66,12 @@ class VelocityFit:
         window = list(samples)[-2 * half - 1 :]
         times, angles = np.array([time for time, _ in window]), np.array([each.position for _, each in window])
         middle, before = float(times.mean()), self._middle
-        if middle <= before:
+        if middle - before < 0.5 * dt:  # none since the window has grown
             return None
         self._middle, self.delay = middle, self._time - middle
         times -= middle
-        fitted = State(
-            angles.mean(axis=0).tolist(), (times @ angles / (times @ times)).tolist(), window[half][1].effort
-        )
+        velocity = times @ (angles - angles[half]) / (times @ times)  # of a shaft at rest exactly zero
+        fitted = State(angles.mean(axis=0).tolist(), velocity.tolist(), window[half][1].effort)
         return FittedState(fitted, dt if math.isnan(before) else middle - before)
 
     def _follow(self, dt: float) -> None:
