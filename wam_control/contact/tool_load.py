@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 class ToolLoad:
     """External torques of a mass of 1 kg at the tool, through the filters of the observer.
 
-    They are computed when they are asked for, so that they are as late as the residual.
+    They are computed when they are needed, so that they are as late as the residual.
 
     Parameters
     ----------
