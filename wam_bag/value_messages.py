@@ -60,12 +60,17 @@ def encoder(kind: str, names: tuple[str, ...] = (), columns: tuple[str, ...] = (
     columns : of a table.
     """
 
+    def joint_state(stamp: int, value: Any) -> bytes:
+        position, velocity, effort = value
+        counts = len(position), len(velocity), len(effort)
+        return joint_states(names, counts).pack(stamp, position, velocity, effort)
+
     def table(stamp: int, value: Any) -> bytes:
         return tables(columns, value.frame, len(value.rows)).pack(stamp, tuple(chain.from_iterable(value.rows)))
 
     clock = Pattern(TIME, ((0, 0),))
     encoders: dict[str, Encode] = {
-        JOINT_STATE: lambda stamp, value: joint_states(names, tuple(map(len, value))).pack(stamp, *value),
+        JOINT_STATE: joint_state,
         WRENCH: lambda stamp, value: wrenches(value.frame).pack(stamp, (*value.force, *value.torque)),
         POINT: lambda stamp, value: points(value.frame).pack(stamp, value.position),
         TABLE: table,

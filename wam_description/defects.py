@@ -122,6 +122,9 @@ _AS_TAKEN: dict[str, Callable[[Any], Any]] = {
 }
 
 
+_STATE_LIMITS = tuple((name, LARGEST[name]) for name in State._fields)
+
+
 def state_defect(state: State, owners: Sequence[str], wanted: Collection[str]) -> str:
     """What is wrong with positions, velocities and torques of motors or joints.
 
@@ -132,10 +135,9 @@ def state_defect(state: State, owners: Sequence[str], wanted: Collection[str]) -
     wanted : arrays that must be filled.
     """
     count = len(owners)
-    for name, values in zip(State._fields, state, strict=True):
+    for values, (name, limit) in zip(state, _STATE_LIMITS, strict=True):
         if len(values) != count and (len(values) or name in wanted):
             return f"{name} has {len(values)} values; send {count}, one for each of {', '.join(owners)}"
-        limit = LARGEST[name]
         for value in values:
             if not -limit <= value <= limit:  # NaN, too
                 owner = owners[[-limit <= one <= limit for one in values].index(False)]

@@ -14,7 +14,7 @@ from typing import Any
 from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_bag import value_messages
-from wam_bag.cdr import Pattern, first_stamp
+from wam_bag.cdr import first_stamp
 from wam_bag.value_messages import Encode, joint_states, points, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
@@ -117,21 +117,24 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
     """What finds the value in a message of a known layout, None in any other; the newest layout is tried first."""
     if topic.type == TABLE:
         return partial(_find_table, topic.columns, frames(arm), most_rows(topic, arm))
-    known: list[tuple[Pattern, Callable[[Numbers], Any]]]
+    known: list[tuple[Callable[[bytes], Numbers | None], Callable[[Numbers], Any]]]
     if topic.type == JOINT_STATE:
         names = owners(topic, arm)
-        known = [(joint_states(names, counts), _as_state) for counts in product((len(names), 0), repeat=3)]
+        known = [(joint_states(names, counts).numbers, _as_state) for counts in product((len(names), 0), repeat=3)]
     elif topic.type == WRENCH:
-        known = [(wrenches(frame), partial(_as_wrench, frame)) for frame in frames(arm)]
+        known = [(wrenches(frame).numbers, partial(_as_wrench, frame)) for frame in frames(arm)]
     else:
-        known = [(points(frame), partial(_as_point, frame)) for frame in frames(arm)]
+        known = [(points(frame).numbers, partial(_as_point, frame)) for frame in frames(arm)]
+    newest = known[0]
 
     def find(data: bytes) -> Any:
-        for i, (pattern, value_of) in enumerate(known):
-            if (numbers := pattern.numbers(data)) is not None:
-                if i:
-                    known.insert(0, known.pop(i))
-                return value_of(numbers)
+        nonlocal newest
+        numbers_of, value_of = newest
+        if (numbers := numbers_of(data)) is not None:
+            return value_of(numbers)
+        for newest in known:
+            if (numbers := newest[0](data)) is not None:
+                return newest[1](numbers)
         return None
 
     return find
