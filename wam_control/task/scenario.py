@@ -28,8 +28,9 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "posture": "rad, an angle for each joint at the end of the step; the arm arrives a little later",
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` may be left out",
     "tip": "`[x, y, z]`, m in the base frame, to which the tool goes along a straight line",
-    "force": "`{frame, newtons: [x, y, z], contact_position}`: N on the world in `base` or in the frame of a link; "
-    "`contact_position`, m along the link, pins it and may be left out",
+    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: N on the world in `base` or in the frame of a "
+    "link; `contact_position`, m along the link, pins it; in `rise`, s, it goes there from the force before; both may "
+    "be left out",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "N m, a torque for each joint",
     "until_force": "N; the step ends when a contact of this force is detected; none is a failure",
@@ -111,6 +112,7 @@ class ScenarioStep(NamedTuple):
     task: TaskCommand | None = None  # in place of a force
     trajectory: PosturePath | None = None  # in place of a posture
     tip: Triple | None = None  # m, base frame, to which the tool goes along a straight line, in place of a posture
+    rise: float = 0.0  # s, in which the force goes from that of the step before to this one; 0: at once
 
     @property
     def moves(self) -> bool:
@@ -185,6 +187,7 @@ class Scenario:
         self._index = -1
         self._elapsed = 0.0
         self._posture: list[float] = []
+        self._before = NO_FORCE  # of the step before
         self.failure = ""
         self.done = False
 
@@ -234,6 +237,7 @@ class Scenario:
         before = self.steps[self._index] if self._index >= 0 else None
         self._index, self._elapsed = index, 0.0
         step = self.steps[index]
+        self._before = before.force if before else NO_FORCE
         if before is not None and before.presses and (step.moves or not step.presses):
             self._posture = list(q)
         try:
@@ -264,6 +268,14 @@ class Scenario:
         return True
 
     def _force(self, step: ScenarioStep) -> ForceCommand:
+        if self._elapsed < step.rise:
+            before = self._before if self._before.frame == step.force.frame else NO_FORCE
+            share = self._elapsed / step.rise
+            force, torque = (
+                tuple(a + share * (b - a) for a, b in zip(*pair, strict=True))
+                for pair in zip(before[1:], step.force[1:], strict=True)
+            )
+            return ForceCommand(step.force.frame, force, torque)  # type: ignore[arg-type]
         if step.chirp is None:
             return step.force
         share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
@@ -498,6 +510,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
         task=_task(where, body, arm),
         trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
         tip=_tip(where, body["tip"]) if "tip" in body else None,
+        rise=number(where + ", force", "rise", body.get("force", {}).get("rise", 0.0)),
     )
     _require_step(where, step, shared)
     return step
@@ -571,6 +584,8 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
         _require_posture(where, step.posture, arm)
     if step.trajectory is not None:
         _require_trajectory(where, step.trajectory, arm)
+    rise = number(where + ", force", "rise", step.rise)
+    require(0.0 <= rise <= seconds, f"{where}: rise is {rise:g} s; allowed: 0 to {seconds:g} s, the time of the step")
     if step.push is not None:
         _require_push(where, step.push, shared, seconds)
 
@@ -634,7 +649,7 @@ def _frame(where: str, frame: Any, arm: Arm) -> str:
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
-    known(where + ", force", body, ("frame", "newtons", "contact_position"), ("frame", "newtons"))
+    known(where + ", force", body, ("frame", "newtons", "contact_position", "rise"), ("frame", "newtons"))
     frame = _frame(where, body["frame"], arm)
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
     if "contact_position" not in body:
