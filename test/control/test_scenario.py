@@ -120,6 +120,20 @@ def test_between_two_forces_the_posture_stays() -> None:
     assert outs[40].posture == GOAL
 
 
+def test_a_force_rises_from_that_of_the_step_before_in_its_own_frame() -> None:
+    steps = [
+        ScenarioStep("press", 0.1, force=ForceCommand("base", (0.0, 0.0, -4.0)), rise=0.1),
+        ScenarioStep("more", 0.1, force=ForceCommand("base", (0.0, 0.0, -8.0)), rise=0.05),
+        ScenarioStep("elsewhere", 0.1, force=ForceCommand("outer_link", (0.0, 6.0, 0.0), (0.0, 0.0, 1.2)), rise=0.1),
+    ]
+    found = [out.force for out in play(Scenario(steps), 60)]
+    assert [force.force[2] for force in found[:40:10]] == pytest.approx([0.0, -2.0, -4.0, -8.0])
+    assert found[50].force == pytest.approx((0.0, 3.0, 0.0))
+    assert found[50].torque == pytest.approx((0.0, 0.0, 0.6))
+    with pytest.raises(ParameterError, match="rise is 2 s; allowed: 0 to 1 s"):
+        Scenario([ScenarioStep("press", 1.0, force=PRESS, rise=2.0)], SHARED)
+
+
 def test_a_step_until_a_force_ends_when_it_is_detected() -> None:
     scenario = Scenario([ScenarioStep("lower", 1.0, tuple(GOAL), until_force=2.0), ScenarioStep("then", 1.0)])
     assert play(scenario, 20, contact=touching(1.9))[-1].step == "lower"
