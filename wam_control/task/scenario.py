@@ -269,19 +269,20 @@ class Scenario:
 
     def _force(self, step: ScenarioStep) -> ForceCommand:
         if self._elapsed < step.rise:
-            before = self._before if self._before.frame == step.force.frame else NO_FORCE
-            share = self._elapsed / step.rise
-            force, torque = (
-                tuple(a + share * (b - a) for a, b in zip(*pair, strict=True))
-                for pair in zip(before[1:], step.force[1:], strict=True)
-            )
-            return ForceCommand(step.force.frame, force, torque)  # type: ignore[arg-type]
+            return _between(self._before, step.force, self._elapsed / step.rise)
         if step.chirp is None:
             return step.force
         share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
-        x, y, z = (newtons * (1.0 + share) for newtons in step.force.force)
-        tx, ty, tz = (torque * (1.0 + share) for torque in step.force.torque)
-        return ForceCommand(step.force.frame, (x, y, z), (tx, ty, tz))
+        return _between(NO_FORCE, step.force, 1.0 + share)
+
+
+def _between(before: ForceCommand, force: ForceCommand, share: float) -> ForceCommand:
+    """A share of the way from one force to another; in another frame the first one is none."""
+    start = before if before.frame == force.frame else NO_FORCE
+    (x, y, z), (tx, ty, tz) = (
+        [a + share * (b - a) for a, b in zip(*pair, strict=True)] for pair in zip(start[1:], force[1:], strict=True)
+    )
+    return ForceCommand(force.frame, (x, y, z), (tx, ty, tz))
 
 
 def motion_of(

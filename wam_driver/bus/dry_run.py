@@ -118,7 +118,4 @@ def _node(number: int) -> str:
 
 
 def _name(number: int, version: int, node: int) -> str:
-    table = properties.SAFETY if node == BusNode.SAFETY_MODULE else properties.MOTOR
-    is_safety = node == BusNode.SAFETY_MODULE
-    known = {properties.number(name, version, is_safety): name for name, rows in table.items() if rows[0][0] <= version}
-    return known.get(number, f"property {number}")
+    return properties.names(version, node == BusNode.SAFETY_MODULE).get(number, f"property {number}")

@@ -5,6 +5,7 @@
 
 import json
 from bisect import bisect_right
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,3 +27,11 @@ def number(name: str, version: int, is_safety_module: bool = False) -> int:
         raise KeyError(f"firmware {version} has no property {name}; it came with {rows[0][0]}")
     found: int = rows[at - 1][1]
     return found
+
+
+@cache
+def names(version: int, is_safety_module: bool = False) -> dict[int, str]:
+    """Names of all properties of a firmware by their number."""
+    table = SAFETY if is_safety_module else MOTOR
+    known = [name for name, rows in table.items() if rows[0][0] <= version]
+    return {number(name, version, is_safety_module): name for name in known}

@@ -31,9 +31,7 @@ class SimulatedController:
         self.node, self.is_safety = node, node == BusNode.SAFETY_MODULE
         self.values: dict[str, int] = {"VERS": version, "MODE": 0, **values}
         self.woken: int | None = None
-        table = properties.SAFETY if self.is_safety else properties.MOTOR
-        known = [name for name, rows in table.items() if rows[0][0] <= version]
-        self._names = {properties.number(name, version, self.is_safety): name for name in known}
+        self._names = properties.names(version, self.is_safety)
 
     def is_addressed(self, frame: Frame) -> bool:
         """Whether it takes a frame."""
