@@ -41,6 +41,12 @@ def points(frame: str) -> Pattern:
     return Pattern(POINT, (((0, 0), frame), (0.0,) * 3))
 
 
+@cache
+def clocks() -> Pattern:
+    """Clocks."""
+    return Pattern(TIME, ((0, 0),))
+
+
 @lru_cache(maxsize=256)
 def tables(columns: tuple[str, ...], frame: str, rows: int) -> Pattern:
     """Tables with so many rows."""
@@ -68,13 +74,12 @@ def encoder(kind: str, names: tuple[str, ...] = (), columns: tuple[str, ...] = (
     def table(stamp: int, value: Any) -> bytes:
         return tables(columns, value.frame, len(value.rows)).pack(stamp, tuple(chain.from_iterable(value.rows)))
 
-    clock = Pattern(TIME, ((0, 0),))
     encoders: dict[str, Encode] = {
         JOINT_STATE: joint_state,
         WRENCH: lambda stamp, value: wrenches(value.frame).pack(stamp, (*value.force, *value.torque)),
         POINT: lambda stamp, value: points(value.frame).pack(stamp, value.position),
         TABLE: table,
-        TIME: lambda stamp, value: clock.pack(stamp),
+        TIME: lambda stamp, value: clocks().pack(stamp),
         BOOL: lambda stamp, value: encoded(BOOL, [bool(value)]),
         STRING: lambda stamp, value: encoded(STRING, [value]),
     }

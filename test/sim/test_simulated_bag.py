@@ -78,7 +78,7 @@ def test_the_demonstration_without_ros_says_so_and_reports(played: tuple[Path, s
 @pytest.mark.slow
 def test_a_force_that_is_refused_ends_the_demonstration_with_an_exit_code_and_the_reason(tmp_path: Path) -> None:
     """A force that is not measured well enough: what follows it in a script would go on as after a press."""
-    force = "{name: press, seconds: 0.6, force: {frame: outer_link, newtons: [0.0, -50.0, 0.0]}}"
+    force = "{name: press, seconds: 1.6, force: {frame: outer_link, newtons: [50.0, 0.0, 0.0]}}"
     (tmp_path / "press.yaml").write_text(TOUCH.replace("  - {name: brake", f"  - {force}\n  - {{name: brake"))
     done = without_ros(tmp_path, "demo", "--scenario", "press.yaml", "--name", "press")
     assert done.returncode == 1
