@@ -35,7 +35,6 @@ from wam_description.wiring import Input
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies import design_choices
-from wam_studies.contact import resting_push
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers
 from wam_studies.figures.catalogue import table as figures_table
@@ -59,6 +58,7 @@ CONFIGURATION = ROOT / "config" / "wam.yaml"
 SAMPLES = ROOT / "bags" / "sample"
 CLAIMS = ROOT / "docs" / "thesis.yaml"
 WRITES_PICTURES = __name__ == "__main__"
+DITHER_CYCLE, DITHER_POSE = 40, (0.1, -0.9, 0.2, 0.9)  # periods; rad
 LISTED = 4  # elements of a list in the table of parameters
 CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -259,7 +259,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "steps": lambda: steps(configuration),
         "driver contract": driver_contract,
         "plant": lambda: plant_table.table(plant_study()),
-        "resting pushes": resting_pushes,
         "steps of a scenario": lambda: markdown(
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
         ),
@@ -345,53 +344,15 @@ def driver_contract() -> str:
     return markdown(["row", "a driver"], [[f"`{key}`", row.text] for key, row in REQUIREMENTS.items()])
 
 
-@cache
-def pushes() -> tuple[resting_push.RestingPush, ...]:
-    """Estimates of pushes at rest with config/wam.yaml."""
-    return tuple(resting_push.study(Configuration.load(CONFIGURATION)))
-
-
-def resting_pushes() -> str:
-    """The estimates of the pushes at rest after 2 s, of each size with each kind of sensing."""
-    head = ["sensing", "push", "detected", "estimated force", "on the outer link", "position error"]
-    rows = []
-    for (sensing, newtons), group in itertools.groupby(pushes(), key=lambda row: (row.sensing, row.newtons)):
-        found = list(group)
-        late = [row.estimate for row in found if row.late]
-        known = [estimate for estimate in late if not math.isnan(estimate.position)]
-        errors = [100.0 * abs(estimate.position - resting_push.PLAN.position) for estimate in known]
-        rows.append(
-            [
-                sensing,
-                f"{newtons:g} N",
-                f"{len(late)} of {len(found)}",
-                between([row.late for row in found if row.late], "N"),
-                f"{sum(estimate.link == 'outer_link' for estimate in late)} of {len(late)}",
-                f"up to {max(errors):.1f} cm" if errors else "–",
-            ]
-        )
-    return markdown(head, rows)
-
-
-def between(values: Sequence[float], unit: str) -> str:
-    """Least and greatest of some values."""
-    known = [f"{value:.1f}" for value in sorted(values) if not math.isnan(value)]
-    return " to ".join(dict.fromkeys((known[0], known[-1]))) + f" {unit}" if known else "–"
-
-
 def dither(configuration: Configuration) -> str:
     """Cost of the dither."""
-    shared = configuration.with_values({"timing.dither_cycle": resting_push.PLAN.cycle}).shared
+    shared = configuration.with_values({"timing.dither_cycle": DITHER_CYCLE}).shared
     own = configuration.node("velocity_loop", VelocityLoopParameters).dither
-    cost = Dither(shared.arm, shared.timing, own).cost(resting_push.PLAN.pose)
-    moved = next(
-        row.tip_motion for row in pushes() if (row.sensing, row.pose) == ("motors, dither", resting_push.PLAN.pose)
-    )
+    cost = Dither(shared.arm, shared.timing, own).cost(DITHER_POSE)
     rows = [
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
         ["amplitude over static friction of motor and joints", f"{own.level:g}"],
-        ["motion of the tool on the plant, peak to peak", f"{1e3 * moved:.2g} mm"],
-        ["the same without friction", f"{1e3 * cost.tip_motion:.2g} mm"],
+        ["motion of the tool without friction, peak to peak", f"{1e3 * cost.tip_motion:.2g} mm"],
         ["heat of the hottest winding, over its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
     ]
     return markdown(["the dither", ""], rows)
@@ -469,14 +430,7 @@ def draw_and_run_examples() -> None:
         subprocess.run([sys.executable, *command], cwd=ROOT, check=True)
 
 
-def draw_push() -> None:
-    """The picture of the contact estimator's page."""
-    resting_push.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
-    print("docs/estimator.png", flush=True)
-
-
 DRAWN = {
-    "push": draw_push,
     "demonstration": partial(demonstrate, "wam.yaml", "demo", is_moving=True),
     "barrett": partial(demonstrate, "barrett-wam7.yaml", "barrett-demo"),
     "tasks": draw_tasks,

@@ -139,6 +139,7 @@ NAMES = (
     "asymmetric 25 %",
     "Stribeck, F_s + 20 %",
     "presliding",
+    "LuGre, F_s + 20 %",
     "load-dependent 6 %",
     "friction drifts 20 %",
     "mass 5 %, centre 5 mm",
@@ -173,6 +174,7 @@ def drawn(name: str, arm: Arm, random: Random) -> Degradation:
         "driver:friction.motor_presliding_stiffness": [4.0],
         "driver:friction.joint_presliding_stiffness": [500.0],
     }
+    gaussian = {"driver:friction.stribeck_exponent": 2.0}  # with presliding: LuGre's model, undamped bristles
     noisy = {**stated, **_cogging(random, arm, 0.004), **_noise(arm, 0.04, 0.04)}
     heavy = {**stated, **_masses(random, arm, 0.05)}
     of = {
@@ -182,6 +184,7 @@ def drawn(name: str, arm: Arm, random: Random) -> Degradation:
         "asymmetric 25 %": _degraded({**stated, **_asymmetric(random, arm, 0.25)}),
         "Stribeck, F_s + 20 %": _degraded({**stated, **_stribeck(arm, 1.2)}),
         "presliding": _degraded({**stated, **presliding}),
+        "LuGre, F_s + 20 %": _degraded({**stated, **_stribeck(arm, 1.2), **gaussian, **presliding}),
         "load-dependent 6 %": _degraded({**stated, **_load(0.06)}),
         "friction drifts 20 %": _degraded(stated, drift=0.2),
         "mass 5 %, centre 5 mm": _degraded(heavy, _centre(random, arm, 0.005)),

@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from wam_description.configuration import Configuration
-from wam_studies.contact.bounds import BOUNDS, bounds
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
-from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables, groups_of
+from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactScore
 from wam_studies.contact.recording import CONTACTS, Drive, record
 from wam_studies.contact.replay import replay
@@ -105,7 +102,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         arm = self.configuration.shared.arm
         scenarios, drives = _of_both(records)
         rows: list[Row] = [*stated_rows(scenarios, arm), *further_rows(scenarios, arm), *degraded_rows(drives)]
-        return Scores(rows, [_extent(scenarios), *degraded_tables(drives), *_bounds(self.configuration, drives)])
+        return Scores(rows, [_extent(scenarios), *degraded_tables(drives)])
 
     def failure(self, record: ContactScore) -> str:
         """Why a case ended early."""
@@ -137,16 +134,3 @@ def _extent(scenarios: Sequence[ContactScore]) -> ScoreTable:
         "free motion, s": round(sum(one.free_seconds for one in scenarios if one.group == "free")),
     }
     return ScoreTable("Extent", list(counts), [list(map(str, counts.values()))])
-
-
-def _bounds(configuration: Configuration, drives: Sequence[ContactScore]) -> Iterator[ScoreTable]:
-    """What is possible at best with the errors of the torques of identified arms; none without any."""
-    identified = [one.torques for own in groups_of(drives, IDENTIFIED_ARM).values() for one in own]
-    if identified:
-        both = [[one.rms("sliding"), one.rms("moving")] for one in identified]
-        errors = np.sqrt(np.mean(np.square(both), axis=0))
-        yield ScoreTable("What is possible at best", BOUNDS, bounds(configuration, errors), OPEN)
-
-
-OPEN = """The inference alone, with torques that have the errors of a row and no others, and exactly their covariance;
-poses and contacts are drawn as after an identification."""
