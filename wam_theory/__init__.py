@@ -11,15 +11,11 @@ zero_order_hold      a linear system and its input held over a sample, as one ma
 stiction             5.4: node with little inertia; staircase: its step response
 regimes              5.5: behaviour of an inertial node by gamma and zeta; half_cycle: its slip
 describing_function  5.5.1: the unstable cycle of domain II
-stiction_start       5.4: asymmetric start of the stiction cycle and how its period converges
 backlash_cycle       2.2: the limit cycle of backlash in a torque loop
 quantisation         3.2.1: force feedback that is read in steps
-harmonics            5.5.1: harmonics of dry friction behind the linear block
-guidelines           5.5.2, 5.7: gain for a frequency, deadband, kept contact
 stick_slip           exact simulation of a node (friction_model, phases, slip_arc, verdicts)
 stability_map        figure 5.8 for many nodes at once (many_slips)
 cable                chapter 6: stiffness, slack, tension, loss and creep of stages
 tension_element      chapter 6: power and speed across pulleys
-pulley_slip          6.2.5, 6.3.2, 6.4.2: arc of slip over the torque, toothed elements, idlers
 arguments            checks of arguments
 """

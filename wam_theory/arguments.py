@@ -30,17 +30,6 @@ def zero_or_more(**arguments: ArrayLike) -> list[Array]:
     return _checked(arguments, lambda a: a >= 0.0, "zero or more")
 
 
-def below_one(**arguments: ArrayLike) -> list[Array]:
-    """Arguments as arrays.
-
-    Raises
-    ------
-    ValueError
-        if one is not above zero and below one.
-    """
-    return _checked(arguments, lambda a: (a > 0.0) & (a < 1.0), "above zero and below one")
-
-
 def finite(**arguments: ArrayLike) -> list[Array]:
     """Arguments as arrays.
 

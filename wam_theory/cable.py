@@ -114,32 +114,6 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
     )
 
 
-def propagated_pretension(pretension: ArrayLike, ratio: ArrayLike) -> Array:
-    """Pretension of the next stage, N, from one pulley and pinion for each strand between them: n T0 (7.2.2).
-
-    Parameters
-    ----------
-    pretension : T0 of this stage, N, zero or more.
-    ratio : n, radius of the pulley over that of the pinion on its shaft.
-    """
-    (pretension,), (ratio,) = zero_or_more(pretension=pretension), above_zero(ratio=ratio)
-    return ratio * pretension
-
-
-def unequal_tension(ea: ArrayLike, length: ArrayLike, mismatch: ArrayLike) -> Array:
-    """Difference of the tensions of two parallel cables, N, of which one is shorter: EA d/L (7.2.2).
-
-    A cable that is looped back over a free pulley has none.
-
-    Parameters
-    ----------
-    ea, length : E A, N, and free length, m, of each, above zero.
-    mismatch : d, m.
-    """
-    ea, length = above_zero(ea=ea, length=length)
-    return np.asarray(ea * np.asarray(mismatch, dtype=float) / length)
-
-
 def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
     """Relative loss of speed and of power of a stage, (T2 - T1)/EA of (6.4) and (6.14), for strain far below 1.
 
@@ -181,38 +155,6 @@ def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike
     radius, ea = above_zero(radius=radius, ea=ea)
     (travel,) = zero_or_more(travel=travel)
     return travel * np.asarray(torque, dtype=float) / (radius * ea)
-
-
-def twisted_tension(
-    pretension: ArrayLike, ea: ArrayLike, length: ArrayLike, radius: ArrayLike, twist: ArrayLike
-) -> Array:
-    """Tension of both strands of a circuit whose ends are turned about its line, N: each becomes a helix (7.2.2).
-
-    T0 + EA (sqrt(1 + (r phi/L)^2) - 1); both strands alike, so that the torque and the stiffness of the circuit stay.
-
-    Parameters
-    ----------
-    pretension : T0, N, zero or more.
-    ea, length : E A, N, and L, m, of a strand, above zero.
-    radius : r of the pulleys at both ends, half of the distance of the strands, m, above zero.
-    twist : phi, rad.
-    """
-    (t0,) = zero_or_more(pretension=pretension)
-    k, span, r = above_zero(ea=ea, length=length, radius=radius)
-    return np.asarray(t0 + k * (np.hypot(1.0, r * np.asarray(twist, dtype=float) / span) - 1.0))
-
-
-def twist_torque(pretension: ArrayLike, ea: ArrayLike, length: ArrayLike, radius: ArrayLike, twist: ArrayLike) -> Array:
-    """Torque that turns a twisted circuit back, N m: 2 T r^2 phi/sqrt(L^2 + (r phi)^2), of both strands.
-
-    Parameters
-    ----------
-    pretension, ea, length, radius, twist : as in `twisted_tension`.
-    """
-    tension = twisted_tension(pretension, ea, length, radius, twist)
-    span, r = above_zero(length=length, radius=radius)
-    phi = np.asarray(twist, dtype=float)
-    return np.asarray(2.0 * tension * r * r * phi / np.hypot(span, r * phi))
 
 
 def eccentric_ripple(eccentricity: ArrayLike, pretension: ArrayLike, angle: ArrayLike) -> Array:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.arguments import Array, above_zero, below_one, zero_or_more
+from wam_theory.arguments import Array, above_zero, zero_or_more
 
 Complex = NDArray[np.complex128]
 
@@ -247,53 +247,12 @@ def best_contact_stiffness(
 ) -> Array:
     """Contact stiffness where the curves of (4.7) cross, N m/rad, (4.9): k_tr J_l/J_m.  N far below N_m.
 
-    Its effect for any other N: `fraction_at_crossover`.
-
     Parameters
     ----------
     motor_inertia, link_inertia, transmission_stiffness : as in `force_resonances`.
     """
     (ktr,) = above_zero(transmission_stiffness=transmission_stiffness)
     return ktr * matched_ratio(motor_inertia, link_inertia) ** 2
-
-
-def fraction_at_crossover(ratio: ArrayLike, matched: ArrayLike) -> Array:
-    """omega_1 over its asymptote (4.6) at the contact stiffness (4.9), for any N; not in print.
-
-    sqrt(1 - u), u = (v sqrt(v^2 + 4) - v^2)/2, v = N/N_m: 1 for small N, 0.62 for N = N_m.
-
-    Parameters
-    ----------
-    ratio : N, zero or more.
-    matched : N_m, above zero.
-    """
-    (n,) = zero_or_more(ratio=ratio)
-    (nm,) = above_zero(matched=matched)
-    v = n / nm
-    return np.sqrt(1.0 - (v * np.sqrt(v * v + 4.0) - v * v) / 2.0)
-
-
-def contact_stiffness_for(
-    fraction: ArrayLike,
-    motor_inertia: ArrayLike,
-    link_inertia: ArrayLike,
-    transmission_stiffness: ArrayLike,
-    ratio: ArrayLike,
-) -> Array:
-    """Contact stiffness for a fraction f of the asymptote (4.6), N m/rad, for any N.
-
-    f^2 k_tr (J_l/J_m + N^2/(1 - f^2)), which section 4.3.2 leaves to numerical solution; for N = 0 and
-    f = 1 it is (4.9).  Not in print.
-
-    Parameters
-    ----------
-    fraction : f, above zero and below one.
-    motor_inertia, link_inertia, transmission_stiffness, ratio : as in `force_resonances`.
-    """
-    (f,) = below_one(fraction=fraction)
-    (ktr,) = above_zero(transmission_stiffness=transmission_stiffness)
-    (n,) = above_zero(ratio=ratio)
-    return f * f * ktr * (matched_ratio(motor_inertia, link_inertia) ** 2 + n * n / (1.0 - f * f))
 
 
 def best_transmission_stiffness(
@@ -309,31 +268,6 @@ def best_transmission_stiffness(
     """
     (kc,) = above_zero(contact_stiffness=contact_stiffness)
     return kc / matched_ratio(motor_inertia, link_inertia) ** 2
-
-
-def transmission_stiffness_for(
-    fraction: ArrayLike,
-    motor_inertia: ArrayLike,
-    link_inertia: ArrayLike,
-    contact_stiffness: ArrayLike,
-    ratio: ArrayLike,
-) -> Array:
-    """Transmission stiffness for a fraction f of the bandwidth of a rigid one, N m/rad, for any N.
-
-    omega_1 is then f sqrt(k_c/M), M = J_l + N^2 J_m, for k_tr = k_c f^2 J_m (M - f^2 J_l)/((1 - f^2) M^2);
-    for N = 0 and f = 1 it is (4.10).  Not in print.
-
-    Parameters
-    ----------
-    fraction : f, above zero and below one.
-    motor_inertia, link_inertia, contact_stiffness, ratio : as in `force_resonances`.
-    """
-    (f,) = below_one(fraction=fraction)
-    jm, jl, kc, n = above_zero(
-        motor_inertia=motor_inertia, link_inertia=link_inertia, contact_stiffness=contact_stiffness, ratio=ratio
-    )
-    total = jl + n * n * jm
-    return kc * f * f * jm * (total - f * f * jl) / ((1.0 - f * f) * total * total)
 
 
 def _parts(

@@ -3,8 +3,7 @@
 The motion after a stick depends on its error only, so a response is a sequence of maps from the error at
 one breakaway to that at the next, with one slip between them or, if friction cannot hold the node, several
 reversals.  The boundary is the unstable fixed point of that map, or the error from which the node never
-sticks again.  The exact slips are those of `many_slips`; `largest_stable_step` computes the same for one
-node by simulation of its response.
+sticks again.  The exact slips are those of `many_slips`.
 """
 
 import math

@@ -21,7 +21,7 @@ from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from, state_after
 from wam_theory.staircase import Staircase, inertialess_staircase
 from wam_theory.thresholds import SEARCH
-from wam_theory.verdicts import Outcome, Verdict, assess, largest_stable_step
+from wam_theory.verdicts import Outcome, Verdict, assess
 
 __all__ = [
     "FrictionNode",
@@ -37,7 +37,6 @@ __all__ = [
     "assess",
     "half_cycle",
     "inertialess_staircase",
-    "largest_stable_step",
     "simulate",
 ]
 

@@ -1,4 +1,4 @@
-"""Whether a step response settles, ends in a limit cycle or diverges, and the largest step that does not diverge."""
+"""Whether a step response settles, ends in a limit cycle or diverges."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from wam_theory.friction_model import FrictionNode, IntegralLoop, require
+from wam_theory.friction_model import FrictionNode, IntegralLoop
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from
 
@@ -163,46 +163,3 @@ def _irregular_cycle(turns: Sequence[tuple[float, float]], force: float) -> tupl
     passes = sum((f1 < force) != (f2 < force) for f1, f2 in pairwise(late))
     period = 2.0 * (turns[-1][0] - turns[-quarter][0]) / passes if passes else math.nan
     return Verdict.LIMIT_CYCLE, spans[1], period
-
-
-def largest_stable_step(node: FrictionNode, loop: IntegralLoop, rtol: float = 1e-6, largest: float = 1e4) -> float:
-    """Largest step of F_des from unstressed rest that does not diverge (domain II of figure 5.8).
-
-    By bisection, on the assumption that every smaller step is stable, too.
-
-    Parameters
-    ----------
-    node, loop : to simulate; the node has friction.
-    rtol : relative, of the result.
-    largest : steps above this many times F_static are not tried.
-
-    Returns
-    -------
-    float
-        N m; 0 if a step of 1e-3 F_static diverges (domain III), infinite if a step of `largest` does not.
-
-    Raises
-    ------
-    ValueError
-        if there is no friction, or a response is undecided.
-    """
-    require("static_friction", node.static_friction, above=0.0)
-
-    def stable(step: float) -> bool:
-        verdict = assess(node, loop, step).verdict
-        if verdict is Verdict.UNDECIDED:
-            raise ValueError(f"the response to a step of {step} is undecided; change the gain, {loop.gain}, a little")
-        return verdict is not Verdict.DIVERGED
-
-    low, high = 1e-3 * node.static_friction, largest * node.static_friction
-    if not stable(low):
-        return 0.0
-    if stable(high):
-        return _INF
-    while high > low * (1.0 + rtol):
-        middle = math.sqrt(low * high)
-        if stable(middle):
-            low = middle
-        else:
-            high = middle
-    return low

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import (
     FrictionNode,
     IntegralLoop,
@@ -17,7 +18,6 @@ from wam_theory.stick_slip import (
     Verdict,
     assess,
     inertialess_staircase,
-    largest_stable_step,
     simulate,
 )
 
@@ -285,22 +285,19 @@ def test_first_peaks_shrink_and_the_response_still_diverges() -> None:
 @pytest.mark.parametrize(("gamma", "largest"), [(1.1, 25.3), (1.5, 3.45), (2.0, 1.17)])
 def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None:
     node, loop = unit_node(), IntegralLoop(gamma)
-    found = largest_stable_step(node, loop)
+    found = float(largest_stable_steps(gamma, 0.25))
     assert found == pytest.approx(largest, rel=0.005)
     # small steps alone, just on either side: what is left of the error at the end of a long run
     for step, stable in ((0.99 * found, True), (1.01 * found, False)):
         ends = SmallSteps(node, loop, step).run([60.0, 120.0, 180.0, 240.0, 300.0], 1.0 / 64, REST)
         spans = np.abs(step - 2.0 * ends[:, 0])
         assert bool(spans[-1] < 0.2 * step) is stable, spans
-    assert largest_stable_step(unit_node(0.3), loop) == pytest.approx(0.3 * found, rel=1e-5)
 
 
 def test_domain_one_takes_every_step_and_domain_three_none() -> None:
     for step in (1e-2, 1.0, 30.0, 1e3):
         assert assess(unit_node(), IntegralLoop(0.97), step).verdict is Verdict.SETTLED
         assert assess(unit_node(), IntegralLoop(2.20), step).verdict is Verdict.DIVERGED
-    assert largest_stable_step(unit_node(), IntegralLoop(0.97)) == math.inf
-    assert largest_stable_step(unit_node(), IntegralLoop(2.20)) == 0.0
 
 
 def test_a_size_that_has_not_converged_is_no_limit_cycle() -> None:
@@ -508,7 +505,6 @@ def test_one_sample_more_reverses_what_friction_does() -> None:
         (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0, (0.0, math.nan, 0.0)), "start is"),
         (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0).at([2.0]), "times go from 2"),
         (lambda: inertialess_staircase(unit_node(), 1.0, 1.0, 5), "no jumps"),
-        (lambda: largest_stable_step(unit_node(0.0), IntegralLoop(1.0)), "static_friction is 0"),
     ],
 )
 def test_a_refusal_names_the_value(build: object, names: str) -> None:
