@@ -91,7 +91,7 @@ endef
 
 constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[compile,completion,docs,live,ros,test,view]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[compile,completion,docs,live,ros,test]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \

@@ -165,8 +165,6 @@ setup(
             "setuptools<80",
             "types-PyYAML",
         ],
-        # the viewer of `wam live BAG --rerun`; its interface changes from version to version
-        "view": ["rerun-sdk>=0.41,<0.42"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),

@@ -18,7 +18,6 @@ demo_figure         its picture
 drawing             colours and sizes that all pictures share
 arm_picture         the arm and its obstacles from the side
 arm_render          the process that renders it with MuJoCo
-rerun_view          a bag for the Rerun viewer
 table               tables of text, for a terminal and for Markdown
 thresholds          what is evaluated, and when it is certain, by concern; the layout of reports
 """

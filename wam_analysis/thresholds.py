@@ -304,10 +304,6 @@ class ReportLayout:
     render_timeout: float = 30.0  # s, of the process that renders
     pixels_per_metre: int = 1500  # of the rendered arm
     floor_gap: float = 0.002  # m below the obstacles, so that surfaces do not flicker
-    # of the plots and of the status: a legend has up to four lines
-    plot_heights: tuple[float, ...] = (1.9, 1.0, 1.5, 0.9)
-    eye_distance: float = 1.3  # of the eye, in heights of what it sees
-    poses: float = 100.0  # poses of the arm in a second at most
 
 
 SHAFT = ShaftThresholds()

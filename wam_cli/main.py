@@ -46,7 +46,6 @@ EXTRAS = {
         "sensor_msgs", "std_msgs", "std_srvs", "visualization_msgs",
     ),
     "live": ("viser",),
-    "view": ("rerun",),
     "dask": ("distributed", "dask"),
     "completion": ("argcomplete",),
 }  # fmt: skip

@@ -140,7 +140,6 @@ JSON = OutputFile("JSON", (".json", ".txt", ""))
 HTML = OutputFile("a page of HTML", (".html", ".htm", ""))
 PAGE = OutputFile("a page of the documentation", (".md",))
 PICTURE = OutputFile("a picture", (".png", ".pdf", ".svg", ".jpg", ".eps"))
-RERUN = OutputFile("a recording for Rerun", (".rrd", ""))
 
 
 # groups

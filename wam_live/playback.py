@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.held_messages import by_names
 from wam_analysis.recorded import recorded_arm
-from wam_analysis.rerun_view import joint_motion
 from wam_bag.bag import BagError, TableColumns
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
@@ -46,10 +47,7 @@ class BagSource:
             self.world = recording.run.parameters.part("driver", World, "world.")
         except BagError:  # a bag without parameters
             self.world = World(self.recorded.obstacles, NO_SPRINGS)
-        joints = joint_motion(recording, self.recorded.arm)
-        if joints is None or not len(joints[0]):
-            raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
-        self._stamps, self._angles = joints
+        self._stamps, self._angles = self._motion(recording)
         self._traces = recording.summary.traces
         self._covers = self.recorded.arm.covers.names
         statuses = sorted(recording.run.stamped_statuses(), key=lambda one: one[0])
@@ -66,6 +64,15 @@ class BagSource:
             self._likely_stamps = columns.stamp_ns.tolist()
         self._objects = recording.bag.topics.get(f"{recording.namespace}/sim/objects")
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
+
+    def _motion(self, recording: AnalysedRun) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Stamps, ns, and angles of the joints, rad, from the best topic in the bag."""
+        for name in ("sim/joint_states", "joint_sensors", "joint_states"):
+            columns = recording.run.joints(name)
+            angles = None if columns is None else by_names(columns, "position", self.recorded.arm.joints.names)
+            if columns is not None and angles is not None and np.any(good := np.all(np.isfinite(angles), axis=1)):
+                return columns.stamp_ns[good], angles[good]
+        raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
 
     def snapshot(self, stamp: int) -> Snapshot:
         """What there was at a time of the arm, ns."""

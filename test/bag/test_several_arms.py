@@ -72,9 +72,7 @@ def test_the_length_is_that_of_the_arm_that_is_analysed(
     assert f"{length} of /{chosen}, " in printed
 
 
-@pytest.mark.parametrize(
-    "command", [("replay", "gravity", "--config", "wam"), ("identify",), ("live", "--save", "x.rrd")]
-)
+@pytest.mark.parametrize("command", [("replay", "gravity", "--config", "wam"), ("identify",)])
 def test_without_a_choice_the_other_arms_are_named(
     bag: Path,
     command: tuple[str, ...],
@@ -82,8 +80,6 @@ def test_without_a_choice_the_other_arms_are_named(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    if command[0] == "live":
-        pytest.importorskip("rerun", reason="Rerun is not installed: pip install 'wam_stack[view]'")
     monkeypatch.chdir(tmp_path)
     name, *options = command
     printed, _ = ended(capsys, name, bag, *options)

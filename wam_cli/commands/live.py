@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from wam_cli.options import ARM, RERUN, namespace, require_option, take_port
+from wam_cli.options import ARM, namespace, require_option, take_port
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle, port_is_free, url
 from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
@@ -19,8 +19,8 @@ PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 5.0  # s, after which a page that is not there yet is reported
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
-    "The page needs viser, pip install 'wam_stack[live]', and is reachable from this machine alone; --rerun and --save "
-    "need 'wam_stack[view]'; --tf needs tf2_msgs and --trajectories control_msgs, of a ROS installation."
+    "The page needs viser, pip install 'wam_stack[live]', and is reachable from this machine alone; --tf needs "
+    "tf2_msgs and --trajectories control_msgs, of a ROS installation."
 )
 
 
@@ -32,11 +32,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_port(parser)
     parser.add_argument("--at", type=float, metavar="SECONDS", help="of a bag: show this time and do not play")
     way = parser.add_mutually_exclusive_group()
-    way.add_argument("--rerun", action="store_true", help="of a bag: open the Rerun viewer instead of the page")
-    way.add_argument(
-        "--save", type=RERUN, metavar="FILE", help="of a bag: write this .rrd file for Rerun, open nothing"
-    )
-    way = parser.add_mutually_exclusive_group()
     way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
     way.add_argument(
         "--trajectories", action="store_true", help="no page: serve the action FollowJointTrajectory, as for MoveIt"
@@ -47,12 +42,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Show or serve until Ctrl-C."""
-    require_option(given, "BAG", "--at", "--rerun", "--save")
+    require_option(given, "BAG", "--at")
     require_option(given, "--tf", "--frame-prefix")
     if given.bag is not None and (given.tf or given.trajectories):
         raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
-    if given.save or given.rerun:
-        return _rerun(given)
     if given.bag is not None:
         return _recording(given)
     from wam_ros.run import die_with_parent  # a recording is shown without ROS
@@ -125,17 +118,6 @@ def _recording(given: argparse.Namespace) -> int:
     stop = Stop()
     port = free_port(given.port, _print)
     play(_run_of(given), port, given.at, lambda: stop.is_set, _print)
-    return 0
-
-
-def _rerun(given: argparse.Namespace) -> int:
-    """Open a recording in Rerun, or save it for that."""
-    from wam_analysis.rerun_view import load_rerun, view, viewer
-
-    load_rerun()  # before the work
-    if not given.save:
-        viewer()
-    print(f"{given.save or 'viewer'}: {view(_run_of(given), given.save)}")
     return 0
 
 
