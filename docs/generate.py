@@ -9,7 +9,6 @@ import ast
 import itertools
 import math
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -400,7 +399,7 @@ def pages() -> dict[Path, str]:
 
 
 def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
-    """Run the demonstration of a configuration in lockstep and keep its report and pictures by a name."""
+    """Run the demonstration of a configuration in lockstep and keep its report, and its moving picture, by a name."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
         configuration = Configuration.load(ROOT / "config" / name).with_values({"recorder:directory": folder})
         file = Path(folder) / "wam.yaml"
@@ -413,10 +412,9 @@ def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
             raise SystemExit(f"the demonstration failed, see above; docs/{kept}.* are unchanged")
         report = done.stdout[done.stdout.index("Demonstration of") :].partition("\nbag ")[0].rstrip()
         (ROOT / "docs" / f"{kept}.txt").write_text(report + "\n", encoding="utf-8")
-        shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / f"{kept}.png")
         if is_moving:
             moving_picture.save(Path(folder) / "demo", ROOT / "docs" / f"{kept}.webp")
-    print(*(f"docs/{kept}{ending}" for ending in (".png", ".txt", *[".webp"] * is_moving)), sep="\n", flush=True)
+    print(*(f"docs/{kept}{ending}" for ending in (".txt", *[".webp"] * is_moving)), sep="\n", flush=True)
 
 
 def draw_and_run_examples() -> None:

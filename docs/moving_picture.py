@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import ESTIMATED, LAYOUT, STYLE, TRUE, draw_forces, seconds_at
 from wam_analysis.demo_summary import DemoSummary, summary_of
 from wam_analysis.demo_traces import TOPICS_READ, ForceSignal
+from wam_analysis.drawing import COLOURS, ESTIMATED, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import JointColumns, read
 from wam_description.signals import Contact
 from wam_sim.recording import recorded_run
@@ -36,40 +37,37 @@ def frames(summary: DemoSummary, recorded: RecordedArm, joints: JointColumns) ->
         figure = Figure(figsize=SIZE, dpi=DPI)
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(2, 1, height_ratios=(1.7, 1.0), left=0.13, right=0.98, bottom=0.08, top=0.95)
-        scene, forces = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-        draw_forces(forces, summary, letter="", room=0)
-        forces.tick_params(labelbottom=True)
-        forces.set_xlabel("time [s]")
+        axes, forces = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+        for name, colour in COLOURS.items():
+            size = getattr(summary.traces, name).size
+            forces.plot((summary.traces.stamp - begin) / 1e9, size, color=colour, label=name)
+        forces.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, (end - begin) / 1e9), ylim=(0.0, None))
+        forces.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(COLOURS))
         now = forces.axvline(0.0, color="#222222", linewidth=1.0, zorder=9)
-        box = scene.get_window_extent()
-        views = [
-            arm_picture.side_view(recorded.arm, q, recorded.obstacles, float(box.width / box.height)) for q in poses
-        ]
+        box = axes.get_window_extent()
+        scenes = [arm_picture.scene(recorded.arm, q, recorded.world) for q in poses]
+        views = [arm_picture.side_view(scene, float(box.width / box.height)) for scene in scenes]
         view = max(views, key=lambda view: view.width)  # does not move
         return [
-            frame(figure, scene, now, summary, recorded, q, view, int(stamp))
-            for stamp, q in zip(stamps, poses, strict=True)
+            frame(figure, axes, now, summary, recorded, scene, q, view, int(stamp))
+            for stamp, q, scene in zip(stamps, poses, scenes, strict=True)
         ]
 
 
-def frame(figure, scene, now, summary, recorded, q, view, stamp) -> Image.Image:  # type: ignore[no-untyped-def]
+def frame(figure, axes, now, summary, recorded, scene, q, view, stamp) -> Image.Image:  # type: ignore[no-untyped-def]
     """The picture of one instant."""
-    scene.clear()
-    scene.set_axis_off()
-    scene.set(xlim=(-view.width / 2.0, view.width / 2.0), ylim=(-view.height / 2.0, view.height / 2.0))
-    scene.set_aspect("equal")
-    arm_picture.draw(scene, recorded.arm, q, recorded.obstacles, view)
+    axes.clear()
+    arm_picture.draw(axes, scene, view)
     row = row_at(summary.traces.stamp, stamp)
     for signal, colour, width in ((summary.traces.true, TRUE, 5.0), (summary.traces.estimated, ESTIMATED, 2.0)):
         contact = contact_at(signal, row)
         if contact.cover in recorded.arm.covers.names and np.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(recorded.arm, q, contact)
             start, end = view.project(np.array([point, point + LAYOUT.metres_per_newton * force]))
-            arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
-            scene.annotate("", end, start, arrowprops=arrow, zorder=30)
+            arm_picture.arrow(axes, start, end, colour, width)
     step = next((step.name for step in summary.steps if step.begin <= stamp < step.end), "")
-    scene.text(0.02, 0.98, step, transform=scene.transAxes, va="top", fontsize=14)
-    now.set_xdata([seconds_at(summary, stamp)] * 2)
+    axes.text(0.02, 0.98, step, transform=axes.transAxes, va="top", fontsize=14)
+    now.set_xdata([(stamp - summary.steps[0].begin) / 1e9] * 2)
     figure.canvas.draw()
     return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
 

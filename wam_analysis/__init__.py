@@ -14,10 +14,8 @@ unplanned_contact   contacts while no force is commanded that are harder than al
 task_forces         forces that tasks command, and what was measured of each
 demo_summary        the demonstration in numbers
 demo_report         its report, as text
-demo_figure         its picture
 drawing             colours and sizes that all pictures share
 arm_picture         the arm and its obstacles from the side
-arm_render          the process that renders it with MuJoCo
 table               tables of text, for a terminal and for Markdown
 thresholds          what is evaluated, and when it is certain, by concern; the layout of reports
 """

@@ -1,20 +1,12 @@
-"""The arm and its obstacles from the side: rendered by MuJoCo, or drawn if OpenGL does not work.
-
-Both are orthographic, in metres of the picture plane, so that arrows and labels fit both.
-"""
+"""The arm and what surrounds it from the side: orthographic, in metres of the picture plane."""
 
 import itertools
-import json
 import math
-import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
@@ -23,16 +15,13 @@ from numpy.typing import NDArray
 from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
 from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
-from wam_description.effects import no_effects
-from wam_description.mjcf import mjcf, rotation_xyz
-from wam_description.mjcf_objects import hinge_name
+from wam_description.mjcf import rotation_xyz
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, ObjectState
-from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_description.world import World
 
 Array = NDArray[np.float64]
 
-GL = ("egl", "osmesa")
 OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 
@@ -47,11 +36,20 @@ class Tube(NamedTuple):
 
 
 class Face(NamedTuple):
-    """A flat face: corners (k, 3) in m and outward normal (3,), base frame, and its shape."""
+    """A flat face: corners (k, 3) in m and outward normal (3,), base frame, the shape that has it, and its colour."""
 
     corners: Array
     normal: Array
     shape: str
+    colour: str
+
+
+class Scene(NamedTuple):
+    """What is drawn: covers and balls as tubes, everything else as faces; height of the floor, m."""
+
+    tubes: list[Tube]
+    faces: list[Face]
+    floor: float
 
 
 class View(NamedTuple):
@@ -120,16 +118,36 @@ def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[
     return body.point(q, contact.cover, point), body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)
 
 
-def faces(obstacles: Obstacles) -> Iterator[Face]:
-    """The faces of all obstacles; round ones in facets."""
-    for i, shape in enumerate(obstacles.shapes):
+def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> Scene:
+    """The arm in a pose, q in rad, and its world; without the states of its objects the obstacles alone."""
+    obstacles = world.obstacles
+    balls: list[Tube] = []
+    faces: list[Face] = []
+    for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
+        if states and name in world.moving:
+            continue
         triple = slice(3 * i, 3 * i + 3)
         rotation, centre = rotation_xyz(*obstacles.rotations[triple]), np.array(obstacles.positions[triple])
-        for corners, normal in _faces(shape, np.array(obstacles.sizes[triple])):
-            yield Face(corners @ rotation.T + centre, rotation @ normal, shape)
+        faces += _faces(shape, np.array(obstacles.sizes[triple]), rotation, centre, BLOCK_COLOUR)
+    floor = min([float(face.corners[:, 2].min()) for face in faces], default=-0.2)  # at the lowest obstacle
+    for one, state in zip(world.solids, states, strict=False):
+        rotation = pin.Quaternion(state.qw, state.qx, state.qy, state.qz).matrix()
+        centre = np.array((state.x, state.y, state.z)) + rotation @ one.centre
+        colour = BLOCK_COLOUR if one.name in world.moving else OBJECT_COLOUR
+        if one.shape == "ball":
+            balls.append(Tube(centre, centre, one.size[0], colour))
+        else:
+            faces += _faces(one.shape, np.array(one.size), rotation, centre, colour)
+    return Scene([*tubes(arm, q), *balls], faces, floor)
 
 
-def _faces(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
+def _faces(shape: str, size: Array, rotation: Array, centre: Array, colour: str) -> Iterator[Face]:
+    """The faces of a solid; round ones in facets."""
+    for corners, normal in _corners(shape, size):
+        yield Face(corners @ rotation.T + centre, rotation @ normal, shape, colour)
+
+
+def _corners(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     if shape == "plane":
         yield np.column_stack([square * size[:2], np.zeros(4)]), np.array([0.0, 0.0, 1.0])
@@ -151,19 +169,17 @@ def _faces(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
 
 
 def side_view(
-    arm: Arm,
-    q: Sequence[float],
-    obstacles: Obstacles,
+    shown: Scene,
     aspect: float,
     margin: float = 0.08,
     azimuth: float = 112.0,
     elevation: float = -14.0,
     more: Sequence[Array] = (),
 ) -> View:
-    """A view from the side and a little from above that shows arm, obstacles and points; aspect: width by height."""
-    points = [point for tube in tubes(arm, q) for point in (tube.start, tube.end)]
-    points += [corner for face in faces(obstacles) for corner in face.corners if face.shape != "plane"]
-    points += [np.array([0.0, 0.0, floor_height(obstacles)]), *more]
+    """A view from the side and a little from above that shows a scene and points; aspect: width by height."""
+    points = [point for tube in shown.tubes for point in (tube.start, tube.end)]
+    points += [corner for face in shown.faces for corner in face.corners if face.shape != "plane"]
+    points += [np.array([0.0, 0.0, shown.floor]), *more]
     view = View(azimuth=azimuth, elevation=elevation, centre=np.zeros(3), width=1.0, height=1.0)
     projected = view.project(np.array(points))
     low, high = projected.min(axis=0), projected.max(axis=0)
@@ -173,111 +189,34 @@ def side_view(
     return view._replace(centre=centre, width=float(width), height=float(width / aspect))
 
 
-def floor_height(obstacles: Obstacles) -> float:
-    """Height of the floor, at the bottom of the lowest obstacle, m."""
-    return min([float(face.corners[:, 2].min()) for face in faces(obstacles)], default=-0.2)
-
-
-def render(
-    arm: Arm,
-    q: Sequence[float],
-    obstacles: Obstacles,
-    view: View,
-    gl: Sequence[str] = GL,
-    moved: tuple[World, Sequence[ObjectState]] | None = None,
-) -> NDArray[np.uint8] | None:
-    """The scene rendered by MuJoCo in a separate process, because a broken OpenGL can crash it.
-
-    Parameters
-    ----------
-    arm, q, obstacles : the scene, q in rad.
-    view : the camera.
-    gl : values of MUJOCO_GL to try in this order.
-    moved : the world with the states of its objects; without it the obstacles alone are drawn.
-
-    Returns
-    -------
-    (height, width, 3) or None
-        RGB; None if none of them works.
-    """
-    scene = {
-        "xml": mjcf(arm, 0.001, moved[0] if moved else World(obstacles, NO_SPRINGS), no_effects(arm)),
-        "joints": dict(zip(arm.joints.names, map(float, q), strict=True)),
-        "objects": _placed(*moved) if moved else [],
-        "azimuth": view.azimuth,
-        "elevation": view.elevation,
-        "centre": view.centre.tolist(),
-        "extent": view.height,
-        "size": [round(view.width * LAYOUT.pixels_per_metre), round(view.height * LAYOUT.pixels_per_metre)],
-        "floor": floor_height(obstacles),
-        "pedestal": LAYOUT.pedestal,
-        "colours": {
-            **{name: to_rgb(TUBE_COLOURS[i % len(TUBE_COLOURS)]) for i, name in enumerate(arm.covers.names)},
-            **{name: to_rgb(BLOCK_COLOUR) for name in obstacles.names},
-            **{
-                name: to_rgb(OBJECT_COLOUR)
-                for name in (moved[0].objects if moved else ())
-                if name not in obstacles.names
-            },
-            "pedestal": to_rgb(PEDESTAL_COLOUR),
-        },
-    }
-    here = str(Path(__file__).resolve().parents[1])
-    paths = os.pathsep.join(filter(None, [here, os.environ.get("PYTHONPATH", "")]))
-    with tempfile.TemporaryDirectory() as directory:
-        picture = Path(directory) / "picture.npy"
-        for name in gl:
-            try:
-                done = subprocess.run(
-                    [sys.executable, "-m", "wam_analysis.arm_render", str(picture)],
-                    input=json.dumps(scene).encode(),
-                    env={**os.environ, "MUJOCO_GL": name, "PYTHONPATH": paths},
-                    cwd=directory,
-                    capture_output=True,
-                    timeout=LAYOUT.render_timeout,
-                    check=False,
-                )
-            except (OSError, subprocess.TimeoutExpired):
-                continue
-            if done.returncode == 0 and picture.is_file():
-                pixels: NDArray[np.uint8] = np.load(picture)
-                if np.ptp(pixels) > 0:
-                    return pixels
-    return None
-
-
-def _placed(world: World, states: Sequence[ObjectState]) -> list[dict[str, object]]:
-    """Where the objects are, as `wam_analysis.arm_render` reads it."""
-    return [
-        {
-            "name": name,
-            "hinge": hinge_name(name) if math.isfinite(state.angle) else "",
-            "angle": state.angle if math.isfinite(state.angle) else 0.0,
-            "pose": [state.x, state.y, state.z, state.qw, state.qx, state.qy, state.qz],
-        }
-        for name, state in zip(world.objects, states, strict=True)
-    ]
-
-
-def draw(axes: Axes, arm: Arm, q: Sequence[float], obstacles: Obstacles, view: View) -> None:
-    """The scene drawn by matplotlib: obstacles as shaded faces, covers with their true radii."""
-    floor = floor_height(obstacles)
-    for tube in tubes(arm, q):
-        shadow = [np.array([*end[:2], floor]) for end in (tube.start, tube.end)]
+def draw(axes: Axes, shown: Scene, view: View) -> None:
+    """A scene: faces shaded, the farthest first, then the tubes with their true radii."""
+    axes.set_axis_off()
+    axes.set(xlim=(-view.width / 2.0, view.width / 2.0), ylim=(-view.height / 2.0, view.height / 2.0), aspect="equal")
+    for tube in shown.tubes:
+        shadow = [np.array([*end[:2], shown.floor]) for end in (tube.start, tube.end)]
         _stadium(axes, view.project(np.array(shadow)), tube.radius, facecolor="#e9ebee", edgecolor="none", zorder=1)
     forward = view.axes[2]
-    for face in faces(obstacles):
+    for face in sorted(shown.faces, key=lambda face: -float(np.mean(face.corners @ forward))):
         if face.normal @ forward < 0.0:
             shade = 0.78 + 0.22 * max(float(face.normal @ LIGHT), 0.0)
-            colour = tuple(shade * channel for channel in to_rgb(BLOCK_COLOUR))
+            colour = tuple(shade * channel for channel in to_rgb(face.colour))
             corners = view.project(face.corners)
             edge = colour if face.shape == "cylinder" and len(corners) == 4 else "#8a6f3a"
             zorder = 2 if face.shape == "plane" else 3
             axes.add_patch(Polygon(corners, facecolor=colour, edgecolor=edge, linewidth=0.6, zorder=zorder))
-    _draw_pedestal(axes, view, floor)
-    order = sorted(tubes(arm, q), key=lambda tube: -float((tube.start + tube.end) @ forward))
+    _draw_pedestal(axes, view, shown.floor)
+    order = sorted(shown.tubes, key=lambda tube: -float((tube.start + tube.end) @ forward))
     for depth, tube in enumerate(order):
         _draw_tube(axes, view, tube, 4.1 + 0.1 * depth)
+
+
+def arrow(axes: Axes, tail: Array, tip: Array, colour: str, width: float) -> None:
+    """An arrow in the picture plane, (2,) each, above the arm; a thin one is above a thick one."""
+    style = {"arrowstyle": "-|>,head_width=0.35,head_length=0.7", "color": colour, "linewidth": width}
+    axes.annotate(
+        "", (tip[0], tip[1]), (tail[0], tail[1]), arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=30.0 - width
+    )
 
 
 def _draw_pedestal(axes: Axes, view: View, floor: float) -> None:

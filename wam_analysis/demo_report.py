@@ -1,15 +1,13 @@
-"""The report of a demonstration: tables for a terminal, and a picture in the directory of the bag."""
+"""The report of a demonstration: tables for a terminal."""
 
 import math
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.contact_list import NOT_ESTIMATED
-from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import DemoSummary, LoopReport
 from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
@@ -19,7 +17,6 @@ from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.held_force import Theory
 from wam_analysis.findings.steps import VerdictResult, verdict
 from wam_analysis.findings.text import table_lines
-from wam_analysis.recorded import recorded_arm
 from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import BagError, read
 from wam_bag.errors import command
@@ -37,19 +34,18 @@ class DemoReport(NamedTuple):
     unmet: tuple[str, ...]
 
 
-def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
-    """Evaluate a recorded demonstration, and draw it.
+def report(bag: Path, namespace: str = "") -> DemoReport:
+    """Evaluate a recorded demonstration.
 
     Parameters
     ----------
     bag : directory of the bag, or its .mcap file.
-    picture : PNG file to write, None for no picture.
     namespace : of the arm, '' for the one with the most topics.
 
     Raises
     ------
     BagError
-        if the bag cannot be read or holds no demonstration; then nothing is written.
+        if the bag cannot be read or holds no demonstration.
     """
     bag = Path(bag)
     recording = analysed_run(read(bag, TOPICS_READ, may_lack=True), namespace)
@@ -58,16 +54,9 @@ def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoR
             f"{bag} is not a recording of the demonstration: it has no step of a scenario; "
             f"{command('wam analyse', bag)} analyses any recording, {command('wam bag info', bag)} lists its topics"
         )
-    notes: tuple[str, ...] = ()
-    if picture is not None:
-        try:
-            notes = save(picture, recording.summary, recorded_arm(recording.run.parameters))
-        except OSError as error:
-            notes = (f"the picture was not written: {error}",)
-    files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
     wrong = [str(answer) for answer in verdict(recording) if answer.result is VerdictResult.NO]
     failed = [f"FAILED: {why}" for why in [recording.failure] if why]
-    return DemoReport("\n".join([text(recording, notes), "", *files]), (*failed, *wrong))
+    return DemoReport(f"{text(recording)}\n\nbag      {bag}", (*failed, *wrong))
 
 
 def reaction_report(bag: Path) -> str:
@@ -77,14 +66,8 @@ def reaction_report(bag: Path) -> str:
     return "\n".join([*_reactions(summary), *([""] if hard else []), *hard])
 
 
-def text(recording: AnalysedRun, notes: Sequence[str] = ()) -> str:
-    """The report without the names of files.
-
-    Parameters
-    ----------
-    recording : of the bag.
-    notes : to be added to those of its summary.
-    """
+def text(recording: AnalysedRun) -> str:
+    """The report without the name of the file."""
     summary = recording.summary
     forces = [one for held in recording.held for one in press_findings(held, Theory())]
     short = [one.hold.name for one in recording.held if one.hold.is_short]
@@ -109,7 +92,7 @@ def text(recording: AnalysedRun, notes: Sequence[str] = ()) -> str:
         lines += _wrapped(f"  {sentence}", "    ")
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
-    lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
+    lines += [line for note in summary.notes for line in _wrapped(f"Note     {note}")]
     return "\n".join(lines)
 
 

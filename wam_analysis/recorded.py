@@ -9,7 +9,7 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects
 from wam_description.parameters import build_part
-from wam_description.world import NO_SPRINGS, Obstacles, Springs
+from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_sim.recorded_parameters import RecordedParameters
 
 T = TypeVar("T")
@@ -19,7 +19,7 @@ class RecordedArm(NamedTuple):
     """The arm and its surroundings; `note` names where they come from if not from the bag."""
 
     arm: Arm
-    obstacles: Obstacles
+    world: World
     note: str
 
 
@@ -81,13 +81,13 @@ def recorded_arm(recorded: RecordedParameters) -> RecordedArm:
     """The arm of the bag, or that of the packaged configuration 'wam' if the bag has none."""
     try:
         arm = recorded.part("driver", Arm, "arm.")
-        return RecordedArm(arm, recorded.part("driver", Obstacles, "world.obstacles."), "")
+        return RecordedArm(arm, recorded.part("driver", World, "world."), "")
     except BagError as error:
         reason = _reason(recorded, error)
     configuration = Configuration.load(packaged("wam"))
-    obstacles = build_part(Obstacles, configuration.sections["driver"], "world.obstacles.")
+    world = build_part(World, configuration.sections["driver"], "world.")
     note = f"the arm in the picture is that of the packaged configuration 'wam': {reason}"
-    return RecordedArm(configuration.shared.arm, obstacles, note)
+    return RecordedArm(configuration.shared.arm, world, note)
 
 
 def _reason(recorded: RecordedParameters, error: BagError) -> str:

@@ -281,29 +281,17 @@ class ReportLayout:
     # pictures
     points: int = 6000  # points of a line
     digits: int = 6  # of a number
-    narrow_page: int = 640  # px; up to this width the narrow pictures are shown
-    wide: float = 9.6  # inches, of a picture
-    narrow: float = 4.1  # inches, of a picture for a small page
-    still_height: float = 2.7  # inches, of a picture
-    points_per_inch: float = 310.0  # of a line
+    arm: tuple[float, float] = (5.6, 4.2)  # inches, of the picture of the arm
     dots: int = 1500  # of a picture of dots
     bars: int = 60  # of a histogram
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
     grey: str = "#9aa3ad"  # of raw values behind a line
-    png_dpi: int = 130  # of a picture on a page
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
-    dpi: int = 200  # of the demonstration's picture
-    size: tuple[float, float] = (9.0, 4.0)  # inches
-    labels: float = 0.08  # m, for the labels beyond the tips of the arrows
-    name_lines: int = 3  # of the name of a step: more would cover the forces
     still: float = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
     flat: float = 1e-4  # of the value; a smaller range of a plot is not blown up
     pedestal: float = 0.07  # m, radius of the drawn base, which is not in the parameters
     floor: float = -1.0  # m, height of the foot of the drawn base
     metres_per_newton: float = 0.015  # length of an arrow
-    render_timeout: float = 30.0  # s, of the process that renders
-    pixels_per_metre: int = 1500  # of the rendered arm
-    floor_gap: float = 0.002  # m below the obstacles, so that surfaces do not flicker
 
 
 SHAFT = ShaftThresholds()

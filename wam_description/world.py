@@ -1,6 +1,7 @@
 """What the arm can touch: obstacles, springs, pushers, and what it can move."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from wam_description.movable import NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions
 from wam_description.parameters import lengths, parameter, require
@@ -149,6 +150,15 @@ NO_FOLDING = Folding(0.0, 0.0, 0.0, 0.0)
 NO_PUSHERS = Pushers((), (), (), (), (), (), (), (), (), (), (), (), (), (), (), ())
 
 
+class Solid(NamedTuple):
+    """An object: its name, shape, size as the parameters have it, and centre in its own frame, m."""
+
+    name: str
+    shape: str
+    size: tuple[float, ...]
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class World:
     """The surroundings of the arm."""
@@ -187,6 +197,17 @@ class World:
     @property
     def objects(self) -> tuple[str, ...]:
         """Names of the free bodies, doors and moving obstacles, in the order of `sim/objects`."""
-        bodies = [self.bodies.names[i] for i in self.bodies.present]
-        doors = [self.doors.names[i] for i in self.doors.present]
-        return (*bodies, *doors, *self.moving)
+        return tuple(solid.name for solid in self.solids)
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The free bodies, doors and moving obstacles, in the order of `sim/objects`."""
+        bodies, doors, obstacles = self.bodies, self.doors, self.obstacles
+        free = [Solid(bodies.names[i], bodies.shapes[i], bodies.sizes[3 * i : 3 * i + 3]) for i in bodies.present]
+        hung = [(doors.names[i], doors.sizes[3 * i : 3 * i + 3]) for i in doors.present]
+        moving = [(name, obstacles.names.index(name)) for name in self.moving]
+        return (
+            *free,
+            *(Solid(name, "box", size, (size[0], 0.0, 0.0)) for name, size in hung),
+            *(Solid(name, obstacles.shapes[i], obstacles.sizes[3 * i : 3 * i + 3]) for name, i in moving),
+        )

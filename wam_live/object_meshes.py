@@ -1,7 +1,7 @@
 """The objects of the world in the page: free bodies, doors and moving obstacles, where the simulator has them."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import viser
@@ -23,7 +23,7 @@ class ObjectMeshes:
     def __init__(self, server: viser.ViserServer, world: World) -> None:
         self._scene = server.scene
         self.frames = [self._scene.add_frame(f"/world/{name}", show_axes=False) for name in world.objects]
-        for name, shape, size, centre in _shapes(world):
+        for name, shape, size, centre in world.solids:
             self._add(name, shape, size, centre, BLOCK_COLOUR if name in world.moving else OBJECT_COLOUR)
 
     def show(self, states: Sequence[ObjectState]) -> None:
@@ -56,16 +56,3 @@ def at_rest(world: World) -> Obstacles:
         width = len(values) // max(len(obstacles.names), 1)
         picked[field.name] = tuple(value for i in kept for value in values[width * i : width * (i + 1)])
     return Obstacles(**picked)
-
-
-def _shapes(world: World) -> Iterator[tuple[str, str, tuple[float, ...], tuple[float, float, float]]]:
-    """Name, shape, size and centre in its own frame of each object, in the order of `World.objects`."""
-    bodies, doors, obstacles = world.bodies, world.doors, world.obstacles
-    for i in bodies.present:
-        yield bodies.names[i], bodies.shapes[i], bodies.sizes[3 * i : 3 * i + 3], (0.0, 0.0, 0.0)
-    for i in doors.present:
-        size = doors.sizes[3 * i : 3 * i + 3]
-        yield doors.names[i], "box", size, (size[0], 0.0, 0.0)
-    for name in world.moving:
-        i = obstacles.names.index(name)
-        yield name, obstacles.shapes[i], obstacles.sizes[3 * i : 3 * i + 3], (0.0, 0.0, 0.0)

@@ -13,10 +13,9 @@ from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.held_messages import by_names
 from wam_analysis.recorded import recorded_arm
-from wam_bag.bag import BagError, TableColumns
+from wam_bag.bag import TableColumns
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
-from wam_description.world import NO_SPRINGS, World
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import Controls
@@ -43,10 +42,6 @@ class BagSource:
 
     def __init__(self, recording: AnalysedRun) -> None:
         self.recorded = recorded_arm(recording.run.parameters)
-        try:
-            self.world = recording.run.parameters.part("driver", World, "world.")
-        except BagError:  # a bag without parameters
-            self.world = World(self.recorded.obstacles, NO_SPRINGS)
         self._stamps, self._angles = self._motion(recording)
         self._traces = recording.summary.traces
         self._covers = self.recorded.arm.covers.names
@@ -141,8 +136,8 @@ def play(
     source = BagSource(recording)
     server = serve(port)
     try:
-        scene = Scene(server, source.recorded.arm, at_rest(source.world), draggable=False)
-        objects = ObjectMeshes(server, source.world)
+        scene = Scene(server, source.recorded.arm, at_rest(source.recorded.world), draggable=False)
+        objects = ObjectMeshes(server, source.recorded.world)
         length = (source.end - source.begin) / 1e9
         name_page(server, recording.bag.path.name)
         place, then = min(max(at or 0.0, 0.0), length), time.monotonic()

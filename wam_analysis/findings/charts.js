@@ -49,7 +49,6 @@
       drawn.push(draw(all[Number(figure.dataset.chart)], figure));
     }
   }
-  document.documentElement.classList.add("live");
   drawAll();
   dark.addEventListener("change", drawAll);
   let waiting = 0;

@@ -1,4 +1,4 @@
-"""Charts of an analysis: what is drawn, as numbers, for the page's uPlot and for its still pictures."""
+"""Charts of an analysis: what is drawn, as numbers, for the page's uPlot."""
 
 import json
 import math
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, TRUE
+from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, MEASURED, SHAFTS, TRUE
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.signals import commanded, envelope, forces_over_time, moving, spectrum
 from wam_analysis.measures.loop_timing import latency
@@ -18,7 +18,7 @@ from wam_bag.bag import JointColumns
 
 Numbers = NDArray[np.float64]
 
-FORCES = {"commanded": COMMANDED, "measured": MEASURED, "true": TRUE, "estimated": ESTIMATED}
+FORCES = {**COLOURS, "at least": LIKELY}
 TIME, FORCE, FIRST, SIGNALS = "time [s]", "force [N]", "happened", "signals"
 
 
@@ -61,7 +61,7 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     over_time = list(_over_time(analysis))
     for i, chart in enumerate(over_time):
         yield chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS)
-    yield from map(_thinned, _holds(analysis))
+    yield from map(_thinned, (*_holds(analysis), *_positions(analysis)))
     for name, columns in moving(analysis.recording).items():
         if isinstance(columns, JointColumns):
             yield from _of_motion(name, columns)
@@ -107,6 +107,19 @@ def _holds(analysis: Analysis) -> Iterator[Chart]:
             if len(one.true):
                 lines.insert(0, ChartLine("true", TRUE, np.interp(one.time, one.time_true, one.true)))
             yield Chart("force", f"{one.hold.name}.", TIME, FORCE, one.time, tuple(lines))
+
+
+def _positions(analysis: Analysis) -> Iterator[Chart]:
+    """Where the arm was touched."""
+    traces = analysis.recording.summary.traces
+    signals = {"true": traces.true, "estimated": traces.estimated}
+    lines = [
+        ChartLine(name, COLOURS[name], np.where(signal.acts, 100.0 * signal.position, np.nan))
+        for name, signal in signals.items()
+    ]
+    if any(np.any(np.isfinite(line.values)) for line in lines):
+        time = (traces.stamp - traces.stamp[0]) / 1e9
+        yield Chart("contact", "Position of the contact along the link.", TIME, "position [cm]", time, tuple(lines))
 
 
 def _of_motion(name: str, columns: JointColumns) -> Iterator[Chart]:

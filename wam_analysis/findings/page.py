@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.plots import Plot, arm_plot, still
+from wam_analysis.findings.plots import arm_plot
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
-from wam_analysis.thresholds import LAYOUT
 from wam_bag.losses import PARAMETERS
 
 # no network access, whatever is in the bag; only the scripts of this page run
@@ -23,7 +22,6 @@ CSS = """
 @media (prefers-color-scheme: dark) {
   :root { --ink: #e4e7eb; --faint: #9aa5b1; --page: #14181d; --sheet: #1d232a; --line: #37414c; --head: #0d1116;
     --link: #7cc4f5; --bad: #ff8a7a; }
-  figure:not(.arm) img { filter: invert(0.88) hue-rotate(180deg); }
 }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--ink); font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; }
@@ -42,8 +40,6 @@ ul { margin: 0; padding-left: 20px; }
 figure { margin: 16px 0 8px; }
 figure img { display: block; width: 100%; height: auto; }
 figure.arm img { max-width: 640px; margin: 0 auto; }
-figure.chart, .live figure.still { display: none; }
-.live figure.chart { display: block; }
 .u-legend { color: var(--ink); font-size: 0.8rem; }
 figcaption { color: var(--faint); font-size: 0.875rem; }
 .wide { overflow-x: auto; }
@@ -71,9 +67,6 @@ dt { color: var(--faint); } dd { margin: 0; overflow-wrap: anywhere; }
   header, header p { color: #000; }
   nav { display: none; }
   section, figure, tr { break-inside: avoid; }
-  figure img { filter: none !important; }
-  .live figure.chart { display: none; }
-  .live figure.still { display: block; }
   .wide { overflow: visible; }
 }
 """
@@ -92,9 +85,9 @@ def page(analysis: Analysis) -> str:
         HTML with its styles, scripts and pictures; it makes no request.
     """
     drawn = list(charts(analysis))
-    figures = [(chart.section, _figure(still(chart), "still") + _chart(i, chart)) for i, chart in enumerate(drawn)]
-    if (arm := arm_plot(analysis)) is not None:
-        figures.insert(0, (FIRST, _figure(arm, "arm")))
+    figures = [(chart.section, _chart(i, chart)) for i, chart in enumerate(drawn)]
+    if (arm := arm_plot(analysis.recording)) is not None:
+        figures.insert(0, (FIRST, _arm(*arm)))
     name = analysis.recording.bag.path.name
     last = Section(SIGNALS, "Signals", (), ())
     shown_last = any(section == SIGNALS for section, _ in figures)
@@ -140,15 +133,9 @@ def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def _figure(picture: Plot, kind: str) -> str:
-    wide, narrow = (
-        f"data:image/{picture.kind};base64,{base64.b64encode(data).decode()}" for data in (picture.wide, picture.narrow)
-    )
-    text = html.escape(picture.title)
-    image = f'<img alt="{text}" src="{wide}">'
-    if picture.wide != picture.narrow:
-        image = f'<picture><source media="(max-width: {LAYOUT.narrow_page}px)" srcset="{narrow}">{image}</picture>'
-    return f'<figure class="{kind}">{image}<figcaption>{text}</figcaption></figure>'
+def _arm(title: str, picture: bytes) -> str:
+    text, source = html.escape(title), f"data:image/svg+xml;base64,{base64.b64encode(picture).decode()}"
+    return f'<figure class="arm"><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
 
 
 def _chart(number: int, chart: Chart) -> str:

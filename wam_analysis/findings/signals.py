@@ -27,6 +27,9 @@ def forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Numbers
     }
     if not found or list(found) == ["commanded"]:
         return None  # nothing to compare the command with
+    if np.any(bound := traces.estimated.is_lower_bound):
+        found |= {"at least": np.where(bound, found["estimated"], np.nan)}
+        found["estimated"] = np.where(bound, np.nan, found["estimated"])
     rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
     time = (traces.stamp - traces.stamp[0])[rising] / 1e9
     return time, {name: value[rising] for name, value in found.items()}

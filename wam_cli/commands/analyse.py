@@ -8,7 +8,7 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.options import HTML, JSON, PICTURE, exit_code_of, require_option, take_arm, take_topic_map, topic_map_of
+from wam_cli.options import HTML, JSON, exit_code_of, take_arm, take_topic_map, topic_map_of
 
 STANDARD_OUTPUT = Path("-")
 
@@ -31,9 +31,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="instead: the report of 'wam demo', whether each step of the scenario did what was commanded; exit code 1 "
         "if a result is NO or the run failed",
     )
-    parser.add_argument(
-        "--picture", type=PICTURE, help="of --steps: draw the arm, the forces and the contact positions"
-    )
     take_arm(parser)
     take_topic_map(parser)
 
@@ -46,7 +43,6 @@ def run(given: argparse.Namespace) -> int:
     """Analyse, print, write."""
     if given.steps:
         return _steps(given)
-    require_option(given, "--steps", "--picture")
     mapped = topic_map_of(given)
     begin = time.monotonic()
 
@@ -75,6 +71,6 @@ def _steps(given: argparse.Namespace) -> int:
 
     if given.html or given.json:
         raise ValueError("--steps prints text alone; leave out --html and --json")
-    made = report(given.bag, given.picture, given.namespace or "")
+    made = report(given.bag, given.namespace or "")
     print(made.text)
     return exit_code_of(made.unmet)

@@ -148,14 +148,14 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
         if not failed:
             raise
         print(f"no report{f' of task {task.name}' if task else ''}: {error}", file=sys.stderr)
-        return _report(bag, failed, None) if task else PrintedReport(False)  # how far it came, with a picture
+        return _report(bag, failed, None) if task else PrintedReport(False)  # how far it came
     return PrintedReport(True, unmet)
 
 
 def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
-    from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
+    from wam_analysis.demo_report import report  # not before the nodes
 
-    made = report(bag, bag / "demo.png")
+    made = report(bag)
     return made.text, made.unmet
 
 

@@ -16,7 +16,6 @@ from wam_studies.thesis.rows import Result
 AZIMUTH, ELEVATION = 150.0, -24.0  # degrees, of the camera
 MARGIN = 0.2  # m around what is seen: the objects by their centres
 WIDTH, HEIGHT = 9.2, 6.4  # inches
-MOST_PIXELS = 700  # of each picture of the arm, in width
 
 
 def save(task: Experiment, bag: Path, result: Result, file: Path) -> None:
@@ -40,20 +39,12 @@ def save(task: Experiment, bag: Path, result: Result, file: Path) -> None:
 
 
 def _draw_arm(axes: Axes, run: Recording, time: float) -> None:
-    """The arm and the objects at a time, s; without OpenGL the arm and the obstacles alone."""
+    """The arm and the objects at a time, s."""
     arm, world = run.shared.arm, world_of(run)
     joints = run.joints("sim/joint_states")
     q = joints.position[int(np.searchsorted(joints.time, time).clip(0, len(joints.time) - 1))].tolist()
     states = object_states(run, time)
     seen = [np.array((state.x, state.y, state.z)) for state in states]
-    view = arm_picture.side_view(arm, q, world.obstacles, 4.4 / 2.9, MARGIN, AZIMUTH, ELEVATION, seen)
-    axes.set_axis_off()
-    axes.set_xlim(-view.width / 2.0, view.width / 2.0)
-    axes.set_ylim(-view.height / 2.0, view.height / 2.0)
-    axes.set_aspect("equal")
-    pixels = arm_picture.render(arm, q, world.obstacles, view, moved=(world, states))
-    if pixels is None:
-        arm_picture.draw(axes, arm, q, world.obstacles, view)
-        return
-    step = max(1, pixels.shape[1] // MOST_PIXELS)
-    axes.imshow(pixels[::step, ::step], extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
+    shown = arm_picture.scene(arm, q, world, states)
+    view = arm_picture.side_view(shown, 4.4 / 2.9, MARGIN, AZIMUTH, ELEVATION, seen)
+    arm_picture.draw(axes, shown, view)
