@@ -286,7 +286,7 @@ def blocks() -> dict[str, Callable[[], str]]:
 
 def verdict(file: str) -> str:
     """The verdict of a demonstration, as `wam demo` prints it."""
-    _, head, rest = (ROOT / "docs" / file).read_text(encoding="utf-8").partition("Result,")
+    _, head, rest = (ROOT / "docs" / file).read_text(encoding="utf-8").partition("Result of the steps,")
     return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
 
 
@@ -410,7 +410,7 @@ def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
         )
         if done.returncode:
             raise SystemExit(f"the demonstration failed, see above; docs/{kept}.* are unchanged")
-        report = done.stdout[done.stdout.index("Demonstration of") :].partition("\nbag ")[0].rstrip()
+        report = done.stdout[done.stdout.index("Verdict\n") :].partition("\nProvenance")[0].rstrip()
         (ROOT / "docs" / f"{kept}.txt").write_text(report + "\n", encoding="utf-8")
         if is_moving:
             moving_picture.save(Path(folder) / "demo", ROOT / "docs" / f"{kept}.webp")

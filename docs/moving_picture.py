@@ -13,7 +13,7 @@ from PIL import Image
 
 from wam_analysis import arm_picture
 from wam_analysis.demo_summary import DemoSummary, summary_of
-from wam_analysis.demo_traces import TOPICS_READ, ForceSignal
+from wam_analysis.demo_traces import OF_STEPS, ForceSignal
 from wam_analysis.drawing import COLOURS, ESTIMATED, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_analysis.thresholds import LAYOUT
@@ -85,7 +85,7 @@ def contact_at(signal: ForceSignal, row: int) -> Contact:
 
 def save(bag: Path, file: Path) -> None:
     """Draw a recording into an animated WebP file, as good as its size allows."""
-    run = recorded_run(read(bag, TOPICS_READ, may_lack=True))
+    run = recorded_run(read(bag, OF_STEPS, may_lack=True))
     joints = run.joints("sim/joint_states")
     assert joints is not None, f"{bag} has no sim/joint_states"
     first, *others = frames(summary_of(run), recorded_arm(run.parameters), joints)

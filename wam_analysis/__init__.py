@@ -13,7 +13,6 @@ contact_list        the contacts one by one, each estimated one compared with th
 unplanned_contact   contacts while no force is commanded that are harder than allowed
 task_forces         forces that tasks command, and what was measured of each
 demo_summary        the demonstration in numbers
-demo_report         its report, as text
 drawing             colours and sizes that all pictures share
 arm_picture         the arm and its obstacles from the side
 table               tables of text, for a terminal and for Markdown

@@ -16,7 +16,7 @@ from wam_analysis.contact_list import (
     missed_contacts,
     right_links,
 )
-from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
+from wam_analysis.demo_traces import NAN, Mask, Numbers, Traces, traces_of
 from wam_analysis.holds import Hold, holds_of
 from wam_analysis.measures.runs import runs
 from wam_analysis.task_forces import TaskForce, task_forces, tasks_of
@@ -35,16 +35,15 @@ UNFINISHED = "not finished: the recording ends before the scenario does"
 class LoopReport(NamedTuple):
     """Timing of the driver's loop; NaN if it was not recorded, as latencies in lockstep.
 
-    The driver reports latencies every second: p50 and p99 are medians of these, `worst` is the highest p99.  In paced
-    lockstep it reports every second how fast simulated time passed: `factor` is that of the whole run, `behind` the
-    largest delay of a period, s, `slips` the periods that were too late to be made up for.
+    The driver reports latencies every second: p50 and p99 are medians of these.  In paced lockstep it reports every
+    second how fast simulated time passed: `factor` is that of the whole run, `behind` the largest delay of a period, s,
+    `slips` the periods that were too late to be made up for.
     """
 
     mode: str
     rate: float
     p50: float
     p99: float
-    worst: float
     missed: int
     periods: int
     factor: float = NAN
@@ -81,9 +80,8 @@ class DemoSummary(NamedTuple):
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
     free : time without contact, s.
     received, dropped : messages counted by the recorder, -1 if it wrote no counts.
-    gone : messages that were recorded and are no longer in the bag, as far as is known.
     lost : sentences about what the bag lacks, none if no loss is known.
-    notes : what is missing or not as it should be.
+    is_blind : whether contacts were under the brakes, where the motors, which alone are observed, sense none.
     """
 
     namespace: str
@@ -106,10 +104,9 @@ class DemoSummary(NamedTuple):
     loop: LoopReport
     received: int
     dropped: int
-    gone: int
     lost: tuple[str, ...]
     moment: Moment | None
-    notes: tuple[str, ...]
+    is_blind: bool
 
 
 def summarize(bag: Bag) -> DemoSummary:
@@ -133,23 +130,10 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     steps = run.steps if run.unfinished is None else (*run.steps, run.unfinished)
     tasks = task_forces(run)
     traces = traces_of(run, tasks)
-    notes = []
-    if run.others:
-        notes.append(run.others)
-    if not steps:
-        notes.append("no step of a scenario was recorded (status of node scenario)")
-    refused = {one.topic for one in run.refused}
-    missing = [name for name in RECORDED if name not in refused and not _length(run, name)]
-    if missing:
-        notes.append(f"not recorded: {', '.join(missing)}")
     reactions = tuple(_with_forces(one, traces) for one in run.reactions(_end(traces, steps)))
     holds = holds_of(run, steps, tasks, traces, reactions)
     certainty = certainty_of(run, traces)
     blind = _blind(run, traces)
-    if np.any(blind & traces.true.acts):
-        notes.append(
-            "contacts under the brakes are not compared: the motors, which alone are observed, sense none then"
-        )
     seen = traces._replace(true=traces.true.unknown(blind), push=traces.push.unknown(blind))
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
@@ -177,10 +161,9 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         loop=_loop(run),
         received=received,
         dropped=dropped,
-        gone=lost.gone,
         lost=(*lost.sentences(bag.first_ns), *(gap.sentence(traces.zero) for gap in gaps)),
         moment=_moment(run, traces, holds),
-        notes=(*notes, *(one.sentence for one in run.refused), *run.parameters.notes, *driver_faults(run, traces.zero)),
+        is_blind=bool(np.any(blind & traces.true.acts)),
     )
 
 
@@ -208,11 +191,6 @@ def _settling_times(run: RecordedRun) -> tuple[tuple[int, float], ...]:
     changes = [(since, values[key]) for since, values in run.live_values(FORCE_LOOP) if key in values]
     known = (int, float)
     return tuple((since, float(value) if isinstance(value, known) else NAN) for since, value in [(0, first), *changes])
-
-
-def _length(run: RecordedRun, topic: str) -> int:
-    columns = run.bag.topics.get(f"{run.namespace}/{topic}")
-    return 0 if columns is None else len(columns.log_time_ns)
 
 
 def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction:
@@ -253,14 +231,13 @@ def _loop(run: RecordedRun) -> LoopReport:
         factors = np.array([float(facts[REAL_TIME_FACTOR]) for facts in paced])
         behind = max(float(facts.get(BEHIND, NAN)) for facts in paced) / 1e3
         factor = 1.0 / float(np.mean(1.0 / np.maximum(factors, 1e-3)))  # each is of a second of the arm
-        return LoopReport(mode, NAN, NAN, NAN, NAN, -1, -1, factor, behind, int(paced[-1].get(SLIPS, -1)))
+        return LoopReport(mode, NAN, NAN, NAN, -1, -1, factor, behind, int(paced[-1].get(SLIPS, -1)))
     if not timed:
-        return LoopReport(mode, NAN, NAN, NAN, NAN, -1, -1)
+        return LoopReport(mode, NAN, NAN, NAN, -1, -1)
     p50, p99 = (np.array([float(facts.get(f"latency {p} [us]", NAN)) for facts in timed]) for p in ("p50", "p99"))
-    worst = float(np.nanmax(p99)) if not np.all(np.isnan(p99)) else NAN
     last = timed[-1]
     missed, periods = (int(last.get(key, -1)) for key in ("missed periods", "periods"))
-    return LoopReport(mode, float(last["rate [Hz]"]), median(p50), median(p99), worst, missed, periods)
+    return LoopReport(mode, float(last["rate [Hz]"]), median(p50), median(p99), missed, periods)
 
 
 def _counts(recording: dict[str, str]) -> tuple[int, int]:

@@ -27,7 +27,7 @@ RECORDED = (
     "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
     "sim/disturbance", "sim/joint_states",
 )  # fmt: skip
-TOPICS_READ = (
+OF_STEPS = (  # topics that show what became of the steps of a scenario
     *RECORDED, "joint_states", "external_joint_torques", "contact/hypotheses", "force_axis", "task_command",
     "task_axes", "status", "/diagnostics",
 )  # fmt: skip

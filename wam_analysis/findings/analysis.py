@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_analysis.contact_list import contacts_by_link
 from wam_analysis.demo_summary import driver_faults
-from wam_analysis.demo_traces import Traces
+from wam_analysis.demo_traces import OF_STEPS, Traces
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
@@ -18,7 +18,7 @@ from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.motion import friction_section, ripple_section
 from wam_analysis.findings.power import power_section
-from wam_analysis.findings.steps import steps_section
+from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
@@ -33,6 +33,7 @@ from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.thresholds import LAYOUT
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.contents import contents
+from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
 from wam_sim.recording import RecordedRun, recorded_run
@@ -40,13 +41,12 @@ from wam_sim.recording import RecordedRun, recorded_run
 OF_THE_START = "predicted for the parameters at the start, which were changed"
 Progress = Callable[[str], None]
 Maker = Callable[[AnalysedRun], Section | None]
+OfKinds = tuple[Maker, tuple[bool, ...]]  # and whether of another robot's recordings, of which kinds
 
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
-    "motor_states", "motor_current_command", "motor_velocity_command", "joint_states", "joint_sensors",
-    "gravity_effort", "force_command", "force_measured", "force_axis", "task_command", "task_axes", "contact/wrench",
-    "contact/point", "contact/hypotheses", "contact/tracked_friction", "sim/contact/wrench", "sim/contact/point",
-    "sim/disturbance", "sim/joint_states", "status", "/diagnostics",
+    *OF_STEPS, "motor_states", "motor_current_command", "motor_velocity_command", "joint_sensors", "gravity_effort",
+    "contact/tracked_friction",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",
@@ -77,6 +77,13 @@ class Analysis(NamedTuple):
     def has_failed(self) -> bool:
         """Whether the run that was recorded failed, or was cut off."""
         return bool(self.recording.failure)
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """A failure of the run, and those answers on its steps that are no."""
+        failed = [f"FAILED: {why}" for why in [self.recording.failure] if why]
+        wrong = [str(answer) for answer in verdict(self.recording) if answer.result is VerdictResult.NO]
+        return (*failed, *wrong)
 
     def __repr__(self) -> str:
         return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
@@ -115,6 +122,24 @@ def analyse(
     return analyse_bag(foreign_bag(path, given), progress, given=given)
 
 
+def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
+    """Whether the steps of a scenario did what was commanded, and what was measured of them.
+
+    Raises
+    ------
+    BagError
+        if the bag cannot be read, or holds no step.
+    """
+    bag = read(Path(path), OF_STEPS, may_lack=True)
+    found = analyse_bag(bag, lambda doing: None, namespace, sections=SECTIONS_OF_STEPS)
+    if not found.recording.summary.steps:
+        raise BagError(
+            f"{path} is not a recording of the demonstration: it has no step of a scenario; "
+            f"{command('wam analyse', path)} analyses any recording, {command('wam bag info', path)} lists its topics"
+        )
+    return found
+
+
 def _is_own(path: Path) -> bool:
     """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
     if path.suffix == ".csv" or needs_rosbags(path):
@@ -133,15 +158,26 @@ def _is_own(path: Path) -> bool:
     return any(spaces.count(space) > 1 for space in spaces)
 
 
-def analyse_bag(bag: Bag, progress: Progress, namespace: str = "", given: TopicMap | None = None) -> Analysis:
-    """Analyse a bag that has been read, see `analyse`; `given` is None for one of this stack."""
+def analyse_bag(
+    bag: Bag,
+    progress: Progress,
+    namespace: str = "",
+    given: TopicMap | None = None,
+    sections: "Sequence[OfKinds] | None" = None,
+) -> Analysis:
+    """Analyse a bag that has been read, see `analyse`; `given` is None for one of this stack.
+
+    Parameters
+    ----------
+    sections : which are made; None for all.
+    """
     recording = AnalysedRun(recorded_run(bag, namespace), given)
-    sections = []
-    for make, kinds in SECTIONS:
+    made = []
+    for make, kinds in SECTIONS if sections is None else sections:
         if recording.is_foreign in kinds and (section := make(recording)) is not None:
             progress(section.title)
-            sections.append(section)
-    return Analysis(recording, recording.duration, provenance(recording), (_verdict(recording, sections), *sections))
+            made.append(section)
+    return Analysis(recording, recording.duration, provenance(recording), (_verdict(recording, made), *made))
 
 
 def _verdict(recording: AnalysedRun, sections: Sequence[Section]) -> Section:
@@ -195,7 +231,7 @@ def happened_section(recording: AnalysedRun) -> Section:
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
-    lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
+    lacking = recording.lacking("joint_states", "force_command", "contact/wrench", "status")
     others = [f"{recording.run.others[0].upper()}{recording.run.others[1:]}."] if recording.run.others else []
     wrong = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
     wrong += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
@@ -269,11 +305,16 @@ def _count(number: int, name: str) -> str:
 
 
 OWN, FOREIGN = (False,), (True,)  # kinds of recordings
-SECTIONS: tuple[tuple[Maker, tuple[bool, ...]], ...] = (
+SECTIONS_OF_STEPS: tuple[OfKinds, ...] = (
     (happened_section, OWN),
-    (topics_section, FOREIGN),
     (steps_section, OWN),
     (partial(_of_the_start, force_section), OWN),
+    (contact_section, OWN),
+)
+SECTIONS: tuple[OfKinds, ...] = (
+    *SECTIONS_OF_STEPS[:1],
+    (topics_section, FOREIGN),
+    *SECTIONS_OF_STEPS[1:3],
     (step_section, FOREIGN),
     (partial(_of_the_start, cycle_section), OWN),
     (repetition_section, FOREIGN),

@@ -15,6 +15,7 @@ from wam_analysis.thresholds import TOUCH
 from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
+BLIND = "Contacts under the brakes are not compared: the motors, which alone are observed, sense none then."
 BEFORE = {
     CutBy.NOTHING: "",
     CutBy.RECORDING: "it began before the recording",
@@ -37,7 +38,10 @@ def contact_section(recording: AnalysedRun) -> Section:
     findings: list[Finding] = []
     wrong = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
     shows: list[str] = []
+    named = [f"{number} {one.step}" for number, one in enumerate(summary.contacts, 1) if one.step]
+    sentences += [f"In the steps: {', '.join(named)}."] if named else []
     sentences += contact_doubts(summary)
+    sentences += [BLIND] * summary.is_blind
     findings += contact_numbers(summary)
     sentences += wrong
     true, sensed = traces.true, traces.estimated

@@ -176,9 +176,8 @@ def _provenance(analysis: Analysis) -> str:
         f"<dt>{html.escape(name)}</dt><dd>{len(columns.log_time_ns)}</dd>"
         for name, columns in sorted(analysis.recording.bag.topics.items())
     )
-    notes = "".join(f"<li>{html.escape(note)}</li>" for note in analysis.recording.summary.notes)
     return (
-        f'<section id="provenance"><h2>Provenance</h2><dl>{rows}</dl><ul>{notes}</ul>'
+        f'<section id="provenance"><h2>Provenance</h2><dl>{rows}</dl>'
         f"<details><summary>Messages of each topic that was read</summary><dl>{topics}</dl></details></section>"
     )
 

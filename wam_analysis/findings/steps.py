@@ -51,7 +51,9 @@ def steps_section(recording: AnalysedRun) -> Section | None:
     """Whether the commands of a scenario were carried out; None without a scenario."""
     if not recording.summary.steps:
         return None
-    return Section("steps", "Steps of the scenario", tuple(f"{answer}." for answer in verdict(recording)), ())
+    return Section(
+        "steps", "Result of the steps, worst case in brackets", tuple(f"{answer}." for answer in verdict(recording)), ()
+    )
 
 
 def verdict(recording: AnalysedRun) -> tuple[VerdictAnswer, ...]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.demo_summary import LoopReport
 from wam_analysis.findings.analysed_run import STAMPED, AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Source
@@ -138,7 +139,7 @@ def provenance(recording: AnalysedRun) -> dict[str, str]:
     facts = {
         "bag": str(bag.path),
         "arm": recording.namespace or "/",
-        "mode": recording.mode,
+        "mode": recording.mode + _pace(summary.loop),
         "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
         "received": "no counts in the bag" if summary.received < 0 else str(summary.received),
@@ -150,6 +151,14 @@ def provenance(recording: AnalysedRun) -> dict[str, str]:
     }
     recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}
     return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
+
+
+def _pace(loop: LoopReport) -> str:
+    """How fast the time of the arm passed in paced lockstep, '' where that is not known."""
+    if math.isnan(loop.factor):
+        return ""
+    slower = f", {loop.slips} periods too late to be made up for" if loop.slips else ""
+    return f"; real-time factor {loop.factor:.2f}, at most {1e3 * loop.behind:.0f} ms behind{slower}"
 
 
 def _part_of(read: int, all_of_them: int) -> str:

@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from wam_analysis.findings.analysis import analyse
+from wam_analysis.findings.analysis import analyse, analyse_steps
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
 from wam_cli.options import HTML, JSON, exit_code_of, take_arm, take_topic_map, topic_map_of
@@ -66,11 +66,9 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _steps(given: argparse.Namespace) -> int:
-    """Print the report of the demonstration again; nothing is written into the directory of the bag."""
-    from wam_analysis.demo_report import report
-
+    """Print the report of the demonstration again."""
     if given.html or given.json:
         raise ValueError("--steps prints text alone; leave out --html and --json")
-    made = report(given.bag, given.namespace or "")
-    print(made.text)
-    return exit_code_of(made.unmet)
+    found = analyse_steps(given.bag, given.namespace or "")
+    print(text(found))
+    return exit_code_of(found.unmet)

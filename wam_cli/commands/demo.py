@@ -153,20 +153,22 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
 
 
 def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
-    from wam_analysis.demo_report import report  # not before the nodes
+    from wam_analysis.findings.analysis import analyse_steps  # not before the nodes
+    from wam_analysis.findings.text import text
 
-    made = report(bag)
-    return made.text, made.unmet
+    found = analyse_steps(bag)
+    return text(found), found.unmet
 
 
 def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
-    from wam_analysis.demo_report import reaction_report  # for the same reason
+    from wam_analysis.findings.analysis import analyse_steps  # for the same reason
     from wam_studies.tasks.pictures import save
     from wam_studies.thesis.evaluation import evaluate, text
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
-    stated = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
+    wrong = [f"  {one}" for section in analyse_steps(bag).sections for one in section.wrong]
+    stated = "\n".join([text(task, result), *["", "Wrong"][: 2 * bool(wrong)], *wrong])
     missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
 
