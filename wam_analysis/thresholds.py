@@ -283,7 +283,6 @@ class ReportLayout:
     digits: int = 6  # of a number
     arm: tuple[float, float] = (5.6, 4.2)  # inches, of the picture of the arm
     dots: int = 1500  # of a picture of dots
-    bars: int = 60  # of a histogram
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
     grey: str = "#9aa3ad"  # of raw values behind a line
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic

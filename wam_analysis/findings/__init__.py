@@ -18,7 +18,6 @@ power                  section about efficiency and backdrivability
 frequency              section about the velocity loops
 timing                 section about the loop, and provenance
 tabulated              tables of subjects and quantities
-signals                the signals that the pictures show
 charts, plots          the charts, as numbers, and the picture of the arm
 text, page             the analysis as text and JSON, and as HTML
 """

@@ -16,7 +16,7 @@ from wam_bag.losses import CUT
 from wam_sim.recording import RecordedRun, recorded_run
 
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
-MOVING = ("motor_states", "joint_sensors", "joint_states")  # where motion is seen, the best first
+MOVING = ("motor_states", "joint_sensors", "joint_states", "sim/joint_states")  # where motion is seen, the best first
 
 
 class AnalysedRun:

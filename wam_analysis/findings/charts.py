@@ -1,7 +1,6 @@
 """Charts of an analysis: what is drawn, as numbers, for the page's uPlot."""
 
 import json
-import math
 from collections.abc import Iterator
 from importlib import resources
 from typing import Any, NamedTuple
@@ -10,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, MEASURED, SHAFTS, TRUE
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.findings.signals import commanded, envelope, forces_over_time, moving, spectrum
-from wam_analysis.measures.loop_timing import latency
+from wam_analysis.foreign.cycles import held as held_command
+from wam_analysis.foreign.sources import Source, longest, pieces
+from wam_analysis.measures.lines import amplitudes
 from wam_analysis.thresholds import LAYOUT, STREAM
-from wam_bag.bag import JointColumns
 
 Numbers = NDArray[np.float64]
 
@@ -62,41 +62,59 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     for i, chart in enumerate(over_time):
         yield chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS)
     yield from map(_thinned, (*_holds(analysis), *_positions(analysis)))
-    for name, columns in moving(analysis.recording).items():
-        if isinstance(columns, JointColumns):
-            yield from _of_motion(name, columns)
+    for one in _shown(analysis.recording):
+        yield from _of_motion(one)
     yield from _friction(analysis)
     ripples = {name: found for name, found in analysis.recording.motion.ripple.items() if len(found.order)}
     for i, (name, found) in enumerate(ripples.items()):
         line = ChartLine(name, SHAFTS[i % len(SHAFTS)], 1e3 * found.amplitude)
         order = found.order.astype(np.float64)
         yield Chart("ripple", f"Torque ripple of {name}.", "cycles per turn", "amplitude [mN m]", order, (line,))
-    yield from _timing(analysis)
 
 
 def _over_time(analysis: Analysis) -> Iterator[Chart]:
     """Forces and motions, each with what was commanded."""
-    traces = forces_over_time(analysis.recording)
-    if traces is not None:
+    recording = analysis.recording
+    if (traces := _forces_over_time(recording)) is not None:
         time, forces = traces
         lines = [ChartLine(name, FORCES[name], value, name == "commanded") for name, value in forces.items()]
         yield _thinned(Chart(FIRST, "Size of the forces.", TIME, FORCE, time, tuple(lines), "time"))
-    for name, columns in moving(analysis.recording).items():
-        time = (columns.stamp_ns - columns.stamp_ns[0]) / 1e9
-        desired = commanded(analysis.recording, columns)
-        if isinstance(columns, JointColumns):
-            for i, joint in enumerate(columns.names):
-                lines = [ChartLine(joint, SHAFTS[i % len(SHAFTS)], columns.position[:, i]), *_dashed(joint, desired)]
-                title = f"Position of {joint} on {name}."
-                yield _thinned(Chart(SIGNALS, title, TIME, "position [rad]", time, tuple(lines), name))
-        else:
-            lines = [ChartLine(axis, SHAFTS[i], columns.force[:, i]) for i, axis in enumerate("xyz")]
-            lines += [line for axis in "xyz" for line in _dashed(axis, desired)]
-            yield _thinned(Chart(SIGNALS, f"Force on {name}.", TIME, FORCE, time, tuple(lines), name))
+    for one in _shown(recording):
+        quantities = [q for q in one.values if not q.startswith("torque")][: 1 if one.is_joint else 3]
+        command = recording.command_of(one)
+        lines = [ChartLine(q, SHAFTS[i % len(SHAFTS)], one.values[q]) for i, q in enumerate(quantities)]
+        if command is not None:
+            held = [(q, held_command(command, q, one.time)) for q in quantities if q in command.values]
+            lines += [ChartLine(f"{q} commanded", COMMANDED, value, True) for q, value in held]
+        up = f"{quantities[0] if one.is_joint else 'force'} [{one.units[quantities[0]]}]"
+        yield _thinned(Chart(SIGNALS, f"{one.label} over time.", TIME, up, one.time, tuple(lines), one.topic))
 
 
-def _dashed(name: str, desired: dict[str, Numbers]) -> list[ChartLine]:
-    return [ChartLine(f"{name} commanded", COMMANDED, desired[name], True)] if name in desired else []
+def _shown(recording: AnalysedRun) -> list[Source]:
+    """What was measured; of this stack the joints, else the motors."""
+    states = [one for one in recording.states if len(one.time) >= STREAM.shown]
+    motors = [] if recording.is_foreign else [one for one in states if one.topic.endswith("/motor_states")]
+    return motors if len(motors) == len(states) else [one for one in states if one not in motors]
+
+
+def _forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Numbers]] | None:
+    """Time, (k,), s, and size of each force that was recorded, (k,), N; None if there is none."""
+    traces = recording.summary.traces
+    signals = {"commanded": traces.commanded, "true": traces.true, "measured": traces.measured}
+    signals["estimated"] = traces.estimated
+    found = {
+        name: np.where(signal.is_known, signal.size, np.nan)
+        for name, signal in signals.items()
+        if len(traces.stamp) and np.any(signal.is_known) and np.any(signal.size[signal.is_known] > 0.0)
+    }
+    if not found or list(found) == ["commanded"]:
+        return None  # nothing to compare the command with
+    if np.any(bound := traces.estimated.is_lower_bound):
+        found |= {"at least": np.where(bound, found["estimated"], np.nan)}
+        found["estimated"] = np.where(bound, np.nan, found["estimated"])
+    rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
+    time = (traces.stamp - traces.stamp[0])[rising] / 1e9
+    return time, {name: value[rising] for name, value in found.items()}
 
 
 def _holds(analysis: Analysis) -> Iterator[Chart]:
@@ -122,19 +140,23 @@ def _positions(analysis: Analysis) -> Iterator[Chart]:
         yield Chart("contact", "Position of the contact along the link.", TIME, "position [cm]", time, tuple(lines))
 
 
-def _of_motion(name: str, columns: JointColumns) -> Iterator[Chart]:
-    """Spectrum, and velocity over position: a cycle is a closed curve."""
-    if len(columns.stamp_ns) >= STREAM.transformed:
-        frequency, amplitude = spectrum(columns)
-        lines = [ChartLine(n, SHAFTS[i % len(SHAFTS)], amplitude[:, i]) for i, n in enumerate(columns.names)]
-        title = f"Spectrum of the positions on {name}: amplitude of each frequency, over the whole recording."
-        yield Chart("stability", title, "frequency [Hz]", "amplitude [rad]", frequency, tuple(lines), logarithmic=True)
-    for i, joint in enumerate(columns.names if columns.velocity.shape == columns.position.shape else ()):
-        rows = np.unique(np.linspace(0, len(columns.stamp_ns) - 1, LAYOUT.dots).astype(np.int64))
-        rows = rows[np.argsort(columns.position[rows, i], kind="stable")]
-        line = ChartLine(joint, SHAFTS[i % len(SHAFTS)], columns.velocity[rows, i], dots=True)
-        title = f"Velocity over position of {joint} on {name}; a cycle is a closed curve."
-        yield Chart("stick_slip", title, "position [rad]", "velocity [rad/s]", columns.position[rows, i], (line,))
+def _of_motion(one: Source) -> Iterator[Chart]:
+    """Spectrum of the longest stretch, and velocity over position: a cycle is a closed curve."""
+    piece = longest(pieces(one, "position"))
+    if piece is None:
+        return
+    value, unit = piece.values["position"], one.units["position"]
+    frequency, amplitude = (each[1:] for each in amplitudes(piece.time, value))
+    if len(value) >= STREAM.transformed:
+        line = ChartLine(one.label, SHAFTS[0], np.maximum(amplitude, LAYOUT.amplitude))
+        title = f"Spectrum of {one.label}: amplitude of each frequency."
+        up = f"amplitude [{unit}]"
+        yield Chart("stability", title, "frequency [Hz]", up, frequency, (line,), logarithmic=True)
+    rows = np.unique(np.linspace(0, len(value) - 1, LAYOUT.dots).astype(np.int64))
+    rows = rows[np.argsort(value[rows], kind="stable")]
+    line = ChartLine(one.label, SHAFTS[0], piece.values["velocity"][rows], dots=True)
+    title = f"Velocity over position of {one.label}; a cycle is a closed curve."
+    yield Chart("stick_slip", title, f"position [{unit}]", f"velocity [{unit}/s]", value[rows], (line,))
 
 
 def _friction(analysis: Analysis) -> Iterator[Chart]:
@@ -160,32 +182,31 @@ def _friction(analysis: Analysis) -> Iterator[Chart]:
         yield Chart("friction", title, "velocity [rad/s]", "torque [mN m]", speed, tuple(lines))
 
 
-def _timing(analysis: Analysis) -> Iterator[Chart]:
-    """Reception intervals and latency of a recording in realtime."""
-    recording = analysis.recording
-    states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
-    if recording.mode != "realtime" or states is None or len(states.stamp_ns) < STREAM.shown:
-        return
-    intervals = np.diff(np.sort(states.log_time_ns)) / 1e6
-    last = max(float(np.percentile(intervals, 99.9)), 1e-3)
-    counts, edges = np.histogram(np.clip(intervals, 0.0, last), LAYOUT.bars, (0.0, last))
-    title = "Time between two motor_states at the recorder."
-    if answers is not None:
-        found = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
-        if found.answered:
-            title += f" Latency to the current command: {1e3 * found.p50:.2f} ms in the median."
-    number = np.where(counts > 0, counts, math.nan)
-    line = ChartLine("messages", TRUE, number, dots=True)
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    yield Chart("timing", title, "interval [ms]", "messages", middles, (line,), logarithmic=True)
-
-
 def _thinned(chart: Chart) -> Chart:
     """The chart with at most `points` points, which looks the same."""
     if len(chart.x) <= LAYOUT.points:
         return chart
-    lines = [one._replace(values=envelope(chart.x, one.values, LAYOUT.points)[1]) for one in chart.series]
-    return chart._replace(x=envelope(chart.x, chart.x, LAYOUT.points)[0], series=tuple(lines))
+    lines = [one._replace(values=_envelope(chart.x, one.values, LAYOUT.points)[1]) for one in chart.series]
+    return chart._replace(x=_envelope(chart.x, chart.x, LAYOUT.points)[0], series=tuple(lines))
+
+
+def _envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Numbers]:
+    """A line with at most so many points that looks the same: minimum and maximum of each interval.
+
+    Parameters
+    ----------
+    time, value : (n,).
+    most : points, an even number.
+    """
+    n = len(time)
+    if n <= most:
+        return time, value
+    edges = np.linspace(0, n, most // 2 + 1).astype(np.int64)
+    filled = np.where(np.isfinite(value), value, np.nan)
+    low = np.fmin.reduceat(filled, edges[:-1])
+    high = np.fmax.reduceat(filled, edges[:-1])
+    at = time[(edges[:-1] + edges[1:] - 1) // 2]
+    return np.repeat(at, 2), np.column_stack([low, high]).ravel()
 
 
 def data(found: list[Chart]) -> str:

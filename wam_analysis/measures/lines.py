@@ -34,15 +34,12 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
     n = len(value)
     if n < CYCLE.window_samples or not np.ptp(value) > 0.0:
         return []
-    steps = np.linspace(-1.0, 1.0, n)
-    flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
-    amplitude = np.abs(np.fft.rfft(flat * window)) / (0.5 * float(window.sum()))
+    frequencies, amplitude = amplitudes(time, value)
+    flat = _windowed(value)
     power = amplitude**2
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     found: list[SpectralLine] = []
-    width = float(time[-1] - time[0]) * n / (n - 1)
     for k in peaks[np.argsort(-power[peaks])].tolist():
         if (
             k < CYCLE.first_line
@@ -54,10 +51,27 @@ def spectral_lines(time: Numbers, value: Numbers, most: int) -> list[SpectralLin
             continue
         a, b, c = (math.log(max(float(amplitude[k + i]), 1e-300)) for i in (-1, 0, 1))
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
-        frequency = (k + shift) / width
+        frequency = (k + shift) * float(frequencies[1])
         turns = np.exp(-2j * np.pi * frequency * (time - time[0]))
-        found.append(SpectralLine(frequency, float(2.0 * np.abs(np.sum(flat * window * turns)) / window.sum())))
+        found.append(SpectralLine(frequency, float(4.0 * np.abs(np.sum(flat * turns)) / n)))
     return found
+
+
+def amplitudes(time: Numbers, value: Numbers) -> tuple[Numbers, Numbers]:
+    """Frequencies, (f,), Hz, from 0 on, and the amplitude of a signal at each, of a Hann window; arguments as above."""
+    n = len(value)
+    frequency = np.arange(n // 2 + 1) * (n - 1) / (n * float(time[-1] - time[0]))
+    amplitude: Numbers = 4.0 * np.abs(np.fft.rfft(_windowed(value))) / n
+    return frequency, amplitude
+
+
+def _windowed(value: Numbers) -> Numbers:
+    """A signal less its line, in a Hann window, whose mean is a half."""
+    n = len(value)
+    steps = np.linspace(-1.0, 1.0, n)
+    flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
+    windowed: Numbers = flat * (0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n))
+    return windowed
 
 
 def _noise(power: Numbers, k: int) -> float:
