@@ -105,14 +105,29 @@ class ListedContact(NamedTuple):
         return found.force - self.true_force if is_known else NAN
 
 
-class MissedContact(NamedTuple):
-    """A true contact during most of which none was estimated: step, begin, end and link as above; median force, N."""
+class TrueContact(NamedTuple):
+    """A true contact, by link and step.
+
+    Attributes
+    ----------
+    step, begin, end : as of an estimated one.
+    link, force : that was touched, and the median force, N.
+    right : part of its time in which its link was estimated; NaN if not known.
+    is_missed : whether none was estimated during most of it.
+    """
 
     step: str
     begin: float
     end: float
     link: str
     force: float
+    right: float
+    is_missed: bool
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it is more than a bounce."""
+        return round(1e9 * (self.end - self.begin)) >= TOUCH.bounce
 
     @property
     def sentence(self) -> str:
@@ -177,29 +192,24 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
             yield row, float(traces.stamp[row] - traces.stamp[begin]) / 1e9
 
 
-def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[MissedContact, ...]:
-    """The true contacts, by link and step, during most of which none was estimated, as far as both were recorded."""
-    true, estimated = traces.true, traces.estimated
-    found = []
-    bounds = [step.begin for step in steps]
-    for begin, end in cut_at(traces.stamp, contacts_by_link(traces.stamp, true), bounds):
-        is_missed = float(np.mean(estimated.acts[begin:end])) < TOUCH.lasting
-        if np.all(estimated.is_known[begin:end]) and is_missed:
-            acting = begin + np.flatnonzero(true.acts[begin:end])
-            force = median(true.size[acting])
-            found.append(MissedContact(*time_of(traces, steps, begin, end), most(true.frame[acting]), force))
-    return tuple(found)
-
-
-def right_links(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[float, ...]:
-    """Part of the time of each true contact, by link and step, in which its link was estimated; NaN if not known."""
+def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[TrueContact, ...]:
+    """The true contacts, by link and step, and what was estimated of each, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
     for begin, end in cut_at(traces.stamp, contacts_by_link(traces.stamp, true), [step.begin for step in steps]):
-        rows = begin + np.flatnonzero(true.acts[begin:end] & estimated.is_known[begin:end])
-        if traces.stamp[end - 1] - traces.stamp[begin] >= TOUCH.bounce:
-            same = estimated.acts[rows] & (estimated.frame[rows] == true.frame[rows])
-            found.append(float(np.mean(same)) if len(rows) else NAN)
+        acting = begin + np.flatnonzero(true.acts[begin:end])
+        known = acting[estimated.is_known[acting]]
+        same = estimated.acts[known] & (estimated.frame[known] == true.frame[known])
+        is_known = bool(np.all(estimated.is_known[begin:end]))
+        found.append(
+            TrueContact(
+                *time_of(traces, steps, begin, end),
+                most(true.frame[acting]),
+                median(true.size[acting]),
+                float(np.mean(same)) if len(known) else NAN,
+                is_known and float(np.mean(estimated.acts[begin:end])) < TOUCH.lasting,
+            )
+        )
     return tuple(found)
 
 

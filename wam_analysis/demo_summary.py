@@ -8,13 +8,12 @@ import numpy as np
 from wam_analysis.command_gaps import command_gaps
 from wam_analysis.contact_list import (
     ListedContact,
-    MissedContact,
+    TrueContact,
     certainty_of,
     contact_rows,
     listed_contacts,
     median,
-    missed_contacts,
-    right_links,
+    true_contacts,
 )
 from wam_analysis.demo_traces import NAN, Mask, Numbers, Traces, traces_of
 from wam_analysis.holds import Hold, holds_of
@@ -72,8 +71,7 @@ class DemoSummary(NamedTuple):
     settling_times : of the force loop, s, and since when it had each, ns; NaN where it was not recorded.
     holds : the constant forces that were commanded.
     contacts : all that were estimated.
-    missed : true contacts that were not.
-    right_links : part of the time of each true contact in which its link was estimated.
+    touched : the true contacts, estimated or not.
     unplanned : contacts without a command of a force, harder than allowed.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
@@ -94,8 +92,7 @@ class DemoSummary(NamedTuple):
     settling_times: tuple[tuple[int, float], ...]
     holds: tuple[Hold, ...]
     contacts: tuple[ListedContact, ...]
-    missed: tuple[MissedContact, ...]
-    right_links: tuple[float, ...]
+    touched: tuple[TrueContact, ...]
     unplanned: UnplannedContacts
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
@@ -107,6 +104,11 @@ class DemoSummary(NamedTuple):
     lost: tuple[str, ...]
     moment: Moment | None
     is_blind: bool
+
+    @property
+    def missed(self) -> tuple[TrueContact, ...]:
+        """True contacts that were not estimated."""
+        return tuple(one for one in self.touched if one.is_missed)
 
 
 def summarize(bag: Bag) -> DemoSummary:
@@ -151,8 +153,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         settling_times=_settling_times(run),
         holds=holds,
         contacts=listed_contacts(traces, certainty, steps),
-        missed=missed_contacts(seen, steps),
-        right_links=right_links(seen, steps),
+        touched=true_contacts(seen, steps),
         unplanned=unplanned_contacts(run, traces, steps, gaps),
         reactions=reactions,
         false_contact=int(np.sum(false)) * traces.period,

@@ -219,11 +219,8 @@ class IdentificationThresholds:
     misfit: float = 0.15  # rms of the recorded torques beyond those of the configured arm, per torque
     scaled: float = 1.4  # torques per torque of the configured arm, from which their unit is in doubt
     better: float = 0.5  # of that, what a mistake leaves that explains it
-    # combinations that gravity depends on
-    poses: int = 100  # random ones, in which the columns are compared
+    poses: int = 100  # random ones, in which the columns of parameters are compared
     seed: int = 1  # of these poses
-    dependent: float = 1e-8  # of the largest column
-    shown: float = 1e-6  # factor of a parameter in a combination, up to which it is left out
 
 
 @dataclass(frozen=True, slots=True)

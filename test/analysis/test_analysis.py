@@ -21,7 +21,7 @@ from wam_analysis.findings.charts import charts
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
-from wam_analysis.findings.prediction import largest_force, node_at, predict
+from wam_analysis.findings.prediction import largest_force, node_at
 from wam_analysis.findings.tabulated import MARK, tabulated
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
@@ -330,15 +330,10 @@ def test_the_node_of_a_press_has_the_stiffness_and_friction_of_statics(moving: R
     assert float(move @ node.joint_per_metre) == pytest.approx(1.0, rel=1e-4)
     lost = np.abs(node.joint_per_metre) @ np.array(arm.joints.dynamic_friction)
     assert node.dynamic_friction == pytest.approx(float(lost), rel=1e-6)
-    plain, with_g_p = (predict(node, 1.5e-2, proportional, 0.005, 1) for proportional in (0.0, 1e-3))
-    assert plain.routh_gain < plain.sampled_gain
-    assert with_g_p.gamma == pytest.approx(1.5e-2 / with_g_p.routh_gain)
-    assert with_g_p.routh_gain == pytest.approx(plain.routh_gain + node.damping / node.inertia * 1e-3)
 
 
 @pytest.mark.slow
-def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_source(moving: Recorded) -> None:
-    """A gain with which every press settles though an ideal velocity source would be in domain III."""
+def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
     recorded_set = prediction_parameters(recorded_parameters(moving.bag, "/wam"))
     assert recorded_set.force_loop is not None
     assert recorded_set.arm is not None
@@ -347,7 +342,6 @@ def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_
     q, position, direction = [0.0, -1.8, 0.0, 1.45], 0.28, np.array([0.0, -1.0, 0.0])
     node = node_at(recorded_set, recorded_set.arm, q, "outer_link", position, direction)
     assert node is not None
-    assert predict(node, 0.12, 0.0, 0.005, 1).regime == "unstable for every step (domain III)"
     for gain, words in ((0.015, "domain I, linearly stable "), (2.0, "NOT stable")):
         own = replace(
             recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_position=position

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin, Writer
 from sample_messages import STORE, joint_state, wrench
 
-from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.contradictions import Mistake, contradictions
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import evenly, motion, recorded_motion
@@ -162,16 +161,6 @@ def test_what_the_motion_does_not_show_stays_as_it_was_and_is_reported_so(
     assert next(line for line in text.splitlines() if line.startswith("links.mass.link1 ")).endswith(" no")
     line = next(line for line in text.splitlines() if line.startswith("motors.coulomb_positive.motor2 "))
     assert line.endswith("yes")
-
-
-def test_gravity_depends_on_as_many_combinations_as_its_torque_has_ranks() -> None:
-    found = gravity_base_set(WAM)
-    random = np.random.Generator(np.random.PCG64(2))
-    rest = np.zeros(4)
-    body = RigidBody(WAM)
-    rows = np.vstack([body.inverse_dynamics_regressor(random.uniform(-2, 2, 4), rest, rest) for _ in range(40)])
-    assert len(found) == np.linalg.matrix_rank(rows, 1e-9)
-    assert any("moment_z.link3 " in text and "+ 0.5588 mass.link4" in text for text in found)
 
 
 def overlaid(found: Identification) -> Configuration:

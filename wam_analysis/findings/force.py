@@ -225,7 +225,8 @@ def cycle_section(recording: AnalysedRun) -> Section:
         sentences.append(f"Not controlled, so without a stability: {', '.join(refused)}.")
     for one in held:
         theory = recording.theories[one.hold.name]
-        sentences += [sentence for sentence in _cycle_sentences(one, theory) if sentence not in sentences]
+        found = [_fate(one)[0], *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
+        sentences += [sentence for sentence in found if sentence not in sentences]
         verdict += filter(None, [_fate(one)[1]])
         findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory, seen)]
     if not held and not refused:
@@ -266,31 +267,6 @@ def _fate(one: HeldForce) -> tuple[str, str]:
     return f"{text}.", f"{text}." if is_bad else ""
 
 
-def _cycle_sentences(one: HeldForce, theory: Theory) -> list[str]:
-    predicted = theory.predicted
-    sentences = [_fate(one)[0]]
-    if theory.guarded is not None:
-        sentences.append(guard_sentence(theory.guarded))
-    if predicted is not None and math.isfinite(predicted.gamma):
-        text = (
-            f"Chapter 5, for an ideal velocity source: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: "
-            f"{predicted.regime}"
-        )
-        if math.isfinite(predicted.period):
-            text += (
-                f"; a stiction cycle would have {shown(predicted.force_peak_to_peak, 'N')} and "
-                f"{shown(predicted.period, 's')}"
-            )
-            if math.isfinite(predicted.driven_period):
-                size, period = shown(predicted.driven_peak_to_peak, "N"), shown(predicted.driven_period, "s")
-                text += f" ({size} and {period} with the compliance of the velocity loops)"
-            text += "" if predicted.is_certain else " if the inertia were smaller, (5.11)"
-            if predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9:
-                text += ", which is too long for this recording"
-        sentences.append(text + ".")
-    return sentences
-
-
 def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
     name, cycle = one.hold.name, one.cycle
     seen = cycle.confidence >= CYCLE.sure
@@ -300,9 +276,9 @@ def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding
         if math.isfinite(predicted.period):
             force, period = predicted.force_peak_to_peak, predicted.period
         soft_force, soft_period = predicted.driven_peak_to_peak, predicted.driven_period
-        note = "(5.8), (5.9) corrected" + (
-            "" if predicted.is_certain else "; (5.11) is not small, so they are approximate"
-        )
+        note = "(5.8), (5.9) corrected" + "; (5.11) is not small, so they are approximate" * (not predicted.is_certain)
+        is_long = predicted.period * CYCLE.cycles > CYCLE.late_part * (one.hold.end - one.hold.begin) / 1e9
+        note += "; too long for this recording" * is_long
     soft = f"with the velocity loops in series, {shown(soft_force, 'N')}; " if math.isfinite(soft_force) else ""
     slow = f"with the velocity loops in series, {shown(soft_period, 's')}" if math.isfinite(soft_period) else ""
     size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
@@ -322,34 +298,15 @@ def _theory_findings(name: str, theory: Theory, seen: set[str]) -> list[Finding]
     """Predictions for the loop itself, once if several forces have the same."""
     predicted = theory.predicted
     margin = theory.guarded.assessment.scale if theory.guarded is not None else math.nan
-    key = f"{shown(predicted.gamma) if predicted is not None else ''} {shown(margin)}"
+    actuator = math.nan if predicted is None else 1e3 * predicted.actuator_peak_to_peak
+    key = f"{shown(actuator)} {shown(margin)}"
     if key in seen:
         return []
     seen.add(key)
-    found = _margin_findings(name, theory.guarded)
-    if predicted is None:
-        return found
-    actuator = 1e3 * predicted.actuator_peak_to_peak
-    moved = 1e3 * theory.moved
-    ideal = "for an ideal velocity source, without friction"
+    label = f"{name}: actuator cycle at the contact, peak to peak"
     return [
-        *found,
-        Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", moved, actuator, "(5.20)"),
-        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
-        Finding(
-            f"{name}: largest stable gain, ideal velocity source, continuous",
-            "m/s/N",
-            math.nan,
-            predicted.routh_gain,
-            f"(5.15), {ideal}",
-        ),
-        Finding(
-            f"{name}: largest stable gain, ideal velocity source, sampled",
-            "m/s/N",
-            math.nan,
-            predicted.sampled_gain,
-            f"no friction, {ideal}",
-        ),
+        *_margin_findings(name, theory.guarded),
+        *([] if predicted is None else [Finding(label, "mm", 1e3 * theory.moved, actuator, "(5.20)")]),
     ]
 
 

@@ -266,12 +266,10 @@ def theory_of(
     largest = largest_force(arm, q, link, position, direction)
     if node is None:
         return Theory(largest=largest)
-    loop, timing = parameters.force_loop, parameters.timing
-    predicted = None
-    if loop is not None and timing is not None and loop.mode == "hybrid":
-        delay = math.ceil(timing.outer_delay / timing.outer_divisor)
+    loop, predicted = parameters.force_loop, None
+    if loop is not None and loop.mode == "hybrid":
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
-        predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
+        predicted = predict(node, gain, proportional)
     found = guarded(parameters, q, cover, position, direction, node.contact_stiffness)
     moved, seen = math.nan, one.swinging
     if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:

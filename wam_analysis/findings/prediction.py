@@ -51,23 +51,14 @@ class Predicted(NamedTuple):
 
     Attributes
     ----------
-    gamma, zeta : (5.15), (5.12).
-    regime : in words.
     time_constant : of the frictionless loop, 1/(G_I K), s, (5.2).
-    routh_gain : largest linearly stable G_I, continuous, m/s/N.
-    sampled_gain : the same with the recorded hold and delay, m/s/N.
     force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     is_certain : whether (5.11) is small enough for (5.8), (5.9).
     driven_peak_to_peak, driven_period : (5.8), (5.9) with the velocity loops in series with the cables.
     """
 
-    gamma: float
-    zeta: float
-    regime: str
     time_constant: float
-    routh_gain: float
-    sampled_gain: float
     force_peak_to_peak: float
     period: float
     actuator_peak_to_peak: float
@@ -142,26 +133,23 @@ def _surface(recorded: PredictionParameters, arm: Arm, cover: str, position: flo
     return _Surface(*found.pop()) if len(found) == 1 else _Surface(math.nan, 0.0)
 
 
-def predict(node: Node, gain: float, proportional_gain: float, sample_period: float, delay_samples: int) -> Predicted:
+def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     """Predictions of chapter 5 for a node.
 
     Parameters
     ----------
     node : with all numbers known.
     gain, proportional_gain : G_I, m/s/N, and G_P, m/N, used in Routh's criterion only, (5.23).
-    sample_period : of the force loop, s.
-    delay_samples : of the force loop, rounded up.
     """
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
         nan = math.nan
-        return Predicted(nan, nan, "not known", nan, nan, nan, nan, nan, nan, False, nan, nan)
+        return Predicted(nan, nan, nan, nan, False, nan, nan)
     zeta, gamma = (
         float(linear_loop.damping_ratio(j, b, ktr, kc)),
         float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain)),
     )
     fs, fd = node.static_friction, node.dynamic_friction
-    has_stiction = fs > fd
     driven_force = driven_period = math.nan
     if math.isfinite(node.driven_stiffness):
         soft = node.driven_stiffness
@@ -170,12 +158,7 @@ def predict(node: Node, gain: float, proportional_gain: float, sample_period: fl
         driven_period = float(stiction.stiction_cycle_period(gain, soft, kc, fs, fd, slow))
     certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
     return Predicted(
-        gamma=gamma,
-        zeta=zeta,
-        regime=_regime(gamma, zeta, has_stiction),
         time_constant=float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc))),
-        routh_gain=float(linear_loop.routh_gain(j, b, ktr, kc, proportional_gain)),
-        sampled_gain=linear_loop.sampled_margin(j, b, ktr, kc, sample_period, delay_samples).gain,
         force_peak_to_peak=float(stiction.stiction_cycle_force(ktr, kc, fs, fd, zeta)),
         period=float(stiction.stiction_cycle_period(gain, ktr, kc, fs, fd, zeta)),
         actuator_peak_to_peak=float(regimes.actuator_cycle(fd, ktr, gamma, zeta)),
@@ -183,21 +166,6 @@ def predict(node: Node, gain: float, proportional_gain: float, sample_period: fl
         driven_peak_to_peak=driven_force,
         driven_period=driven_period,
     )
-
-
-def _regime(gamma: float, zeta: float, has_stiction: bool) -> str:
-    """The regime in words, see `wam_theory.regimes`."""
-    if gamma >= float(regimes.gamma_3(zeta)):
-        return "unstable for every step (domain III)"
-    if gamma >= 1.0:
-        return "stable for small steps only (domain II)"
-    if has_stiction:
-        return "stable, with a stiction limit cycle at rest"
-    if gamma >= float(regimes.gamma_b(zeta)):
-        return "stable, with a limit cycle of the motor (domain I)"
-    if gamma >= float(regimes.gamma_a(zeta)):
-        return "stable, approaches the force in steps from one side"
-    return "stable, approaches the force without sticking"
 
 
 class LargestForce(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, ListedContact, MissedContact
+from wam_analysis.contact_list import NO_LINK, ListedContact
 from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Section
@@ -112,10 +112,11 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Of each true contact; one that is estimated where none is has its own answer."""
-    if _missed(summary):
+    if any(one.lasts for one in summary.missed):
         return VerdictAnswer("right link", VerdictResult.NO, "missed")
-    answer = _answer("right link", [1.0 - right for right in summary.right_links], 1.0 - TOUCH.lasting, "another link")
-    least = f"{100.0 * min(summary.right_links, default=0.0):.0f} %"
+    right = [one.right for one in summary.touched if one.lasts]
+    answer = _answer("right link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
+    least = f"{100.0 * min(right, default=0.0):.0f} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 
@@ -123,16 +124,11 @@ def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     found = _compared(summary)
     errors = [100.0 * abs(one.position_error) for one in found if not one.estimate.is_lower_bound]
-    errors += [math.nan] * len(_missed(summary))
+    errors += [math.nan] * sum(one.lasts for one in summary.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = sum(one.estimate.is_lower_bound for one in found)
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
     return answer._replace(remark=f"unknown for {unknown} of {len(found)} contacts" * bool(unknown))
-
-
-def _missed(summary: DemoSummary) -> list[MissedContact]:
-    """Those that lasted."""
-    return [contact for contact in summary.missed if contact.end - contact.begin >= 1e-9 * TOUCH.bounce]
 
 
 def _compared(summary: DemoSummary) -> list[ListedContact]:

@@ -8,7 +8,6 @@ uncertainty standard errors and covariance, of parameters and of their combinati
 tracked_errors  the covariance in the errors of the model that the contact estimator tracks
 stribeck    the Stribeck velocity of each motor
 contradictions  mistakes of a recording that would give a wrong model
-base_set    combinations of inertial parameters that gravity depends on
 recorded_loop  friction node and force loop of chapter 5, as far as a recording of any arm shows them
 overlay     the estimate as a configuration for --config
 report      the table, and the warnings

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.overlay import identified
 from wam_analysis.table import plain
@@ -63,7 +62,6 @@ def report(shared: Shared, found: Identification, label: str) -> str:
         ],
     )
     lines += ["", _notes(found, len(result.names))]
-    lines += [f"Gravity depends on {'; '.join(gravity_base_set(shared.arm))}."]
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings(shared, found)), ""])
 
 
