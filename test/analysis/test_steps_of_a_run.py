@@ -870,7 +870,7 @@ def test_report_reads_a_bag_from_disk_and_leaves_it_as_it_is(tmp_path):
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
     before = sorted((tmp_path / "bag").iterdir())
-    assert analyse_steps(tmp_path / "bag").sections[0].sentences[0] == "/wam: 1 s, 1 step, done."
+    assert analyse_steps(tmp_path / "bag").sections[0].sentences[0].endswith("1 step, done.")
     assert sorted((tmp_path / "bag").iterdir()) == before
     assert list(read(tmp_path / "bag", OF_STEPS, may_lack=True).topics) == ["/wam/status"]
 
