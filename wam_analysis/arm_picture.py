@@ -44,7 +44,7 @@ class Face(NamedTuple):
     colour: str
 
 
-class Scene(NamedTuple):
+class SideScene(NamedTuple):
     """What is drawn: covers and balls as tubes, everything else as faces; height of the floor, m."""
 
     tubes: list[Tube]
@@ -118,7 +118,7 @@ def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[
     return body.point(q, contact.cover, point), body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)
 
 
-def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> Scene:
+def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> SideScene:
     """The arm in a pose, q in rad, and its world; without the states of its objects the obstacles alone."""
     obstacles = world.obstacles
     balls: list[Tube] = []
@@ -138,7 +138,7 @@ def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectSta
             balls.append(Tube(centre, centre, one.size[0], colour))
         else:
             faces += _faces(one.shape, np.array(one.size), rotation, centre, colour)
-    return Scene([*tubes(arm, q), *balls], faces, floor)
+    return SideScene([*tubes(arm, q), *balls], faces, floor)
 
 
 def _faces(shape: str, size: Array, rotation: Array, centre: Array, colour: str) -> Iterator[Face]:
@@ -169,7 +169,7 @@ def _corners(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
 
 
 def side_view(
-    shown: Scene,
+    shown: SideScene,
     aspect: float,
     margin: float = 0.08,
     azimuth: float = 112.0,
@@ -189,7 +189,7 @@ def side_view(
     return view._replace(centre=centre, width=float(width), height=float(width / aspect))
 
 
-def draw(axes: Axes, shown: Scene, view: View) -> None:
+def draw(axes: Axes, shown: SideScene, view: View) -> None:
     """A scene: faces shaded, the farthest first, then the tubes with their true radii."""
     axes.set_axis_off()
     axes.set(xlim=(-view.width / 2.0, view.width / 2.0), ylim=(-view.height / 2.0, view.height / 2.0), aspect="equal")

@@ -105,7 +105,7 @@ class ListedContact(NamedTuple):
         return found.force - self.true_force if is_known else NAN
 
 
-class TrueContact(NamedTuple):
+class TouchedLink(NamedTuple):
     """A true contact, by link and step.
 
     Attributes
@@ -192,7 +192,7 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
             yield row, float(traces.stamp[row] - traces.stamp[begin]) / 1e9
 
 
-def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[TrueContact, ...]:
+def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[TouchedLink, ...]:
     """The true contacts, by link and step, and what was estimated of each, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
@@ -202,7 +202,7 @@ def true_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[TrueCo
         same = estimated.acts[known] & (estimated.frame[known] == true.frame[known])
         is_known = bool(np.all(estimated.is_known[begin:end]))
         found.append(
-            TrueContact(
+            TouchedLink(
                 *time_of(traces, steps, begin, end),
                 most(true.frame[acting]),
                 median(true.size[acting]),

@@ -8,7 +8,7 @@ import numpy as np
 from wam_analysis.command_gaps import command_gaps
 from wam_analysis.contact_list import (
     ListedContact,
-    TrueContact,
+    TouchedLink,
     certainty_of,
     contact_rows,
     listed_contacts,
@@ -92,7 +92,7 @@ class DemoSummary(NamedTuple):
     settling_times: tuple[tuple[int, float], ...]
     holds: tuple[Hold, ...]
     contacts: tuple[ListedContact, ...]
-    touched: tuple[TrueContact, ...]
+    touched: tuple[TouchedLink, ...]
     unplanned: UnplannedContacts
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
@@ -106,7 +106,7 @@ class DemoSummary(NamedTuple):
     is_blind: bool
 
     @property
-    def missed(self) -> tuple[TrueContact, ...]:
+    def missed(self) -> tuple[TouchedLink, ...]:
         """True contacts that were not estimated."""
         return tuple(one for one in self.touched if one.is_missed)
 
