@@ -286,7 +286,7 @@ def blocks() -> dict[str, Callable[[], str]]:
 
 def verdict(file: str) -> str:
     """The verdict of a demonstration, as `wam demo` prints it."""
-    _, head, rest = (ROOT / "docs" / file).read_text(encoding="utf-8").partition("Result of the steps,")
+    _, head, rest = (ROOT / "docs" / file).read_text(encoding="utf-8").partition("Result")
     return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
 
 

@@ -138,21 +138,18 @@ class TouchedLink(NamedTuple):
         )
 
 
-class Certainty(NamedTuple):
-    """What is known of the estimate at each instant, from `contact/hypotheses`; NaN and -1 where it is not."""
-
-    numbers: dict[str, Numbers]
-    reasons: NDArray[np.int64]
+Certainty = dict[str, Numbers]  # columns of `contact/hypotheses` at each instant; NaN where they are not known
 
 
 def certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
     """Of the estimated contact at each instant."""
     numbers = {name: np.full(len(traces.stamp), NAN) for name in HYPOTHESIS}
     if (hypotheses := most_probable(run)) is not None:
-        row, known = held_rows(hypotheses.stamp, traces.stamp)
+        stamps, columns = hypotheses
+        row, known = held_rows(stamps, traces.stamp)
         for name, values in numbers.items():
-            values[known] = hypotheses.columns[name][row[known]]
-    return Certainty(numbers, np.nan_to_num(numbers["reasons"], nan=-1.0).astype(np.int64))
+            values[known] = columns[name][row[known]]
+    return numbers
 
 
 def listed_contacts(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
@@ -319,10 +316,11 @@ def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Es
     estimated = traces.estimated
     link = most(estimated.frame[rows])
     own = rows[estimated.frame[rows] == link]
-    bits = certainty.reasons[own][certainty.reasons[own] >= 0]
+    reasons = certainty["reasons"][own]
+    bits = reasons[np.isfinite(reasons)].astype(np.int64)
     lasting = {text: float(np.mean(bits & why > 0)) for why, text in REASONS.items()} if len(bits) else {}
     probability, position_sd, force_sd = (
-        median(certainty.numbers[name][own]) for name in ("probability", "position_sd", "force_sd")
+        median(certainty[name][own]) for name in ("probability", "position_sd", "force_sd")
     )
     position = median(estimated.position[own])
     placed = own[estimated.is_placed[own]]

@@ -17,8 +17,7 @@ from wam_analysis.contact_list import (
 )
 from wam_analysis.demo_traces import NAN, Mask, Numbers, Traces, traces_of
 from wam_analysis.holds import Hold, holds_of
-from wam_analysis.measures.runs import runs
-from wam_analysis.task_forces import TaskForce, task_forces, tasks_of
+from wam_analysis.task_forces import task_forces, tasks_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import CUT, RECORDING, losses
@@ -65,8 +64,6 @@ class DemoSummary(NamedTuple):
     Attributes
     ----------
     namespace : of the arm, '/wam'.
-    period : time between two instants of the traces, s.
-    tasks : forces that tasks command.
     torques : begin and end of each time in which a task commands the same joint torques and motions, ns.
     settling_times : of the force loop, s, and since when it had each, ns; NaN where it was not recorded.
     holds : the constant forces that were commanded.
@@ -75,7 +72,7 @@ class DemoSummary(NamedTuple):
     unplanned : contacts without a command of a force, harder than allowed.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
-    false_contact, longest_false_contact : time of false detections and the longest of them, s.
+    false_contact : time of false detections, s.
     free : time without contact, s.
     received, dropped : messages counted by the recorder, -1 if it wrote no counts.
     lost : sentences about what the bag lacks, none if no loss is known.
@@ -83,11 +80,9 @@ class DemoSummary(NamedTuple):
     """
 
     namespace: str
-    period: float
     outcome: str
     steps: tuple[RecordedStep, ...]
     traces: Traces
-    tasks: tuple[TaskForce, ...]
     torques: tuple[tuple[int, int], ...]
     settling_times: tuple[tuple[int, float], ...]
     holds: tuple[Hold, ...]
@@ -96,7 +91,6 @@ class DemoSummary(NamedTuple):
     unplanned: UnplannedContacts
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
-    longest_false_contact: float
     free: float
     loop: LoopReport
     received: int
@@ -144,11 +138,9 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     gaps = command_gaps(run, traces.stamp, lost, steps)
     return DemoSummary(
         namespace=run.namespace,
-        period=traces.period,
         outcome=run.outcome or UNFINISHED,
         steps=steps,
         traces=traces,
-        tasks=tuple(tasks),
         torques=tuple(watched_times(tasks_of(run), without_forces=True)),
         settling_times=_settling_times(run),
         holds=holds,
@@ -157,7 +149,6 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         unplanned=unplanned_contacts(run, traces, steps, gaps),
         reactions=reactions,
         false_contact=int(np.sum(false)) * traces.period,
-        longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * traces.period,
         free=int(np.sum(known & ~traces.true.acts)) * traces.period,
         loop=_loop(run),
         received=received,

@@ -19,6 +19,8 @@ Names = NDArray[np.str_]
 Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+_Points = tuple[Times, Numbers]  # stamps, ns, and positions along a link, m, (k,)
+
 NAN = float("nan")
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
@@ -28,7 +30,7 @@ RECORDED = (
     "sim/disturbance", "sim/joint_states",
 )  # fmt: skip
 OF_STEPS = (  # topics that show what became of the steps of a scenario
-    *RECORDED, "joint_states", "external_joint_torques", "contact/hypotheses", "force_axis", "task_command",
+    *RECORDED, "joint_states", "contact/hypotheses", "force_axis", "task_command",
     "task_axes", "status", "/diagnostics",
 )  # fmt: skip
 
@@ -143,9 +145,9 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         row, known = held_rows(forces.stamp_ns, base)
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
         if points is not None:
-            at, is_there = held_rows(points.stamp, base)
-            is_placed = is_there & known & (points.stamp[at] == forces.stamp_ns[row])
-            position[is_placed] = points.position[at[is_placed]]
+            at, is_there = held_rows(points[0], base)
+            is_placed = is_there & known & (points[0][at] == forces.stamp_ns[row])
+            position[is_placed] = points[1][at[is_placed]]
         return ForceSignal(np.array(forces.frames, np.str_)[row], force, position, is_placed)
 
     base = np.empty(0, np.int64)
@@ -167,46 +169,32 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
 
 
-class _Points(NamedTuple):
-    """Recorded positions along a link, m, and their stamps, ns, (k,)."""
-
-    stamp: Times
-    position: Numbers
-
-
 def _points(run: RecordedRun, topic: str) -> _Points | None:
     columns = run.points(topic)
-    return None if columns is None else _Points(columns.stamp_ns, columns.point[:, 0])
+    return None if columns is None else (columns.stamp_ns, columns.point[:, 0])
 
 
 def _points_of_hypotheses(run: RecordedRun) -> _Points | None:
     """Positions of the most probable hypotheses, which are those of `contact/point`."""
     hypotheses = most_probable(run)
-    return None if hypotheses is None else _Points(hypotheses.stamp, hypotheses.columns["position"])
+    return None if hypotheses is None else (hypotheses[0], hypotheses[1]["position"])
 
 
-class MostProbable(NamedTuple):
+def most_probable(run: RecordedRun) -> tuple[Times, dict[str, Numbers]] | None:
     """The most probable hypothesis of each message of `contact/hypotheses`, which is the contact that is published.
 
-    Attributes
-    ----------
-    stamp : (k,), ns.
-    columns : by their names, (k,).
+    Returns
+    -------
+    tuple or None
+        stamps, (k,), ns, and columns by their names, (k,); None without a table of hypotheses.
     """
-
-    stamp: Times
-    columns: dict[str, Numbers]
-
-
-def most_probable(run: RecordedRun) -> MostProbable | None:
-    """The hypotheses of a run; None without a table of hypotheses."""
     columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
     if not isinstance(columns, TableColumns) or not len(columns.message):
         return None
     if not {*HYPOTHESIS} <= {*columns.columns}:
         return None
     _, first = np.unique(columns.message, return_index=True)
-    return MostProbable(columns.row_stamp_ns[first], {name: columns.columns[name][first] for name in HYPOTHESIS})
+    return columns.row_stamp_ns[first], {name: columns.columns[name][first] for name in HYPOTHESIS}
 
 
 def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:

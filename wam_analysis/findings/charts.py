@@ -130,11 +130,9 @@ def _holds(analysis: Analysis) -> Iterator[Chart]:
 def _positions(analysis: Analysis) -> Iterator[Chart]:
     """Where the arm was touched."""
     traces = analysis.recording.summary.traces
-    signals = {"true": traces.true, "estimated": traces.estimated}
-    lines = [
-        ChartLine(name, COLOURS[name], np.where(signal.acts, 100.0 * signal.position, np.nan))
-        for name, signal in signals.items()
-    ]
+    touched = {name: getattr(traces, name) for name in ("true", "estimated")}
+    positions = {name: np.where(one.acts, 100.0 * one.position, np.nan) for name, one in touched.items()}
+    lines = [ChartLine(name, COLOURS[name], position) for name, position in positions.items()]
     if any(np.any(np.isfinite(line.values)) for line in lines):
         time = (traces.stamp - traces.stamp[0]) / 1e9
         yield Chart("contact", "Position of the contact along the link.", TIME, "position [cm]", time, tuple(lines))

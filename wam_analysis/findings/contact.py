@@ -70,7 +70,7 @@ def contact_section(recording: AnalysedRun) -> Section:
     if np.any(known):
         false = known & sensed.acts & ~true.acts
         count = len(runs(false))
-        seconds = float(np.sum(false)) * summary.period
+        seconds = float(np.sum(false)) * summary.traces.period
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
             sentences.append(f"False detections: {count}, {shown(seconds, 's')}.")
@@ -88,7 +88,7 @@ def contact_section(recording: AnalysedRun) -> Section:
 def contact_numbers(summary: DemoSummary) -> Iterator[Finding]:
     """Every estimated contact in numbers."""
     for number, contact in enumerate(summary.contacts, 1):
-        yield from _numbers(f"{number} {contact.estimate.link}", contact, summary.period)
+        yield from _numbers(f"{number} {contact.estimate.link}", contact, summary.traces.period)
 
 
 def contact_doubts(summary: DemoSummary) -> Iterator[str]:

@@ -244,7 +244,7 @@ def _fate(one: HeldForce) -> tuple[str, str]:
     name, cycle, verdict = one.hold.name, one.cycle, one.stability
     if not one.is_recorded:
         if one.swinging is not None:
-            return swinging_words(name, one.swinging)
+            return (swinging_words(name, one.swinging),) * 2
         return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
     words = {
         Verdict.SETTLED: "settles",

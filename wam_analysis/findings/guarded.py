@@ -13,8 +13,7 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
 from wam_control.force.force_loop_parameters import force_law, task_of
 from wam_control.force.friction_verdict import Domain
-from wam_control.force.guard import Supervision
-from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of, rounded_down
+from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
 from wam_control.force.thresholds import GUARD
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -31,15 +30,12 @@ class Guarded(NamedTuple):
     surface : its stiffness, N/m.
     gain : G_I along the force, m/s/N.
     posture : of this contact, in words.
-    accepted : factor of the gains up to which the force loop accepts them with the arm in this posture, in both
-        directions across the link, in `guard.posture`, and with the surface of its parameters.
     """
 
     assessment: GuardAssessment
     surface: float
     gain: float
     posture: str
-    accepted: float
 
 
 def guarded(
@@ -72,15 +68,11 @@ def guarded(
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
     found = guard.assess(task_of(loop, law), touches)
-    warning = replace(loop, guard=replace(loop.guard, mode="warn"))
-    own = Supervision(arm, servo, timing, warning, tuple(q)).assessment
-    accepted = parameters.stability_fraction * min(found.scale, math.inf if own is None else own.scale)
     return Guarded(
         found,
         parameters.contact_stiffness,
         max(law.gain),
         posture_of(touches[0]._replace(q=tuple(np.round(q, 3)))),
-        accepted,
     )
 
 
@@ -96,12 +88,9 @@ def sentence(found: Guarded) -> str:
             if assessment.scale >= GUARD.largest_scale
             else f"with up to {shown(assessment.scale)}"
         )
-        return f"{text}: domain I, linearly stable {more} times these gains. {_accepted(found)}"
+        return f"{text}: domain I, linearly stable {more} times these gains."
     if assessment.scale >= 1.0:
-        return (
-            f"{text}: linearly stable, but only with up to {shown(assessment.scale)} times these gains. "
-            f"{_accepted(found)}"
-        )
+        return f"{text}: linearly stable, but only with up to {shown(assessment.scale)} times these gains."
     if not over:
         return f"{text}: NOT stable, not even with a hundredth of the gains."
     if assessment.stable_error > 0.0:
@@ -110,11 +99,3 @@ def sentence(found: Guarded) -> str:
             f"{shown(assessment.stable_error, 'N')}."
         )
     return f"{text}: NOT stable, domain {assessment.domain}; the gains are {over}."
-
-
-def _accepted(found: Guarded) -> str:
-    """What the force loop accepts, which is less than what is stable here."""
-    return (
-        f"In this posture, guard.posture and any direction across the link the force loop accepts a gain up to "
-        f"{rounded_down(found.accepted * found.gain):g}, {shown(rounded_down(found.accepted))} times the recorded one."
-    )

@@ -34,7 +34,7 @@ Numbers = NDArray[np.float64]
 
 JOINTS = ("sim/joint_states", "joint_states")
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
-UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
+UNDECIDED = Stability(Verdict.UNDECIDED, math.nan)
 
 
 class HeldForce(NamedTuple):

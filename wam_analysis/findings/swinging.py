@@ -58,21 +58,18 @@ def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
     )
 
 
-def swinging_words(name: str, found: Swinging) -> tuple[str, str]:
-    """A sentence on a hold, and its verdict ('' for none)."""
+def swinging_words(name: str, found: Swinging) -> str:
+    """A sentence on a hold."""
     one, where = found.swings, f"{found.name} (the force was not recorded)"
     size = f"{shown(one.peak_to_peak, 'rad')} peak to peak, period {shown(one.period, 's')}"
     if one.verdict is Verdict.LIMIT_CYCLE:
-        text = f"{name}: limit cycle, seen on {where}: {size}."
-        return text, text
+        return f"{name}: limit cycle, seen on {where}: {size}."
     if one.verdict is Verdict.DIVERGED:
-        text = f"{name}: DIVERGES, seen on {where}: {shown(100.0 * (one.growth - 1.0))} % per half cycle, last {size}."
-        return text, text
+        return f"{name}: DIVERGES, seen on {where}: {shown(100.0 * (one.growth - 1.0))} % per half cycle, last {size}."
     settled = one.verdict is Verdict.SETTLED
-    text = (
+    return (
         f"{name}: {where} {'ceases to swing' if settled else 'swings too seldom to decide'}; no limit cycle detected."
     )
-    return text, text
 
 
 def swinging_findings(name: str, found: Swinging) -> list[Finding]:

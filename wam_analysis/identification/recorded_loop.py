@@ -11,8 +11,7 @@ from wam_analysis.findings.finding import shown
 from wam_analysis.findings.guarded import sentence
 from wam_analysis.findings.held_force import JOINTS, Theory, theory_of
 from wam_analysis.foreign.mechanics import friction, is_sure
-from wam_analysis.foreign.reading import foreign_bag
-from wam_analysis.foreign.sources import Source, sources
+from wam_analysis.foreign.sources import Source
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_description.arm import Arm
 
@@ -54,11 +53,7 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
     analysis = analyse(path, lambda doing: None, given)
     if not analysis.recording.is_foreign:
         return _at_the_contact(path, analysis)
-    found = {
-        one.label: (one, friction(one))
-        for one in sources(foreign_bag(path, given), given)
-        if one.is_joint and not one.is_command
-    }
+    found = {one.label: (one, friction(one)) for one in analysis.recording.states if one.is_joint}
     seen = {label: (one, fit) for label, (one, fit) in found.items() if fit is not None}
     if not seen:
         raise ValueError(

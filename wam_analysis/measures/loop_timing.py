@@ -17,22 +17,18 @@ class StampTiming(NamedTuple):
 
     Attributes
     ----------
-    messages : how many came.
     period : between two stamps, median, s.
     missed : periods without a message.
     longest_gap : between two stamps, s.
     backwards : stamps that are not later than the one before.
-    interval : between two receptions, mean, s; NaN if they were not recorded.
-    jitter : standard deviation of it, s.
+    jitter : standard deviation of the intervals between two receptions, s; NaN if they were not recorded.
     worst : longest interval between two receptions, s.
     """
 
-    messages: int
     period: float
     missed: int
     longest_gap: float
     backwards: int
-    interval: float
     jitter: float
     worst: float
 
@@ -64,23 +60,20 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         as in lockstep bags, whose log times are the stamps.
     """
     if len(stamp) < 2:
-        return StampTiming(len(stamp), math.nan, 0, math.nan, 0, math.nan, math.nan, math.nan)
+        return StampTiming(math.nan, 0, math.nan, 0, math.nan, math.nan)
     steps = np.diff(stamp)
     forward = steps[steps > 0]
     period = float(np.median(forward)) if len(forward) else math.nan
     skipped = _skipped(forward / period) if len(forward) else np.zeros(0, dtype=np.int64)
-    interval = jitter = worst = math.nan
+    jitter = worst = math.nan
     if received is not None:
         intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
-        interval, jitter = float(np.mean(intervals)), float(np.std(intervals))
-        worst = float(np.max(intervals))
+        jitter, worst = float(np.std(intervals)), float(np.max(intervals))
     return StampTiming(
-        messages=len(stamp),
         period=period / 1e9,
         missed=int(np.sum(skipped)),
         longest_gap=float(np.max(steps)) / 1e9,
         backwards=int(np.sum(steps <= 0)),
-        interval=interval,
         jitter=jitter,
         worst=worst,
     )

@@ -20,15 +20,10 @@ class Stability(NamedTuple):
     ----------
     verdict : see `Verdict`.
     growth : factor from one half cycle to the next at the end; NaN if there are too few.
-    confidence : 0 to 1, from the scatter about the trend and the number of peaks; 1 if the error
-        has come to rest within the tolerance.
-    peaks : (k,), largest |error| of each half cycle, whole ones only.
     """
 
     verdict: Verdict
     growth: float
-    confidence: float
-    peaks: Numbers
 
 
 def stability(error: Numbers, tolerance: float) -> Stability:
@@ -51,10 +46,10 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     peaks = half_cycle_peaks(error, tolerance)
     quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
     if quiet:
-        return Stability(Verdict.SETTLED, math.nan, 1.0, peaks)
+        return Stability(Verdict.SETTLED, math.nan)
     late = peaks[CYCLE.transient :]
     if len(late) < CYCLE.peaks:
-        return Stability(Verdict.UNDECIDED, math.nan, 0.0, peaks)
+        return Stability(Verdict.UNDECIDED, math.nan)
     late = late[-max(len(late) // 2 + 1, CYCLE.peaks) :]
     slope, error_of_slope = trend(np.log(late))
     sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
@@ -63,11 +58,9 @@ def stability(error: Numbers, tolerance: float) -> Stability:
         verdict = Verdict.DIVERGED
     elif abs(last) <= CYCLE.steady_growth or sure <= 2.0 or (slope < 0.0 and last > CYCLE.flattened * slope):
         verdict = Verdict.LIMIT_CYCLE
-        sure = CYCLE.steady_growth / error_of_slope if error_of_slope > 0.0 else math.inf
     else:
         verdict = Verdict.SETTLED
-    confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - CYCLE.transient) / 5.0)
-    return Stability(verdict, math.exp(slope), confidence, peaks)
+    return Stability(verdict, math.exp(slope))
 
 
 def half_cycle_peaks(error: Numbers, tolerance: float) -> Numbers:
