@@ -13,7 +13,7 @@ from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
-from wam_studies.contact.degraded_rows import DEGRADED, contacts_needed, degraded_rows, degraded_tables
+from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
 from wam_studies.contact.recording import Drive, _identified, record
 from wam_studies.contact.replay import SignalFaults, names_payload
@@ -22,7 +22,7 @@ from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.study import ContactCase, ContactStudy, play_case
 from wam_studies.contact.touches import axis_of
 from wam_studies.identification.plants import MeasuredSignals
-from wam_studies.scores import Row, ScoreTable, share
+from wam_studies.scores import Row, ScoreTable
 
 TOUCH = ContactOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, "outer", 0.0, 0.01, True)
 QUIET = TorqueErrors(*[(0.0,)] * 4, 1, 1, 1)
@@ -58,13 +58,6 @@ def test_drives_are_of_each_degradation_and_the_mix_is_identified_too() -> None:
     assert {drive.seed for drive in drives if drive.contacts == "level"} == {6, 7, 8}
     assert {drive.seconds for drive in drives if drive.contacts == "masses"} == {10.0}
     assert not list(ContactStudy(CONFIGURATION).drives(2))
-
-
-def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to_be_allowed() -> None:
-    count, (low, high) = contacts_needed(), DEGRADED.covered[0]
-    enough, fewer = (share(round(DEGRADED.usual * n), n) for n in (count, count - 1))
-    assert low <= enough.low < enough.high <= high
-    assert fewer.low < low or fewer.high > high
 
 
 def scored(*outcomes: ContactOutcome, **parts: Any) -> ContactScore:

@@ -1,7 +1,7 @@
 """Contact estimation on the whole arm (`wam evaluate contact`): the arm as its model states it, and degraded ones.
 
 scenarios      what is simulated on the arm as stated: poses, moves, contacts, a true arm drawn from a seed
-moves, foam    random moves within the limits of the arm; a fixed foam post that it runs into
+moves          random moves within the limits of the arm
 simulation     play and score a scenario without ROS
 degradations   how the true arm and its signals differ from what the estimator states
 touches        contacts drawn wider than the estimator's prior, as exact forces; masses that are picked up

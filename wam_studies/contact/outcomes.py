@@ -3,13 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_estimator import ContactEstimate
-from wam_control.contact.contact_inference import Hypothesis
+from wam_description.arm import Arm
 
 Mask = NDArray[np.bool_]
 Array = NDArray[np.float64]
@@ -24,7 +24,6 @@ class EvaluationLimits:
     gap: int = 1  # moments without force within one contact
     greatest_force: float = 25.0  # N; contacts with a greater force are excluded
     settled: float = 0.2  # s from the start of a contact until the estimate is evaluated
-    settled_in_foam: float = 0.12  # s, the same in foam, which soon stops the arm
     settled_at_rest: float = 0.4  # s, the same at rest, where the estimate averages over the dither
     shortest: float = 0.12  # s; shorter contacts are excluded
     edge: float = 0.1  # s after the start or end of a contact in which the observer lags
@@ -59,7 +58,7 @@ class TrueContact(NamedTuple):
     Attributes
     ----------
     kind, cover, friction : of the scenario or the drawn contact; coefficient.
-    position, force, moment : at the evaluation; m, N, N m about the link's origin.
+    position, force : at the evaluation; m, N.
     first, due, last : numbers of the moments of its start, of the evaluation, and until which it may be detected.
     since : s, from which on the latency counts.
     mass : kg, of a mass at the tool.
@@ -74,7 +73,6 @@ class TrueContact(NamedTuple):
     due: int
     last: int
     since: float
-    moment: tuple[float, float, float] = (math.nan,) * 3
     mass: float = 0.0
 
 
@@ -89,8 +87,6 @@ class ContactOutcome(NamedTuple):
     detected, probability, right_link, link : of the most probable link, '' and NaN without any.
     error, position_sd : m; inf on the wrong link or without a position; NaN sd without a position.
     in_set : whether the 90 % set contains the truth.
-    moment_error : of the moment about the link's origin on the right link, per moment.
-    least_force : N, size of the estimated force, a lower bound where the position is unknown.
     sure_and_wrong : s of the contact in which another link is reported with certainty.
     """
 
@@ -108,8 +104,6 @@ class ContactOutcome(NamedTuple):
     error: float
     position_sd: float
     in_set: bool
-    moment_error: float = math.nan
-    least_force: float = math.nan
     sure_and_wrong: float = 0.0
 
 
@@ -148,14 +142,8 @@ def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length:
         error=abs(known.position - contact.position) if known else math.inf,
         position_sd=best.position_sd if right and best else math.nan,
         in_set=carries > EVALUATION.outside or any(one.low - 1e-6 <= place <= one.high + 1e-6 for one in own),
-        moment_error=_moment_error(own[0], contact) if is_named else math.nan,
-        least_force=math.hypot(*own[0].force) if own else math.nan,
         sure_and_wrong=sum(wrong) * (moments[1].time - moments[0].time),
     )
-
-
-def _moment_error(found: Hypothesis, contact: TrueContact) -> float:
-    return math.dist(found.moment, contact.moment) / math.hypot(*contact.moment)
 
 
 def is_sure_and_wrong(estimate: ContactEstimate, cover: str) -> bool:
@@ -278,3 +266,36 @@ class ContactScore(NamedTuple):
     masses: tuple[MassOutcome, ...] = ()
     started: tuple[tuple[bool, bool], ...] = ()
     failure: str = ""
+
+
+def during(moments: Sequence[EstimatedMoment], begin: float, end: float) -> Mask:
+    """Whether each moment is within some times, s."""
+    time = np.array([one.time for one in moments])
+    return (time >= begin - 1e-9) & (time <= end + 1e-9)
+
+
+def score_of(
+    arm: Arm,
+    moments: Sequence[EstimatedMoment],
+    contacts: Sequence[TrueContact],
+    acting: Sequence[Mask],
+    busy: Mask,
+    **more: Any,
+) -> ContactScore:
+    """Score a run.
+
+    Parameters
+    ----------
+    acting : of each contact, whether it acts at each moment.
+    busy : of each moment, whether a contact acts, or has just acted.
+    more : other fields of the score.
+    """
+    return ContactScore(
+        outcomes=[
+            outcome_of(contact, moments, arm.covers.length_of(contact.cover), acts)
+            for contact, acts in zip(contacts, acting, strict=True)
+        ],
+        free_seconds=(moments[1].time - moments[0].time) * int((~busy).sum()),
+        alarms=alarms(moments, busy),
+        **more,
+    )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from wam_studies.contact.outcomes import (
     Mask,
     MassOutcome,
     TrueContact,
-    alarms,
+    during,
     is_sure_and_wrong,
-    outcome_of,
+    score_of,
     torque_errors,
 )
 from wam_studies.contact.recording import DriveRecording
@@ -97,33 +98,30 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
             moments.append(
                 EstimatedMoment(time, estimator.estimate(), is_moving, float(np.abs(recording.thetad[i]).min()))
             )
-    found = _scored(recording, moments, shared.arm)
-    return found._replace(name=name, group=group, started=tuple(started.values()))
+    return _scored(recording, moments, shared.arm, name=name, group=group, started=tuple(started.values()))
 
 
-def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: Arm) -> ContactScore:
+def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: Arm, **more: Any) -> ContactScore:
     touches = [touch for touch in recording.touches if touch.end < moments[-1].time]
-    acting = [_during(moments, touch.begin, touch.end) for touch in touches]
+    acting = [during(moments, touch.begin, touch.end) for touch in touches]
     busy = np.zeros(len(moments), bool)
     for touch in touches:
-        busy |= _during(moments, touch.begin, touch.end + (REPLAY.setting_down if touch.mass else EVALUATION.edge))
-    free = ~busy & _during(moments, REPLAY.observer + 1e-12, np.inf) & np.array([one.is_moving for one in moments])
+        busy |= during(moments, touch.begin, touch.end + (REPLAY.setting_down if touch.mass else EVALUATION.edge))
+    free = ~busy & during(moments, REPLAY.observer + 1e-12, np.inf) & np.array([one.is_moving for one in moments])
     warned = [one.estimate.warning is not None for one, take in zip(moments, ~busy, strict=True) if take]
     truth = np.zeros((len(moments), len(arm.joints.names)))
-    return ContactScore(
-        name="",
-        group="",
-        outcomes=[
-            outcome_of(_contact(touch, moments), moments, arm.covers.length_of(touch.cover), acts)
-            for touch, acts in zip(touches, acting, strict=True)
-        ],
-        free_seconds=(moments[1].time - moments[0].time) * int((~busy).sum()),
-        alarms=alarms(moments, busy),
+    return score_of(
+        arm,
+        moments,
+        [_contact(touch, moments) for touch in touches],
+        acting,
+        busy,
         torques=torque_errors(moments, truth, free, REPLAY.sliding),
         warnings=sum(warned) / max(1, len(warned)),
         contact_seconds=sum(touch.end - touch.begin for touch in touches if not touch.mass),
         masses=tuple(_mass(touch, moments, acts) for touch, acts in zip(touches, acting, strict=True) if touch.mass),
         failure=recording.failure,
+        **more,
     )
 
 
@@ -145,11 +143,6 @@ def _mass(touch: Touch, moments: Sequence[EstimatedMoment], acting: Mask) -> Mas
         wrong=any(is_sure_and_wrong(one, touch.cover) and one.link != PAYLOAD for one in during),
         lasting=linked[-1] and not named[-1],
     )
-
-
-def _during(moments: Sequence[EstimatedMoment], begin: float, end: float) -> Mask:
-    time = np.array([one.time for one in moments])
-    return (time >= begin) & (time <= end)
 
 
 def _contact(touch: Touch, moments: Sequence[EstimatedMoment]) -> TrueContact:

@@ -13,8 +13,7 @@ import numpy as np
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
-from wam_description.rigid_body import RigidBody
-from wam_studies.contact.foam import Foam, FoamCollision, foam_values
+from wam_description.world import Obstacles
 from wam_studies.contact.moves import MoveGenerator
 
 
@@ -39,12 +38,10 @@ class ScenarioRanges:
     margin: float = 0.02  # m at the ends of a link without contacts
     dither_cycle: float = 0.04  # s: 25 Hz
     beyond_first: float = 0.7  # of the contacts are not on the first cover
-    foam_share: float = 0.15  # of the scenarios in motion
 
 
 RANGES = ScenarioRanges()
-KINDS = ("push", "sphere", "flat", "foam")
-AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
+KINDS = ("push", "sphere", "flat")
 
 # what the estimator states of an arm that was identified to this range, as standard deviations
 IDENTIFIED = {
@@ -103,7 +100,7 @@ def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, 
     estimator = configuration.sections["contact_estimator"]
     joints = len(configuration.shared.arm.joints.names)
     values: dict[str, Any] = {
-        **foam_values(AWAY, RANGES.weakest, 0.0),
+        **{f"driver:world.obstacles.{key}": [] for key in Obstacles.__dataclass_fields__},
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
     }
@@ -125,7 +122,7 @@ class ScenarioGenerator:
     def __init__(self, configuration: Configuration, seed: int, joint_sensors: bool = False) -> None:
         self._configuration, self._seed = configuration, seed
         self._arm: Arm = configuration.shared.arm
-        self._moves, self._body = MoveGenerator(self._arm), RigidBody(self._arm)
+        self._moves = MoveGenerator(self._arm)
         self._base = base_values(configuration, joint_sensors) | IDENTIFIED
 
     def contacts(self, count: int) -> list[BenchmarkScenario]:
@@ -145,8 +142,7 @@ class ScenarioGenerator:
 
     def _moving(self, i: int) -> BenchmarkScenario:
         random = self._random(0, i)
-        if random.random() < RANGES.foam_share:
-            return self._foam(random, i)
+        random.random()
         start = self._moves.pose(random)
         moves = self._moves.moves(random, start, 2)
         steps, planned = _opening(), []
@@ -161,28 +157,6 @@ class ScenarioGenerator:
         steps.append(ScenarioStep("end", 0.1))
         values = self._values(random, start, planned)
         return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
-
-    def _foam(self, random: np.random.Generator, i: int) -> BenchmarkScenario:
-        """The arm runs into foam and moves back."""
-        foam = None
-        while foam is None:
-            start = self._moves.pose(random)
-            (move,) = self._moves.moves(random, start, 1)
-            contact = self._contact(
-                random, RANGES.release + RANGES.settle, RANGES.release + RANGES.settle + move.seconds + 0.5
-            )
-            cover = self._arm.covers.names.index(contact.cover)
-            foam = FoamCollision(self._arm, self._body, start, move).foam(random, cover, contact.position)
-        friction = RANGES.rough if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
-        contact = contact._replace(kind="foam", force=max(contact.force, 4.0), friction=friction)
-        steps = [
-            *_opening(),
-            ScenarioStep("move into foam", move.seconds, posture=move.posture),
-            ScenarioStep("press", 0.2),
-            ScenarioStep("back", move.seconds, posture=start),
-        ]
-        values = self._values(random, start, []) | foam_values(foam, contact.force, friction)
-        return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), (contact,))
 
     def _resting(self, i: int, dither: Mapping[str, Any] | None) -> BenchmarkScenario:
         random = self._random(1, i)

@@ -4,16 +4,13 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
-from wam_description.effects import no_effects
-from wam_description.mjcf import mjcf
 from wam_description.parameters import ParameterError
+from wam_description.rigid_body import RigidBody
 from wam_description.signals import Load
-from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
 from wam_studies.contact.outcomes import (
@@ -23,13 +20,12 @@ from wam_studies.contact.outcomes import (
     EstimatedMoment,
     Mask,
     TrueContact,
-    alarms,
-    outcome_of,
+    during,
+    score_of,
     torque_errors,
 )
 from wam_studies.contact.scenarios import RANGES, BenchmarkScenario, PlannedContact
 
-NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 SLIDING = 1.0  # rad/s of the slowest motor
 
 
@@ -43,32 +39,6 @@ class Played(NamedTuple):
     failure: str
 
 
-class LoadTorques:
-    """Joint torques of a load on a cover by the simulator's kinematics, independent of the estimator's."""
-
-    def __init__(self, arm: Arm) -> None:
-        self._model = mujoco.MjModel.from_xml_string(mjcf(arm, 1e-3, World(NOWHERE, NO_SPRINGS), no_effects(arm)))
-        self._data = mujoco.MjData(self._model)
-        self._n = len(arm.joints.names)
-        sites = {name: self._model.site(f"{name}_frame").id for name in arm.covers.names}
-        self._at = {name: (site, int(self._model.site_bodyid[site])) for name, site in sites.items()}
-
-    def torques(self, q: Sequence[float], load: Load) -> tuple[float, ...]:
-        """Torques on the joints, (n,), N m, of a load in pose q, rad."""
-        if not load.cover:
-            return (0.0,) * self._n
-        data, model = self._data, self._model
-        site, body = self._at[load.cover]
-        data.qpos[self._n :] = q
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        rotation = data.site_xmat[site].reshape(3, 3)
-        result = np.zeros(model.nv)
-        force, moment = rotation @ np.array(load.force), rotation @ np.array(load.moment)
-        mujoco.mj_applyFT(model, data, force, moment, data.site_xpos[site], body, result)
-        return tuple(result[self._n :].tolist())
-
-
 def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
     """Play a scenario without ROS."""
     configured = configuration.with_values(scenario.values)
@@ -77,7 +47,7 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
     except ParameterError:  # the drawn arm is stiffer than the configured one; do what the refusal advises
         finer = {"timing.substeps": 2 * configured.shared.timing.substeps}
         run = Simulation(configured.with_values(finer), scenario.steps)
-    load_torques = LoadTorques(configured.shared.arm)
+    body = RigidBody(configured.shared.arm)
     played = Played(scenario, [], [], [], "")
     done = False
     while not done:
@@ -90,10 +60,17 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
         is_moving = max(map(abs, joints.velocity)) > EVALUATION.moving
         played.moments.append(EstimatedMoment(stamp * 1e-9, run.estimate, is_moving, min(map(abs, motors.velocity))))
         played.loads.append(load)
-        played.torques.append(load_torques.torques(joints.position, load))
+        played.torques.append(torques_of(body, joints.position, load))
         if run.driver.safety.mode is Mode.FAULT:
             return played._replace(failure=run.driver.safety.fault)
     return played._replace(failure=run.scenario.failure)
+
+
+def torques_of(body: RigidBody, q: Sequence[float], load: Load) -> tuple[float, ...]:
+    """Torques on the joints, (n,), N m, of a load in pose q, rad."""
+    if not load.cover:
+        return (0.0,) * len(q)
+    return tuple((np.concatenate((load.force, load.moment)) @ body.cover_jacobian(q, load.cover)).tolist())
 
 
 def force_of(load: Load) -> float:
@@ -124,32 +101,28 @@ def spans(loads: Sequence[Load]) -> list[Span]:
 
 def score(played: Played, arm: Arm) -> ContactScore:
     """Score a scenario."""
-    group, moments, found = played.scenario.group, played.moments, spans(played.loads)
-    counted = [span for span in found if _counts(played, span)]
-    acting = [_between(moments, span.first, span.last) for span in counted]
-    excluded, period = len(found) - len(counted), moments[1].time - moments[0].time
+    moments, found = played.moments, spans(played.loads)
+    counted, period = [span for span in found if _counts(played, span)], moments[1].time - moments[0].time
     busy = np.zeros(len(moments), bool)
     for span in found:
-        busy |= _between(moments, span.first, span.last + round(EVALUATION.edge / period))
-    return ContactScore(
+        busy |= _during(moments, span, EVALUATION.edge)
+    return score_of(
+        arm,
+        moments,
+        [_contact(played, span) for span in counted],
+        [_during(moments, span) for span in counted],
+        busy,
         name=played.scenario.name,
-        group=group,
-        outcomes=[
-            outcome_of(_contact(played, span), moments, arm.covers.length_of(span.cover), acts)
-            for span, acts in zip(counted, acting, strict=True)
-        ],
-        free_seconds=period * int((~busy).sum()),
-        alarms=alarms(moments, busy),
+        group=played.scenario.group,
         torques=torque_errors(moments, _truth(played, period), _settled(moments, found), SLIDING),
-        excluded=excluded,
+        excluded=len(found) - len(counted),
         not_made=max(0, len(played.scenario.planned) - len(found)),
         failure=played.failure,
     )
 
 
-def _between(moments: Sequence[EstimatedMoment], first: int, last: int) -> Mask:
-    at = np.arange(len(moments))
-    return (at >= first) & (at <= last)
+def _during(moments: Sequence[EstimatedMoment], span: Span, after: float = 0.0) -> Mask:
+    return during(moments, moments[span.first].time, moments[span.last].time + after)
 
 
 def _counts(played: Played, span: Span) -> bool:
@@ -164,13 +137,10 @@ def _contact(played: Played, span: Span) -> TrueContact:
     planned = _planned(played.scenario.planned, begin)
     kind = planned.kind if planned else ""
     wait = EVALUATION.settled if played.scenario.group == "moving" else EVALUATION.settled_at_rest
-    wait = EVALUATION.settled_in_foam if kind == "foam" else wait
     due = max(i for i in range(span.first, span.last) if moments[i].time - begin <= wait + 1e-9)
     load = played.loads[due] if played.loads[due].cover else played.loads[due - 1]
     since, friction = moments[max(span.first - 1, 0)].time, planned.friction if planned else np.nan
-    return TrueContact(
-        kind, span.cover, friction, load.position, force_of(load), span.first, due, span.last, since, load.moment
-    )
+    return TrueContact(kind, span.cover, friction, load.position, force_of(load), span.first, due, span.last, since)
 
 
 def _planned(planned: Sequence[PlannedContact], time: float) -> PlannedContact | None:
