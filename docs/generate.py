@@ -272,7 +272,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
         "backdrivability": lambda: backdrivability.table(found_figures()["3.2.6"]),
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
-        "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},
         "claims, count": lambda: claims.count(claims.load(CLAIMS)),
         "claims, not shown": lambda: claims.not_shown(itertools.chain(*claims.load(CLAIMS).values())),

@@ -10,6 +10,6 @@ faults              broken messages, lost nodes, full disks, Ctrl-C, a long run,
 plant               the plant's effects, each measured alone and compared with theory
 force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
 stability           the stability guard validated by Monte Carlo simulation; the stability map of figure 5.8
-design_choices      4.4 and 5.7 with numbers: stiffness of the arm, less friction against more stiffness
+design_choices      4.4 with numbers: stiffness of the arm
 scorecard           the arm of a configuration compared with the requisites of chapter 3
 """

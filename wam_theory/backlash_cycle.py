@@ -1,4 +1,4 @@
-"""The limit cycle of a torque loop by backlash (2.2): a sensor behind a play, by describing function and exactly.
+"""The limit cycle of a torque loop by backlash (2.2): a sensor behind a play, exactly.
 
 A motor of inertia J and damping b turns a gear with play against a link at rest.  The sensor reads the torque
 tau of the flank; the loop answers it with -(G tau + G_I integral of tau + G_D d tau/dt).  Within the play it answers
@@ -9,7 +9,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wam_theory.arguments import Array
 from wam_theory.thresholds import SEARCH
@@ -54,35 +53,6 @@ class BacklashCycle(NamedTuple):
 NO_CYCLE = BacklashCycle(0.0, math.nan)
 
 
-def dead_zone_gain(amplitude: ArrayLike) -> Array:
-    """Describing function of a play, over the stiffness: 1 - 2/pi (asin r + r sqrt(1 - r^2)), r = 1/amplitude.
-
-    Parameters
-    ----------
-    amplitude : of the motor's angle over half of the play; up to 1 the gain is 0.
-    """
-    r = 1.0 / np.maximum(np.asarray(amplitude, dtype=float), 1.0)
-    return np.asarray(1.0 - 2.0 / math.pi * (np.arcsin(r) + r * np.sqrt(1.0 - r * r)))
-
-
-def predicted_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
-    """The cycle by the describing function: its gain is the critical one, omega^2 = N k (1 + G)/J.
-
-    Parameters
-    ----------
-    loop : gear, motor and gains.
-    """
-    n = loop.critical_gain
-    if not 0.0 < n < 1.0:
-        return NO_CYCLE
-    low, high = 1.0, 4.0 / (1.0 - n)  # 1 - N is below 4/(pi amplitude)
-    while high > (1.0 + 1e-12) * low:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if dead_zone_gain(middle) < n else (low, middle)
-    frequency = math.sqrt(n * loop.stiffness * (1.0 + loop.proportional) / loop.inertia)
-    return BacklashCycle(loop.stiffness * loop.play * (low - 1.0), frequency)
-
-
 def exact_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
     """The cycle by exact motion over play and flank in turn, until a half cycle repeats itself.
 
@@ -97,8 +67,9 @@ def exact_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
     """
     if not 0.0 < loop.critical_gain < 1.0:
         return NO_CYCLE
-    guess = predicted_cycle(loop)
-    speed, wound = guess.frequency * loop.play, 0.0  # rad/s at the flank; G_I integral of tau
+    n, proportional = loop.critical_gain, loop.proportional  # by the describing function omega^2 = N k (1 + G)/J
+    frequency = math.sqrt(n * loop.stiffness * (1.0 + proportional) / loop.inertia)
+    speed, wound = frequency * loop.play, 0.0  # rad/s at the flank; G_I integral of tau
     for _ in range(SEARCH.half_cycles):
         contact, most, back, wound_then = _flank(loop, speed, wound)
         crossing, reached = _play(loop, back, wound_then)

@@ -140,7 +140,7 @@ def efficiency(losses: ArrayLike) -> float:
 
 
 def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike) -> Array:
-    """Creep of the driven pulley under a torque, seen at the motor, rad, (6.19) corrected.
+    """Creep of the driven pulley under a torque, seen at the motor, rad, (6.19) corrected; never undone, (6.20).
 
     The integral of (T2 - T1)/EA over the absolute travel of the driving pulley: travel out and back under
     the same torque adds up.

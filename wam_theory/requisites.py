@@ -1,7 +1,7 @@
 """The requisites of chapter 3 for good force control, as formulas and as a scorecard."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -100,11 +100,6 @@ class Measures:
     cover_friction : coefficient of friction of the covers.
     efficiency : least limiting efficiency of a transmission at peak torque.
     efficiency_required : by the thesis.
-
-    Raises
-    ------
-    ValueError
-        if a value is not finite and above zero.
     """
 
     steady_force: float
@@ -127,14 +122,6 @@ class Measures:
     cover_friction: float
     efficiency: float
     efficiency_required: float
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = np.asarray(getattr(self, field.name))
-            least = "zero or more" if field.name == "cycle_force" else "above zero"
-            allowed = value >= 0.0 if field.name == "cycle_force" else value > 0.0
-            if not np.all(np.isfinite(value) & allowed):
-                raise ValueError(f"{field.name} is {getattr(self, field.name)!r}; it must be finite and {least}")
 
 
 class Requisite(NamedTuple):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.arguments import Array, above_zero
 
 Complex = NDArray[np.complex128]
 
@@ -53,7 +53,7 @@ def position_bandwidth(link_inertia: ArrayLike, transmission_stiffness: ArrayLik
     """Resonance of (4.2), rad/s: N sqrt(k_tr/J_l); with the reducer at the motor it is that of N = 1.
 
     A reducer at the joint gives N times the bandwidth for equal k_tr; for equal stress in the lines the factor
-    is smaller, `bandwidth_by_reducer_position`.
+    is the square root of the stiffnesses of `cable.stiffness_with_reducer`, sqrt(N).
 
     Parameters
     ----------
@@ -61,26 +61,6 @@ def position_bandwidth(link_inertia: ArrayLike, transmission_stiffness: ArrayLik
     """
     jl, ktr, n = above_zero(link_inertia=link_inertia, transmission_stiffness=transmission_stiffness, ratio=ratio)
     return n * np.sqrt(ktr / jl)
-
-
-def bandwidth_by_reducer_position(ratio: ArrayLike, length: ArrayLike, distance: ArrayLike) -> Array:
-    """Position bandwidth with the reducer part of the way over that with it at the motor, at constant stress.
-
-    Square root of the stiffnesses `cable.stiffness_with_reducer`: sqrt(N L/(N L + C (1 - N))), which is
-    sqrt(N) for a reducer at the joint; the factor N of section 4.2 assumes the same k_tr for both lines.
-    Not in print.
-
-    Parameters
-    ----------
-    ratio : N, above zero.
-    length : L of the line, m, above zero.
-    distance : C, of the reducer from the motor, m, 0 to L.
-    """
-    n, span = above_zero(ratio=ratio, length=length)
-    (c,) = zero_or_more(distance=distance)
-    if not np.all(c <= span):
-        raise ValueError(f"distance is {distance!r} m; it must not be above length, {length!r} m")
-    return np.sqrt(n * span / (n * span + c * (1.0 - n)))
 
 
 # ----------------------------------------------------------------------------------- force (4.3)
@@ -137,29 +117,6 @@ def force_resonances(
     c = ktr * kc / (jm * jl)
     root = np.sqrt(b * b - 4.0 * c)
     return Resonances(np.sqrt(2.0 * c / (b + root)), np.sqrt((b + root) / 2.0))
-
-
-def torque_amplification(
-    s: ArrayLike,
-    motor_inertia: ArrayLike,
-    link_inertia: ArrayLike,
-    transmission_stiffness: ArrayLike,
-    contact_stiffness: ArrayLike,
-    ratio: ArrayLike,
-) -> Array:
-    """Motor torque for a contact force over that at rest: N over the magnitude of (4.3), the cost of 4.1.1.
-
-    Below 1 near the two resonances, above the upper one it grows with the fourth power of the frequency.  No
-    feedback can do with less.  Not in print.
-
-    Parameters
-    ----------
-    s : complex frequency, rad/s.
-    motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio : as in `force_resonances`.
-    """
-    (n,) = above_zero(ratio=ratio)
-    transfer = force_transfer(s, motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
-    return np.asarray(n / np.abs(transfer))
 
 
 def soft_contact_bandwidth(

@@ -243,20 +243,6 @@ def staircase_number(
     return np.divide(moved, slipped, out=np.full(shape, math.inf), where=slipped > 0.0)
 
 
-def deadband_against_stiction(peak_to_peak: ArrayLike) -> Array:
-    """Least deadband at the input of G_I that ends the stiction cycle, N m: half of its size (5.8); not in print.
-
-    Section 5.7 requires one "large enough": the cycle is symmetric about F_des, so that both standstills lie
-    in the deadband if it is at least half of the peak to peak.
-
-    Parameters
-    ----------
-    peak_to_peak : of F_c, N m, zero or more.
-    """
-    (size,) = zero_or_more(peak_to_peak=peak_to_peak)
-    return size / 2.0
-
-
 def play(desired: ArrayLike, friction: ArrayLike) -> Array:
     """Contact force of open-loop force control along a path of F_des, N: friction as a deadband, section 5.2.
 

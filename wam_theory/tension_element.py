@@ -228,45 +228,11 @@ def driven_angle(
     ----------
     drive_angle : theta_a, rad.
     drive_radius, driven_radius : r_a, r_b, m, above zero.
-    creep : theta_b,error of `creep_along`, rad; zero for a rigid cable.
+    creep : theta_b,error of `cable.creep`, rad; zero for a rigid cable.
     """
     ra, rb = above_zero(drive_radius=drive_radius, driven_radius=driven_radius)
     angle, error = finite(drive_angle=drive_angle, creep=creep)
     return ra / rb * angle + error
-
-
-def creep_along(
-    drive_angles: ArrayLike,
-    driven_torque: ArrayLike,
-    drive_radius: ArrayLike,
-    driven_radius: ArrayLike,
-    ea: ArrayLike,
-) -> Array:
-    """Creep of the driven pulley along a path of the drive, rad, (6.19) corrected; never undone, (6.20).
-
-    Integral of sgn(tau_b) (T2 - T1)/EA r_a/r_b |d theta_a|, T2 - T1 = |tau_b|/r_b; the print has the
-    signed d theta_a, for which its example of a radian out and back has no error.  Under a torque of one
-    sign the error grows without bound.  First order of the strain; `cable.creep` is the same for one
-    travel, seen at the motor.
-
-    Parameters
-    ----------
-    drive_angles : (n,), theta_a along the path, rad, n at least 1.
-    driven_torque : (n,) or one, tau_b of the environment on the driven pulley, N m, linear in between.
-    drive_radius, driven_radius : r_a, r_b, m, above zero; numbers.
-    ea : E A, N, above zero; a number.
-
-    Returns
-    -------
-    (n,), theta_b,error at each angle, 0 at the first.
-    """
-    angles, torques = np.broadcast_arrays(*finite(drive_angles=drive_angles, driven_torque=driven_torque))
-    if angles.ndim != 1 or angles.size == 0:
-        raise ValueError(f"drive_angles has shape {angles.shape}; it must be (n,), n at least 1")
-    ra, rb, k = above_zero(drive_radius=drive_radius, driven_radius=driven_radius, ea=ea)
-    rate = torques * ra / (rb * rb * k)
-    steps = np.abs(np.diff(angles)) * (rate[1:] + rate[:-1]) / 2.0
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def coulomb_like_torque(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike) -> Array:

@@ -1,11 +1,11 @@
-"""The limit cycle of backlash in a torque loop: by Fourier's integral, and by small steps in time."""
+"""The limit cycle of backlash in a torque loop, against small steps in time."""
 
 import math
 
 import numpy as np
 import pytest
 
-from wam_theory.backlash_cycle import GearedTorqueLoop, dead_zone_gain, exact_cycle, predicted_cycle
+from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
 
 
 def loop(critical: float, damping: float = 0.0) -> GearedTorqueLoop:
@@ -39,16 +39,6 @@ def stepped(case: GearedTorqueLoop, cycles: float) -> tuple[float, float]:
     return 2.0 * torque(float(np.abs(late).max())), 2.0 * math.pi / (float(np.diff(rises).mean()) * h)
 
 
-@pytest.mark.parametrize("amplitude", [1.0, 1.1, 2.0, 10.0])
-def test_gain_of_a_play_is_its_first_harmonic(amplitude: float) -> None:
-    angle = (np.arange(100_000) + 0.5) / 100_000 * 2.0 * math.pi
-    x = amplitude * np.sin(angle)
-    through = np.sign(x) * np.maximum(np.abs(x) - 1.0, 0.0)
-    assert float(dead_zone_gain(amplitude)) == pytest.approx(
-        2.0 * np.mean(through * np.sin(angle)) / amplitude, abs=1e-8
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("critical", "damping"), [(0.4, 0.0), (0.7, 0.1)])
 def test_exact_cycle_is_that_of_small_steps_in_time(critical: float, damping: float) -> None:
@@ -58,14 +48,8 @@ def test_exact_cycle_is_that_of_small_steps_in_time(critical: float, damping: fl
     assert found.frequency == pytest.approx(frequency, rel=2e-3)
 
 
-@pytest.mark.slow
-def test_describing_function_is_the_nearer_the_less_of_a_cycle_is_within_the_play() -> None:
-    errors = [predicted_cycle(loop(n)).frequency / exact_cycle(loop(n)).frequency - 1.0 for n in (0.2, 0.5, 0.8)]
-    assert errors[0] > 0.2 > errors[1] > 0.03 > errors[2] > 0.0
-
-
 def test_there_is_no_cycle_where_damping_suffices_without_the_derivative_or_no_play_is_needed() -> None:
     for critical in (-0.1, 1.1):
         case = loop(critical, 0.2)
         assert case.critical_gain == pytest.approx(critical)
-        assert predicted_cycle(case).torque == exact_cycle(case).torque == 0.0
+        assert exact_cycle(case).torque == 0.0

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from wam_control.force.thresholds import GUARD
 from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
-from wam_theory.stiction import deadband_against_stiction, stiction_cycle_force, stiction_cycle_period
+from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
 
 class Domain(StrEnum):
@@ -98,7 +98,7 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
     zeta = damping_ratio(node.inertia, node.damping, *stiffness)
     size = float(stiction_cycle_force(*stiffness, *friction, zeta))
     period = float(stiction_cycle_period(gain, *stiffness, *friction, zeta))
-    return PredictedCycle(size, period, float(deadband_against_stiction(size)))
+    return PredictedCycle(size, period, size / 2.0)
 
 
 class StableErrors(NamedTuple):

@@ -107,7 +107,7 @@ def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: 
     busy = np.zeros(len(moments), bool)
     for touch in touches:
         busy |= during(moments, touch.begin, touch.end + (REPLAY.setting_down if touch.mass else EVALUATION.edge))
-    free = ~busy & during(moments, REPLAY.observer + 1e-12, np.inf) & np.array([one.is_moving for one in moments])
+    free = ~busy & during(moments, REPLAY.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
     warned = [one.estimate.warning is not None for one, take in zip(moments, ~busy, strict=True) if take]
     truth = np.zeros((len(moments), len(arm.joints.names)))
     return score_of(

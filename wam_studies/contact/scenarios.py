@@ -142,7 +142,6 @@ class ScenarioGenerator:
 
     def _moving(self, i: int) -> BenchmarkScenario:
         random = self._random(0, i)
-        random.random()
         start = self._moves.pose(random)
         moves = self._moves.moves(random, start, 2)
         steps, planned = _opening(), []

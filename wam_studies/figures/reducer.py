@@ -18,7 +18,7 @@ from wam_studies.plant.ideal_testbed import (
     released_plant,
 )
 from wam_theory.cable import stiffness_with_reducer
-from wam_theory.resonance import bandwidth_by_reducer_position, position_bandwidth, torque_amplification
+from wam_theory.resonance import force_transfer, position_bandwidth
 
 HZ = 0.5 / np.pi
 
@@ -103,7 +103,7 @@ def _bandwidth() -> Panel:
     ratios, some = np.geomspace(1.0, 40.0, 60), np.array([1.5, 4.0, 10.0, 30.0])
     arm = line_of(RATIO, 1.0)
     at_joint = position_bandwidth(link_inertia(arm), arm.circuits[0].stiffness, ratios)
-    at_motor = at_joint / bandwidth_by_reducer_position(ratios, 1.0, 1.0)
+    at_motor = at_joint / np.sqrt(ratios)  # lines of the same stress: (4.1) for C = L over C = 0
     measured = [np.array([link_frequency(line_of(n, share)) for n in some.tolist()]) for share in (1.0, 0.0)]
     lines = (
         ("at the joint, $N\\sqrt{k_{tr}/J_l}$", Series(ratios, HZ * at_joint, some, HZ * measured[0])),
@@ -119,7 +119,7 @@ def _torque() -> Panel:
         arm = line_of(RATIO, 1.0, None, thinner)
         own = (arm.motors.inertia[0], link_inertia(arm), arm.circuits[0].stiffness, CASE.contact, RATIO)
         frequency = 2.0 * np.pi * np.linspace(0.5, 60.0, 400)
-        line = torque_amplification(1j * frequency, *own)
+        line = RATIO / np.abs(force_transfer(1j * frequency, *own))
         measured = RATIO / force_amplitude(arm, some)
         lines.append((label, Series(HZ * frequency, line, HZ * some, measured)))
     return Panel(
