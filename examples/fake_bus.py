@@ -1,5 +1,6 @@
 """A motor bus that is none: what `bus_driver.py` needs of yours, `wam_driver.bus.bus_driver_node.Hardware`."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 
@@ -12,6 +13,7 @@ class FakeBus:
     is_running : whether they are known.
     advice : what a person has to do before the motors may be released, '' where nothing.
     fault : why they were braked, '' where there is no reason.
+    counts : of errors that are no fault, for the diagnostics.
     """
 
     INERTIA, DAMPING = 2e-3, 0.02  # kg m^2, N m s/rad
@@ -21,6 +23,7 @@ class FakeBus:
         self._torque_constant, self._peak, self._period = torque_constant, peak, period
         self.position, self.velocity, self.current = ([0.0] * len(torque_constant) for _ in range(3))
         self._is_released = False
+        self.counts = Counter[str]()
 
     def exchange(self, periods: int) -> None:
         """Take the state of the motors; here they also move, by some periods."""
@@ -46,10 +49,10 @@ class FakeBus:
 
     stop = brake
 
-    def go_on(self) -> None:
-        """Start what has to be started."""
+    def clear(self) -> None:
+        """Forget a fault."""
 
-    clear = close = go_on
+    close = clear
 
     def confirm_home(self) -> bool:
         """These motors know their angles."""

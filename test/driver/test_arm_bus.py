@@ -5,16 +5,16 @@ import random
 from collections.abc import Callable
 from functools import cache
 
+import can
 import pytest
 
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.bus import frames
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_fault import BusFault
 from wam_driver.bus.frames import Frame
-from wam_driver.bus.line import LineError
+from wam_driver.bus.line import CanLine, Line, LineError, ServedArm
 from wam_driver.bus.safety_module import Button
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.bus.start_up import Wait
@@ -33,17 +33,43 @@ def loaded(name: str) -> tuple[Shared, Plant]:
     return shared, Plant(shared.arm, own.world, own.effects, shared.timing.substep, own.friction)
 
 
+class Served(CanLine):
+    """A line of python-can, with the arm at its other end; both are in bus time."""
+
+    def __init__(self, bus: SimulatedBus, interface: str, channel: str) -> None:
+        own, other = (can.Bus(interface=interface, channel=channel) for _ in range(2))
+        echoes = 64 * (interface == "udp_multicast")
+        super().__init__(own, bus.now, bus.sleep, echoes)
+        self._arm = ServedArm(CanLine(other, lambda: 0.0, bus.sleep, echoes), bus)
+        self.let_pass, self._end = bus.let_pass, other
+
+    def send(self, frame: Frame) -> None:
+        super().send(frame)
+        self._arm.answer(0.1)
+
+    def receive(self, timeout: float) -> Frame | None:
+        frame = super().receive(0.01)  # by the kernel
+        if frame is None:
+            self.sleep(timeout)
+        return frame
+
+
 class Rig:
     """An arm, its simulated bus and the driver; the arm is carried by the torques of its links."""
 
-    def __init__(self, name: str = "barrett-wam4", version: int = NEW, is_homed: bool = True) -> None:
+    def __init__(
+        self,
+        name: str = "barrett-wam4",
+        version: int = NEW,
+        is_homed: bool = True,
+        via: Callable[[SimulatedBus], Line] = lambda bus: bus,
+    ) -> None:
         self.shared, self.plant = loaded(name)
         self.plant.reset()
         arm = self.shared.arm
         self.bus = SimulatedBus(arm, self.plant, self.shared.timing.substep, version, is_homed)
-        home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        self.arm = ArmBus(self.bus, arm.motors.torque_constant, home, PERIOD)
-        self.currents = [0.1 + 0.05 * at for at in range(len(home))]
+        self.arm = ArmBus(via(self.bus), arm, PERIOD)
+        self.currents = [0.1 + 0.05 * at for at in range(len(arm.motors.names))]
 
     def wake(self) -> None:
         for node in range(1, 1 + len(self.currents)):
@@ -53,7 +79,7 @@ class Rig:
         """Until it runs or there is a fault; what was waited for."""
         waits, end = [], self.bus.now() + most
         while not self.arm.is_running and self.arm.trouble is None and self.bus.now() < end:
-            self.arm.go_on()
+            self.arm.exchange()
             if self.arm.wait not in waits[-1:]:
                 waits.append(self.arm.wait)
         return waits
@@ -96,6 +122,19 @@ def test_the_arm_starts_wakes_and_follows_torques_with_any_firmware(name: str, v
     rig.run(0.1)
     assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
     assert not any(rig.arm.current)
+
+
+@pytest.mark.parametrize(
+    ("interface", "channel"), [("virtual", "served"), ("udp_multicast", "239.74.163.47")], ids=["virtual", "multicast"]
+)
+def test_the_arm_is_reached_over_a_bus_of_python_can(interface: str, channel: str) -> None:
+    rig = Rig(via=lambda bus: Served(bus, interface, channel))
+    rig.enable()
+    rig.run(0.05)
+    rig.arm.close()
+    assert rig.arm.trouble is None
+    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.2)
+    assert rig.arm.counts["lost replies"] == rig.arm.counts["other frames"] == 0
 
 
 def test_velocities_are_those_of_the_motors() -> None:
@@ -192,7 +231,7 @@ def jumping(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
     def pass_on(frame: Frame) -> list[Frame]:
         found = frames.read(frame)
         if isinstance(found, frames.Position) and found.node == chosen:
-            return [frames.position(chosen, found.motor + 5000)]
+            return [frames.position(chosen, found.counts + 5000)]
         return [frame]
 
     return pass_on
@@ -305,7 +344,7 @@ def test_an_arm_that_is_not_right_is_refused_by_name(kind: str, seed: int) -> No
     inject(rig, random.Random(seed))
     rig.start()
     assert rig.arm.trouble is not None
-    assert rig.arm.trouble.fault is fault, rig.arm.trouble.text
+    assert rig.arm.trouble.fault is fault, rig.arm.fault
     rig.arm.release()
     rig.step()
     assert not any(rig.bus.commanded)
@@ -325,11 +364,11 @@ def test_a_fault_of_the_bus_is_named_and_ends_the_torque(kind: str, seed: int) -
         rig.step()
         last = rig.bus.now() if any(rig.bus.commanded) else last
     assert rig.arm.trouble is not None
-    assert rig.arm.trouble.fault is fault, rig.arm.trouble.text
+    assert rig.arm.trouble.fault is fault, rig.arm.fault
     assert last - begun <= STOP
     assert not any(rig.arm.current)
     if "limit" in kind:
-        assert f"fault of the {kind.split()[0]}" in rig.arm.trouble.text
+        assert f"fault of the {kind.split()[0]}" in rig.arm.fault
 
 
 def test_an_adapter_that_takes_nothing_more_is_stopped_by_the_heartbeat() -> None:

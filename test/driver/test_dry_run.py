@@ -11,7 +11,7 @@ from wam_driver.bus import frames
 from wam_driver.bus.dry_run import heard, in_words, sent
 from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
 from wam_driver.bus.interface import BusParameters
-from wam_driver.bus.lines import line_of
+from wam_driver.bus.line import line_of
 
 BUS4 = Configuration.load(packaged("barrett-wam4-bus"))
 

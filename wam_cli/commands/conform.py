@@ -5,13 +5,15 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import get_context
 
 from wam_cli.options import COUNT, bounded, configuration_of, take_configuration, take_stack
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.interface import BusParameters
-from wam_driver.bus.lines import line_of
+from wam_driver.bus.line import ServedArm, line_of
+from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
@@ -30,6 +32,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL",
         help="bus of a configuration for a real arm: can0, or INTERFACE:CHANNEL of python-can; simulated:200 is a "
         "simulated one with firmware 200",
+    )
+    parser.add_argument(
+        "--arm",
+        type=COUNT,
+        metavar="VERSION",
+        help="put a simulated arm with this firmware on that bus, as udp_multicast:239.74.163.2, in its own process",
     )
     parser.add_argument(
         "--dry-run",
@@ -78,8 +86,15 @@ def run(given: argparse.Namespace) -> int:
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
     with connected(given.namespace, configuration, given.share, given.current) as bench:
+        arm = (
+            get_context("spawn").Process(target=_serve, args=(configuration, given.arm), daemon=True)
+            if given.arm
+            else None
+        )
         driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
         try:
+            if given.arm:
+                arm.start()
             if driver:
                 bench.end, bench.restart = driver.stop, driver.start
             for row in Conformance(bench, given.attempts).rows():
@@ -89,8 +104,19 @@ def run(given: argparse.Namespace) -> int:
         finally:
             if driver:
                 driver.close()
+            if given.arm:
+                arm.terminate()
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)
+
+
+def _serve(configuration: Configuration, version: int) -> None:
+    """Be the arm on the bus of a configuration."""
+    own = configuration.node("driver", BusParameters)
+    line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
+    arm = ServedArm(line, SimulatedBus.of(configuration.shared, own, version))
+    while True:
+        arm.answer(configuration.shared.timing.substep)
 
 
 def _listen(configuration: Configuration, seconds: float) -> int:

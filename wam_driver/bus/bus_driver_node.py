@@ -1,6 +1,7 @@
 """Node `driver` of a real arm: the contract of docs/driver.md around a motor bus."""
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -12,10 +13,10 @@ from wam_description.event import Event, fault
 from wam_description.interface import declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Answer, State
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.lines import SIMULATED, line_of
+from wam_driver.bus.interface import SIMULATED
+from wam_driver.bus.line import line_of
 from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 
@@ -29,6 +30,7 @@ class Hardware(Protocol):
     is_running : whether they are known.
     advice : what a person has to do before the motors may be released, '' where nothing.
     fault : why they were braked, '' where there is no reason.
+    counts : of errors that are no fault, for the diagnostics.
     """
 
     position: list[float]
@@ -41,12 +43,11 @@ class Hardware(Protocol):
     def advice(self) -> str: ...  # noqa: D102 - an attribute
     @property
     def fault(self) -> str: ...  # noqa: D102 - an attribute
-
-    def go_on(self) -> None:
-        """Take a step of the start, until `is_running`."""
+    @property
+    def counts(self) -> Counter[str]: ...  # noqa: D102 - an attribute
 
     def exchange(self, periods: int) -> None:
-        """Take the state, some periods after the last one."""
+        """Take the state, some periods after the last one; until `is_running` a step of the start."""
 
     def command(self, currents: Sequence[float]) -> None:
         """Send currents, A, at once; nothing unless released."""
@@ -84,9 +85,9 @@ class BusDriver(ArmDriver):
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
         self._watchdog, self._constant = self.own.watchdog, self.shared.arm.motors.torque_constant
         self.hardware, self.safety = self.make_hardware(self.shared, self.own), Safety()
+        self._take_advice()
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
-        self._advice: str | None = None  # as it was printed last
         self.serve("confirm_home", Trigger, lambda _: self._confirm_home())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(self.shared.timing.period, self._run, clock=steady)
@@ -94,12 +95,9 @@ class BusDriver(ArmDriver):
 
     def make_hardware(self, shared: Shared, own: Any) -> Hardware:
         """The motors: those of the production WAM on its bus."""
-        arm, timing = shared.arm, shared.timing
-        home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        line = line_of(shared, own, time.perf_counter, time.sleep)
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
-        return ArmBus(line, arm.motors.torque_constant, home, timing.period)
+        return ArmBus(line_of(shared, own, time.perf_counter, time.sleep), shared.arm, shared.timing.period)
 
     @property
     def stamp(self) -> int:
@@ -110,16 +108,6 @@ class BusDriver(ArmDriver):
         """Whether the motors are not known yet."""
         return not self.hardware.is_running
 
-    @property
-    def unready(self) -> str:  # type: ignore[override]
-        """What a person has to do before the motors may be released, '' where nothing."""
-        return self.hardware.advice
-
-    @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The same."""
-        return (self.unready,) if self.unready else ()
-
     def _run(self) -> None:
         hardware, timing = self.hardware, self.shared.timing
         due = int((time.perf_counter() - self._begin) / timing.period) + 1 - self._tick
@@ -127,21 +115,23 @@ class BusDriver(ArmDriver):
             return
         self._tick += due
         self.health.counts["late periods"] += due - 1
+        age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
+        if self.safety.mode is Mode.ENABLED and age > self._watchdog:
+            cure = f"{due - 1} periods missed, check that velocity_loop runs"
+            self.trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
+        hardware.exchange(due)
         if hardware.is_running:
-            age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
-            if self.safety.mode is Mode.ENABLED and age > self._watchdog:
-                cure = f"{due - 1} periods missed, check that velocity_loop runs"
-                self.trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
-            hardware.exchange(due)
             self._publish(due)
-        else:
-            hardware.go_on()
         if hardware.fault:
             self.trip(fault("hardware", reason=hardware.fault))
-        if (advice := hardware.advice) != self._advice and self.safety.mode is not Mode.FAULT:
-            self._advice = advice
-            self.get_logger().info(advice or "the arm may be enabled")
+        self._take_advice()
         self.announce()
+
+    def _take_advice(self) -> None:
+        advice = self.hardware.advice
+        if advice != self.unready:
+            self.get_logger().info(advice or "the arm may be enabled")
+        self.unready, self.warnings = advice, (advice,) if advice else ()
 
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
@@ -155,6 +145,7 @@ class BusDriver(ArmDriver):
                 publish("/clock", stamp, None)
                 publish("motor_currents", stamp, State([], [], hardware.current))
         self.health.counts["steps"] += 1
+        self.health.counts |= hardware.counts
         self.diagnostics.report(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:

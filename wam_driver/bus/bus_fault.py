@@ -1,7 +1,6 @@
 """What is wrong on the bus, as data, and its sentence."""
 
 from enum import Enum
-from typing import NamedTuple
 
 
 class BusFault(Enum):
@@ -42,22 +41,9 @@ class BusFault(Enum):
         return self not in kept
 
 
-class Trouble(NamedTuple):
-    """A fault, of which node it is, and a detail."""
-
-    fault: BusFault
-    node: int = 0
-    detail: str = ""
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        return f"bus: {self.fault.value.format(node=self.node, detail=self.detail)}"
-
-
-class StartError(Exception):
-    """The start of the arm is refused."""
+class Trouble(Exception):
+    """A fault, of which node it is, and a detail; its text is for people."""
 
     def __init__(self, fault: BusFault, node: int = 0, detail: object = "") -> None:
-        self.trouble = Trouble(fault, node, str(detail))
-        super().__init__(self.trouble.text)
+        self.fault = fault
+        super().__init__(f"bus: {fault.value.format(node=node, detail=detail)}")

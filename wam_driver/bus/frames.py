@@ -68,11 +68,10 @@ class Value(NamedTuple):
 
 
 class Position(NamedTuple):
-    """Motor encoder of a controller, counts, and its joint encoder where there is one."""
+    """Motor encoder of a controller."""
 
     node: int
-    motor: int
-    joint: int | None
+    counts: int
 
 
 def get(receiver: int, number: int, group: int = 0) -> Frame:
@@ -83,6 +82,11 @@ def get(receiver: int, number: int, group: int = 0) -> Frame:
 def put(receiver: int, number: int, value: int, group: int = 0) -> Frame:
     """Write a property of a node, signed 32 bits; nobody acknowledges it."""
     return Frame(group | receiver, bytes([Bit.WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
+
+
+def written(frame: Frame) -> int:
+    """The value of `put`, or of a reply."""
+    return int.from_bytes(frame.data[2:], "little", signed=True)
 
 
 def reply(node: int, number: int, value: int) -> Frame:
@@ -105,22 +109,19 @@ def read_torques(frame: Frame) -> list[int]:
     return [_signed(packed >> shift, 14) for shift in (42, 28, 14, 0)]
 
 
-def position(node: int, motor: int, joint: int | None = None) -> Frame:
+def position(node: int, counts: int) -> Frame:
     """The answer of a controller to `get` of its position."""
-    counts = [motor] if joint is None else [motor, joint]
-    data = b"".join((count & 0x3FFFFF).to_bytes(3, "big") for count in counts)
-    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, data)
+    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, (counts & 0x3FFFFF).to_bytes(3, "big"))
 
 
 def read(frame: Frame) -> Value | Position | None:
     """What a node has answered; None for any other frame."""
     data, size = frame.data, len(frame.data)
     to = frame.identifier & RECEIVER
-    if to == POSITION_REPLY and size in (3, 6):
-        counts = [_signed(int.from_bytes(data[at : at + 3], "big"), 22) for at in range(0, size, 3)]
-        return Position(frame.sender, counts[0], counts[1] if size > 3 else None)
-    if to == VALUE_REPLY and size in (4, 6) and data[0] & 0x80:
-        return Value(frame.sender, data[0] & 0x7F, int.from_bytes(data[2:], "little", signed=True))
+    if to == POSITION_REPLY and size in (3, 6):  # with a joint encoder, which comes second
+        return Position(frame.sender, _signed(int.from_bytes(data[:3], "big"), 22))
+    if to == VALUE_REPLY and size in (4, 6) and data[0] & Bit.WRITE:
+        return Value(frame.sender, data[0] & ~Bit.WRITE, written(frame))
     return None
 
 

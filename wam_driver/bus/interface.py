@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from wam_description.parameters import parameter
 from wam_driver.driver import DriverParameters
 
+SIMULATED = "simulated"
+
 
 @dataclass(frozen=True)
 class BusParameters(DriverParameters):

@@ -1,35 +1,19 @@
-"""The line to the bus: what the driver needs of python-can, or of the simulated bus, and of a clock."""
+"""The line to the bus: one of python-can and a clock, or the simulated one."""
 
+from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
+from wam_description.arm import Shared
+from wam_description.parameters import ParameterError
 from wam_driver.bus.frames import Frame
+from wam_driver.bus.interface import SIMULATED, BusParameters
+from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.thresholds import BUS
 
 
 class LineError(Exception):
     """A frame was not sent, or the adapter reports an error of the bus."""
-
-
-class Line(Protocol):
-    """A bus and its clock."""
-
-    def now(self) -> float:
-        """Steady time, s."""
-
-    def sleep(self, seconds: float) -> None:
-        """Wait."""
-
-    def let_pass(self, seconds: float, late: float) -> None:
-        """A period of the host has passed, s: a simulated bus goes on to its end, and forgives the late part."""
-
-    def send(self, frame: Frame) -> None:
-        """Send a frame; LineError where it was not."""
-
-    def receive(self, timeout: float) -> Frame | None:
-        """The next frame of another node, None where none comes in time; LineError at an error of the bus."""
-
-    def close(self) -> None:
-        """End the connection."""
 
 
 class CanLine:
@@ -39,36 +23,80 @@ class CanLine:
     ----------
     bus : `can.Bus` of any interface.
     now, sleep : the steady clock, s.
+    echoes : how many of its newest own frames it looks for, where the interface gives them back; they are dropped.
     """
 
-    def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None]) -> None:
+    def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], echoes: int = 0) -> None:
         import can
 
-        self._bus, self._message, self._error = bus, can.Message, can.CanError
-        self.now, self.sleep = now, sleep
+        self._bus, self._message, self._errors = bus, can.Message, (can.CanError, OSError)
+        self._echoes = deque[Frame](maxlen=echoes)
+        self.now, self.sleep, self.close = now, sleep, bus.shutdown
 
-    def let_pass(self, seconds: float, late: float) -> None:
-        """Nothing: real time passes by itself."""
+    def let_pass(self, seconds: float) -> None:
+        """A period of the host has passed, s: real time passes by itself."""
 
     def send(self, frame: Frame) -> None:
-        """Send a frame without waiting for a place in the queue."""
+        """Send a frame without waiting for a place in the queue; LineError where it was not."""
         try:
             self._bus.send(self._message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False), 0.0)
-        except (self._error, OSError) as error:
+        except self._errors as error:
             raise LineError(str(error)) from error
+        self._echoes.append(frame)
 
     def receive(self, timeout: float) -> Frame | None:
-        """The next frame."""
+        """The next frame of another node, None where none comes in time, s; LineError at an error of the bus."""
         try:
             message = self._bus.recv(timeout)
-        except (self._error, OSError) as error:
+        except self._errors as error:
             raise LineError(str(error)) from error
         if message is None:
             return None
         if message.is_error_frame:
             raise LineError("error frame")
-        return Frame(message.arbitration_id, bytes(message.data))
+        frame = Frame(message.arbitration_id, bytes(message.data))
+        if frame not in self._echoes:
+            return frame
+        self._echoes.remove(frame)
+        return self.receive(timeout)
 
-    def close(self) -> None:
-        """End the connection."""
-        self._bus.shutdown()
+
+Line = CanLine | SimulatedBus
+
+
+def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep: Callable[[float], None]) -> Line:
+    """The line to the bus of a driver; a real one uses the clock, s, and waits.
+
+    Raises
+    ------
+    ParameterError
+        where python-can is not installed, or cannot open the bus.
+    """
+    if own.interface == SIMULATED:
+        return SimulatedBus.of(shared, own, int(own.channel))
+    try:
+        import can
+
+        bus = can.Bus(interface=own.interface, channel=own.channel or None)
+    except ImportError as error:
+        raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
+    except (can.CanError, OSError, ValueError) as error:
+        raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
+    return CanLine(bus, now, sleep, BUS.echoes if own.interface == "udp_multicast" else 0)
+
+
+class ServedArm:
+    """A simulated arm that answers on a line, as that to `virtual` or `udp_multicast`, in the time of the line."""
+
+    def __init__(self, line: Line, arm: SimulatedBus) -> None:
+        self._line, self._arm, self._passed = line, arm, line.now()
+
+    def answer(self, timeout: float) -> None:
+        """Answer the next frame, if one comes in time, s."""
+        frame, now = self._line.receive(timeout), self._line.now()
+        self._arm.let_pass(now - self._passed)
+        self._passed = now
+        if frame is not None:
+            self._arm.send(frame)
+        while (found := self._arm.receive(0.0)) is not None:
+            self._line.send(found)

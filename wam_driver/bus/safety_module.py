@@ -7,10 +7,9 @@ WATCHED: Final = ("velocity", "torque", "voltage", "heartbeat", "other")  # thre
 
 
 class Lamp(IntEnum):
-    """Of a watched quantity, one of three bits."""
+    """Of a watched quantity, one of three bits; 2 is a warning."""
 
     SAFE = 1
-    WARNING = 2
     FAULT = 4
 
 
@@ -37,25 +36,20 @@ class Pendant(NamedTuple):
     Attributes
     ----------
     button : that is pressed.
-    warnings, faults : watched quantities whose lamp shows that.
+    faults : watched quantities whose lamp shows a fault.
     """
 
     button: Button
-    warnings: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, value: int) -> "Pendant":
         """From the property PEN."""
-        lamps = {name: value >> 3 * at & 7 for at, name in enumerate(WATCHED)}
-        lit = [tuple(name for name, lamp in lamps.items() if lamp & bit) for bit in (Lamp.WARNING, Lamp.FAULT)]
-        return cls(Button(value >> 26 & 3), *lit)
+        lit = tuple(name for at, name in enumerate(WATCHED) if value >> 3 * at & Lamp.FAULT)
+        return cls(Button(value >> 26 & 3), lit)
 
     @property
     def value(self) -> int:
-        """As the property PEN, without the segments and the lamps of the buttons."""
-        value = int(self.button) << 26
-        for at, name in enumerate(WATCHED):
-            lamp = Lamp.FAULT if name in self.faults else Lamp.WARNING if name in self.warnings else Lamp.SAFE
-            value |= lamp << 3 * at
-        return value
+        """As the property PEN, without segments, warnings and the lamps of the buttons."""
+        lamps = (Lamp.FAULT if name in self.faults else Lamp.SAFE for name in WATCHED)
+        return int(self.button) << 26 | sum(lamp << 3 * at for at, lamp in enumerate(lamps))

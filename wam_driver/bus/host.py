@@ -1,0 +1,85 @@
+"""The computer on the bus: it sends and receives frames, and asks nodes for their properties."""
+
+from collections import Counter
+
+from wam_driver.bus import frames, properties
+from wam_driver.bus.bus_fault import BusFault, Trouble
+from wam_driver.bus.frames import BusNode, Frame
+from wam_driver.bus.line import Line, LineError
+from wam_driver.thresholds import BUS
+
+
+class Host:
+    """One end of a line.
+
+    Attributes
+    ----------
+    versions : of the firmware, by node, of those that are known.
+    refused : frames in a row that the adapter has not taken.
+    counts : errors, lost replies and other things that are no fault if they are rare.
+    """
+
+    def __init__(self, line: Line) -> None:
+        self.line, self.now, self.sleep = line, line.now, line.sleep
+        self.versions: dict[int, int] = {}
+        self.refused = 0
+        self.counts: Counter[str] = Counter()
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame."""
+        try:
+            self.line.send(frame)
+            self.refused = 0
+        except LineError:
+            self.refused += 1
+            self.counts["frames not sent"] += 1
+
+    def receive(self, timeout: float) -> Frame | None:
+        """The next frame; None where none comes in time, s, or the adapter reports an error."""
+        try:
+            return self.line.receive(timeout)
+        except LineError:
+            self.counts["bus errors"] += 1
+            return None
+
+    def number(self, node: int, name: str) -> int:
+        """Number of a property of a node.
+
+        Raises
+        ------
+        Trouble
+            where its firmware has none.
+        """
+        try:
+            return properties.number(name, self.versions.get(node, 0), node == BusNode.SAFETY_MODULE)
+        except KeyError as error:
+            raise Trouble(BusFault.FIRMWARE, node, error.args[0]) from error
+
+    def ask(self, node: int, name: str, attempts: int = BUS.attempts) -> int | None:
+        """A property of a node, of the position its counts; None where it does not answer."""
+        number = self.number(node, name)
+        for _ in range(attempts):
+            self.send(frames.get(node, number))
+            end = self.now() + BUS.reply
+            while (left := end - self.now()) > 0.0 and (frame := self.receive(left)) is not None:
+                found = frames.read(frame)
+                if found and found[:-1] == ((node,) if name == "P" else (node, number)):
+                    return found[-1]
+        return None
+
+    def demand(self, node: int, name: str) -> int:
+        """A property of a node that has to answer.
+
+        Raises
+        ------
+        Trouble
+            where it does not.
+        """
+        found = self.ask(node, name)
+        if found is None:
+            raise Trouble(BusFault.NO_SAFETY_MODULE if node == BusNode.SAFETY_MODULE else BusFault.MISSING, node)
+        return found
+
+    def write(self, node: int, name: str, value: int) -> None:
+        """Write a property of a node."""
+        self.send(frames.put(node, self.number(node, name), value))
