@@ -76,8 +76,8 @@ class Cycle:
         for motor in motors:
             motor.missed += 1
         requested, patience = host.now(), BUS.collect * self._period
-        for _ in range(BUS.most_frames):
-            if not any(motor.missed for motor in motors):
+        for taken in range(BUS.most_frames):
+            if taken >= len(motors) and not any(motor.missed for motor in motors):
                 return
             frame = host.receive(patience)
             if frame is None:
@@ -95,8 +95,6 @@ class Cycle:
             self._host.send(request)
 
     def _take(self, frame: Frame, requested: float) -> None:
-        if frame.sender == BusNode.HOST:
-            self._stray(BusFault.FOREIGN)
         match frames.read(frame):
             case Position(node, count) if node <= len(self.motors):
                 if self.motors[node - 1].missed:
@@ -113,6 +111,8 @@ class Cycle:
                 self._take_mode(node, mode)
             case None:
                 self._host.counts["other frames"] += 1
+                if frame.sender == BusNode.HOST:
+                    self._stray(BusFault.FOREIGN)
 
     def _take_safety_mode(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
