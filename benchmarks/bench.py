@@ -127,6 +127,7 @@ BENCHMARKS = {
     "speed": "stack:SPEED",
     "round_trip": "stack:ROUND_TRIP",
     "real_time": "stack:REAL_TIME",
+    "bus": "bus:BUS",
     "plant": "simulation:PLANT",
     "compiled": "simulation:COMPILED",
     "parts": "cost:PARTS",

@@ -14,7 +14,7 @@ from wam_driver.bus import frames
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_fault import BusFault
 from wam_driver.bus.frames import Frame
-from wam_driver.bus.line import CanLine, Line, LineError, ServedArm
+from wam_driver.bus.line import CanLine, Line, ServedArm
 from wam_driver.bus.safety_module import Button
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.bus.start_up import Wait
@@ -43,9 +43,10 @@ class Served(CanLine):
         self._arm = ServedArm(CanLine(other, lambda: 0.0, bus.sleep, echoes), bus)
         self.let_pass, self._end = bus.let_pass, other
 
-    def send(self, frame: Frame) -> None:
-        super().send(frame)
+    def send(self, frame: Frame) -> bool:
+        is_taken = super().send(frame)
         self._arm.answer(0.1)
+        return is_taken
 
     def receive(self, timeout: float) -> Frame | None:
         frame = super().receive(0.01)  # by the kernel
@@ -247,10 +248,8 @@ def refused(seconds: float) -> Inject:
     def inject(rig: Rig, draw: random.Random) -> None:
         end = rig.bus.now() + seconds
 
-        def refuse(frame: Frame) -> list[Frame]:
-            if not frame.sender and rig.bus.now() < end:
-                raise LineError("no buffer space available")
-            return [frame]
+        def refuse(frame: Frame) -> list[Frame] | None:
+            return None if not frame.sender and rig.bus.now() < end else [frame]
 
         rig.bus.on_line = refuse
 
@@ -315,6 +314,7 @@ AT_START: dict[str, tuple[Inject, BusFault]] = {
     "no torque": (setting("MT", 0), BusFault.LIMIT),
     "wrong index": (setting("PIDX", 9), BusFault.INDEX),
     "wrong group": (setting("GRPC", 5), BusFault.INDEX),
+    "full queue at the start": (refused(math.inf), BusFault.NOT_SENT),
 }  # fmt: skip
 RUNNING: dict[str, tuple[Inject, BusFault]] = {
     "silent controller": (on_line(silent_motor), BusFault.NO_REPLY),

@@ -1,13 +1,12 @@
-"""The line over python-can: frames arrive as they were sent, and errors of the adapter are named."""
+"""The line over python-can: frames arrive as they were sent, and errors of the adapter are counted."""
 
 import random
 
 import can
-import pytest
 
 from wam_driver.bus import frames
 from wam_driver.bus.frames import Frame
-from wam_driver.bus.line import CanLine, LineError
+from wam_driver.bus.line import CanLine
 
 
 def lines(channel: str) -> tuple[CanLine, CanLine]:
@@ -32,8 +31,8 @@ def test_frames_arrive_as_they_were_sent() -> None:
 def test_an_error_frame_is_no_frame() -> None:
     host, node = lines("errors")
     host._bus.send(can.Message(is_error_frame=True))
-    with pytest.raises(LineError):
-        node.receive(0.0)
+    assert node.receive(0.0) is None
+    assert node.counts["bus errors"] == 1
     host.close()
     node.close()
 
@@ -42,7 +41,6 @@ def test_a_bus_that_is_closed_refuses_frames() -> None:
     host, node = lines("closed")
     host.close()
     node.close()
-    with pytest.raises(LineError):
-        host.send(frames.get(1, 5))
-    with pytest.raises(LineError):
-        host.receive(0.0)
+    assert not host.send(frames.get(1, 5))
+    assert host.receive(0.0) is None
+    assert host.counts["bus errors"] == 1

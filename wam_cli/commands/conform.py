@@ -36,6 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--arm",
         type=COUNT,
+        default=0,
         metavar="VERSION",
         help="put a simulated arm with this firmware on that bus, as udp_multicast:239.74.163.2, in its own process",
     )
@@ -85,16 +86,12 @@ def run(given: argparse.Namespace) -> int:
     print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
-    with connected(given.namespace, configuration, given.share, given.current) as bench:
-        arm = (
-            get_context("spawn").Process(target=_serve, args=(configuration, given.arm), daemon=True)
-            if given.arm
-            else None
-        )
+    with (
+        connected(given.namespace, configuration, given.share, given.current) as bench,
+        served(configuration, given.arm),
+    ):
         driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
         try:
-            if given.arm:
-                arm.start()
             if driver:
                 bench.end, bench.restart = driver.stop, driver.start
             for row in Conformance(bench, given.attempts).rows():
@@ -104,10 +101,21 @@ def run(given: argparse.Namespace) -> int:
         finally:
             if driver:
                 driver.close()
-            if given.arm:
-                arm.terminate()
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return int(counts[WRONG] > 0)
+
+
+@contextmanager
+def served(configuration: Configuration, version: int) -> Iterator[None]:
+    """A simulated arm on the bus of a configuration, in a process of its own; none where the version is 0."""
+    arm = get_context("spawn").Process(target=_serve, args=(configuration, version), daemon=True)
+    if version:
+        arm.start()
+    try:
+        yield
+    finally:
+        if version:
+            arm.terminate()
 
 
 def _serve(configuration: Configuration, version: int) -> None:

@@ -73,8 +73,7 @@ class ArmBus:
             self.wait = next(self._steps)
         except StopIteration as end:
             settings, self.wait = end.value, Wait.ACTIVATE
-            self._per_ampere = [gain * k for gain, k in zip(settings.gain, self._constant, strict=True)]
-            self._cycle = Cycle(self._host, settings, self._period)
+            self._cycle = Cycle(self._host, settings, self._constant, self._period)
         except Trouble as trouble:
             self.trouble = trouble
         if refused := self._host.refused:
@@ -100,8 +99,7 @@ class ArmBus:
     def command(self, currents: Sequence[float]) -> None:
         """Send torques at once, A each, clipped; nothing unless the motors are released."""
         if self._cycle is not None and self._cycle.is_released:
-            sent = self._cycle.command([i * each for i, each in zip(currents, self._per_ampere, strict=True)])
-            self.current = [count / each for count, each in zip(sent, self._per_ampere, strict=True)]
+            self.current = self._cycle.command(currents)
 
     @property
     def advice(self) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from wam_driver.bus import frames
 from wam_driver.bus.bus_fault import BusFault, Trouble
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Position, Value
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Value
 from wam_driver.bus.host import Host
 from wam_driver.bus.motor_track import MotorTrack
 from wam_driver.bus.safety_module import Pendant, SafetyMode
@@ -20,6 +20,7 @@ class Cycle:
     ----------
     host : on the bus.
     settings : of the arm.
+    torque_constant : N m/A, (n,).
     period : s.
 
     Attributes
@@ -30,12 +31,14 @@ class Cycle:
     trouble : the first fault; it brakes.
     """
 
-    def __init__(self, host: Host, settings: Settings, period: float) -> None:
+    def __init__(self, host: Host, settings: Settings, torque_constant: Sequence[float], period: float) -> None:
         self._host, self._limit, self._period = host, settings.limit, period
+        self._gain = [gain * k for gain, k in zip(settings.gain, torque_constant, strict=True)]  # counts/A
         self.motors = [MotorTrack(counts) for counts in settings.counts]
         self.safety_mode = SafetyMode.IDLE
         self.trouble: Trouble | None = None
         self._strays: Counter[BusFault] = Counter()
+        self._awaited: set[int] = set()  # motors whose position has not come in this period
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
         self._torque, self._mode = host.number(1, "T"), host.number(1, "MODE")
         self._requests = [  # the pendant first: it states why the mode changes
@@ -49,7 +52,7 @@ class Cycle:
     def set_released(self, is_released: bool) -> None:
         """Let the controllers follow their torques, which are zero first, or idle."""
         self.is_released = is_released
-        self.command([0] * len(self.motors))
+        self.command([0.0] * len(self.motors))
         mode = BUS.torque_mode if is_released else BUS.idle_mode
         self._host.send(frames.put(BusGroup.MOTORS, self._mode, mode, Bit.GROUP))
 
@@ -60,30 +63,29 @@ class Cycle:
         if is_settable and self.safety_mode is SafetyMode.ACTIVE:
             self._host.send(frames.put(BusNode.SAFETY_MODULE, self._mode, SafetyMode.IDLE))
 
-    def command(self, wanted: Sequence[float]) -> list[int]:
-        """Send torques in counts, (n,), clipped; what was sent."""
-        sent = [max(-most, min(most, round(one))) for one, most in zip(wanted, self._limit, strict=True)]
-        for group, start in zip((BusGroup.ARM, BusGroup.WRIST), range(0, len(sent), 4), strict=False):
-            self._host.send(frames.torques(group, self._torque, sent[start : start + 4]))
-        return sent
+    def command(self, currents: Sequence[float]) -> list[float]:
+        """Send torques by currents, A, (n,), clipped; what was sent."""
+        limited = zip(currents, self._gain, self._limit, strict=True)
+        counts = [max(-most, min(most, round(i * gain))) for i, gain, most in limited]
+        self._host.send(frames.torques(BusGroup.ARM, self._torque, counts[:4]))
+        if len(counts) > 4:
+            self._host.send(frames.torques(BusGroup.WRIST, self._torque, counts[4:]))
+        return [count / gain for count, gain in zip(counts, self._gain, strict=True)]
 
     def exchange(self) -> None:
         """Ask for positions and, from time to time, modes; take what comes."""
-        host, motors = self._host, self.motors
+        host = self._host
         if host.now() >= self._poll_at:
             self._poll()
         host.send(self._requests[-1])
-        for motor in motors:
-            motor.missed += 1
         requested, patience = host.now(), BUS.collect * self._period
-        for taken in range(BUS.most_frames):
-            if taken >= len(motors) and not any(motor.missed for motor in motors):
-                return
-            frame = host.receive(patience)
-            if frame is None:
+        self._awaited = set(range(1, len(self.motors) + 1))
+        for _ in range(BUS.most_frames):
+            if not self._awaited or (frame := host.receive(patience)) is None:
                 break
             self._take(frame, requested)
-        self._judge()
+        if self._awaited:
+            self._judge()
 
     def _poll(self) -> None:
         """Ask for the modes; that there was no answer to the last requests is a fault."""
@@ -95,24 +97,26 @@ class Cycle:
             self._host.send(request)
 
     def _take(self, frame: Frame, requested: float) -> None:
-        match frames.read(frame):
-            case Position(node, count) if node <= len(self.motors):
-                if self.motors[node - 1].missed:
-                    self.motors[node - 1].take(count, requested)
-                else:
-                    self._stray(BusFault.DOUBLED, node)
-            case Value(BusNode.SAFETY_MODULE, number, value):
-                self._is_answered = True
-                if number != self._mode:
-                    self._pendant = value
-                elif 0 <= value <= SafetyMode.ACTIVE:
-                    self._take_safety_mode(SafetyMode(value))
-            case Value(node, self._mode, mode) if node <= len(self.motors):
-                self._take_mode(node, mode)
-            case None:
-                self._host.counts["other frames"] += 1
-                if frame.sender == BusNode.HOST:
-                    self._stray(BusFault.FOREIGN)
+        found = frames.read(frame)
+        if found is None:
+            self._host.counts["other frames"] += 1
+            if frame.sender == BusNode.HOST:
+                self._stray(BusFault.FOREIGN)
+        elif found.node == BusNode.SAFETY_MODULE:
+            self._is_answered = True
+            if found[1] != self._mode:
+                self._pendant = found[-1]
+            elif 0 <= found[-1] <= SafetyMode.ACTIVE:
+                self._take_safety_mode(SafetyMode(found[-1]))
+        elif found.node > len(self.motors):
+            self._host.counts["other frames"] += 1
+        elif isinstance(found, Value):
+            if found.number == self._mode:
+                self._take_mode(found.node, found.value)
+        elif found.node not in self._awaited:
+            self._stray(BusFault.DOUBLED, found.node)
+        elif self.motors[found.node - 1].take(found.counts, requested):
+            self._awaited.remove(found.node)
 
     def _take_safety_mode(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
@@ -127,9 +131,10 @@ class Cycle:
 
     def _judge(self) -> None:
         """Look for motors whose positions have not come for too long."""
-        lost = [node for node, motor in enumerate(self.motors, 1) if motor.missed]
-        self._host.counts["lost replies"] += len(lost)
-        silent = [node for node in lost if self.motors[node - 1].missed * self._period >= BUS.silent]
+        self._host.counts["lost replies"] += len(self._awaited)
+        for node in self._awaited:
+            self.motors[node - 1].missed += 1
+        silent = [node for node in self._awaited if self.motors[node - 1].missed * self._period >= BUS.silent]
         if not silent or self.trouble:
             return
         if self._host.refused:

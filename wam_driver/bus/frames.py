@@ -45,12 +45,12 @@ class Frame(NamedTuple):
 
     @property
     def sender(self) -> int:
-        """BusNode that sends it, 0 is the host."""
+        """Node that sends it, 0 is the host."""
         return self.identifier >> 5 & 31
 
     @property
     def receiver(self) -> int:
-        """BusNode or, with the group bit, group that takes it."""
+        """Node or, with the group bit, group that takes it."""
         return self.identifier & 31
 
     @property
@@ -96,11 +96,10 @@ def reply(node: int, number: int, value: int) -> Frame:
 
 def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
     """Torques of up to four controllers in counts of 14 bits; `number` of the property T."""
-    packed = 0
-    for count in counts:
+    packed = Bit.WRITE | number
+    for count in (*counts, 0, 0, 0)[:4]:
         packed = packed << 14 | count & 0x3FFF
-    packed <<= 14 * (4 - len(counts))
-    return Frame(Bit.GROUP | group, bytes([Bit.WRITE | number]) + packed.to_bytes(7, "big"))
+    return Frame(Bit.GROUP | group, packed.to_bytes(8, "big"))
 
 
 def read_torques(frame: Frame) -> list[int]:
@@ -116,11 +115,11 @@ def position(node: int, counts: int) -> Frame:
 
 def read(frame: Frame) -> Value | Position | None:
     """What a node has answered; None for any other frame."""
-    data, size = frame.data, len(frame.data)
-    to = frame.identifier & RECEIVER
-    if to == POSITION_REPLY and size in (3, 6):  # with a joint encoder, which comes second
-        return Position(frame.sender, _signed(int.from_bytes(data[:3], "big"), 22))
-    if to == VALUE_REPLY and size in (4, 6) and data[0] & Bit.WRITE:
+    identifier, data = frame
+    to = identifier & RECEIVER
+    if to == POSITION_REPLY and len(data) in (3, 6):  # with a joint encoder, which comes second
+        return Position(identifier >> 5 & 31, _signed(int.from_bytes(data[:3], "big"), 22))
+    if to == VALUE_REPLY and len(data) in (4, 6) and data[0] & Bit.WRITE:
         return Value(frame.sender, data[0] & ~Bit.WRITE, written(frame))
     return None
 

@@ -1,11 +1,9 @@
 """The computer on the bus: it sends and receives frames, and asks nodes for their properties."""
 
-from collections import Counter
-
 from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.frames import BusNode, Frame
-from wam_driver.bus.line import Line, LineError
+from wam_driver.bus.line import Line
 from wam_driver.thresholds import BUS
 
 
@@ -20,27 +18,18 @@ class Host:
     """
 
     def __init__(self, line: Line) -> None:
-        self.line, self.now, self.sleep = line, line.now, line.sleep
+        self.line, self.now, self.sleep, self.receive = line, line.now, line.sleep, line.receive
         self.versions: dict[int, int] = {}
         self.refused = 0
-        self.counts: Counter[str] = Counter()
+        self.counts = line.counts
 
     def send(self, frame: Frame) -> None:
         """Send a frame."""
-        try:
-            self.line.send(frame)
+        if self.line.send(frame):
             self.refused = 0
-        except LineError:
+        else:
             self.refused += 1
             self.counts["frames not sent"] += 1
-
-    def receive(self, timeout: float) -> Frame | None:
-        """The next frame; None where none comes in time, s, or the adapter reports an error."""
-        try:
-            return self.line.receive(timeout)
-        except LineError:
-            self.counts["bus errors"] += 1
-            return None
 
     def number(self, node: int, name: str) -> int:
         """Number of a property of a node.

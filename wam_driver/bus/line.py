@@ -1,6 +1,6 @@
 """The line to the bus: one of python-can and a clock, or the simulated one."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -12,10 +12,6 @@ from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 
 
-class LineError(Exception):
-    """A frame was not sent, or the adapter reports an error of the bus."""
-
-
 class CanLine:
     """A bus of python-can.
 
@@ -24,6 +20,10 @@ class CanLine:
     bus : `can.Bus` of any interface.
     now, sleep : the steady clock, s.
     echoes : how many of its newest own frames it looks for, where the interface gives them back; they are dropped.
+
+    Attributes
+    ----------
+    counts : of errors.
     """
 
     def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], echoes: int = 0) -> None:
@@ -32,28 +32,32 @@ class CanLine:
         self._bus, self._message, self._errors = bus, can.Message, (can.CanError, OSError)
         self._echoes = deque[Frame](maxlen=echoes)
         self.now, self.sleep, self.close = now, sleep, bus.shutdown
+        self.counts: Counter[str] = Counter()
 
     def let_pass(self, seconds: float) -> None:
         """A period of the host has passed, s: real time passes by itself."""
 
-    def send(self, frame: Frame) -> None:
-        """Send a frame without waiting for a place in the queue; LineError where it was not."""
+    def send(self, frame: Frame) -> bool:
+        """Send a frame without waiting for a place in the queue; whether the adapter took it."""
         try:
             self._bus.send(self._message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False), 0.0)
-        except self._errors as error:
-            raise LineError(str(error)) from error
+        except self._errors:
+            return False
         self._echoes.append(frame)
+        return True
 
     def receive(self, timeout: float) -> Frame | None:
-        """The next frame of another node, None where none comes in time, s; LineError at an error of the bus."""
+        """The next frame of another node; None where none comes in time, s, or at an error of the bus."""
         try:
             message = self._bus.recv(timeout)
-        except self._errors as error:
-            raise LineError(str(error)) from error
+        except self._errors:
+            self.counts["bus errors"] += 1
+            return None
         if message is None:
             return None
         if message.is_error_frame:
-            raise LineError("error frame")
+            self.counts["bus errors"] += 1
+            return None
         frame = Frame(message.arbitration_id, bytes(message.data))
         if frame not in self._echoes:
             return frame

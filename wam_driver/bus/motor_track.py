@@ -15,7 +15,7 @@ class MotorTrack:
     Attributes
     ----------
     position, velocity : rad, rad/s.
-    missed : periods since the last position that was taken.
+    missed : periods since the last position, as the cycle counts them.
     has_jumped : whether one was dropped since then.
     """
 
@@ -25,14 +25,15 @@ class MotorTrack:
         self._step = math.tau / counts
         self._time = math.nan  # s, of the last position
 
-    def take(self, count: int, time: float) -> None:
+    def take(self, count: int, time: float) -> bool:
         """Take a position of a time, s, unless the motor cannot be there."""
         position = count * self._step
         moved, dt = position - self.position, time - self._time
         if dt > 0.0:
             if abs(moved) > BUS.jump * math.tau:
                 self.has_jumped = True
-                return
+                return False
             self.velocity = moved / dt
         self.position, self._time = position, time
         self.missed, self.has_jumped = 0, False
+        return True

@@ -4,7 +4,7 @@ Bus time passes with the bits of each frame, with waiting, and to the next perio
 """
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 
 from wam_description.arm import Arm, Shared
@@ -88,7 +88,8 @@ class SimulatedBus:
     ----------
     controllers : by node, to be changed by tests.
     is_attended : whether a person presses Idle and Activate where that is wanted.
-    on_line : what becomes of each frame, for tests: lost, doubled, another one.
+    on_line : what becomes of each frame, for tests: lost, doubled, another one; None: the adapter refuses it.
+    counts : of errors.
     time : bus time, ns.
     """
 
@@ -103,7 +104,8 @@ class SimulatedBus:
         self.controllers = {one.node: one for one in (*self._motors, self._safety)}
         self._position_request = frames.get(BusGroup.MOTORS, properties.number("P", version), Bit.GROUP)
         self._show(Pendant(Button.NONE))
-        self.on_line: Callable[[Frame], list[Frame]] = lambda frame: [frame]
+        self.on_line: Callable[[Frame], list[Frame] | None] = lambda frame: [frame]
+        self.counts: Counter[str] = Counter()
         self._queue: deque[Frame] = deque()
         self.time = self._reached = self._requested = self._pressed = self._passed = 0
 
@@ -162,10 +164,12 @@ class SimulatedBus:
         self.sleep(timeout)
         return None
 
-    def send(self, frame: Frame) -> None:
-        """Give a frame to the nodes, and keep their answers."""
-        for passed in self.on_line(frame):
-            self._deliver(passed)
+    def send(self, frame: Frame) -> bool:
+        """Give a frame to the nodes, and keep their answers; whether it was taken."""
+        passed = self.on_line(frame)
+        for one in passed or ():
+            self._deliver(one)
+        return passed is not None
 
     def _deliver(self, frame: Frame) -> None:
         self._spend(frame)
@@ -176,7 +180,7 @@ class SimulatedBus:
             is_on = (one is self._safety or mode != SafetyMode.ESTOP) and self.time >= one.deaf_until
             if is_on and one.is_addressed(frame) and (answer := one.take(frame, self.time)):
                 self._spend(answer)
-                self._queue += self.on_line(answer)
+                self._queue += self.on_line(answer) or ()
         wanted, self._safety.values["MODE"] = self._safety.values["MODE"], mode
         if wanted < mode and self._safety.values["VERS"] >= BUS.settable_version:  # only a person goes upwards
             self._set_mode(SafetyMode(wanted))
@@ -242,17 +246,17 @@ class SimulatedBus:
 
     def _watch(self) -> None:
         values = self._safety.values
-        is_asked = self.time - self._requested <= nanoseconds(BUS.heartbeat)
+        is_requested = self.time - self._requested <= nanoseconds(BUS.heartbeat)
         if values["MODE"] == SafetyMode.ACTIVE:
             speeds = self._body.start_and_tool_speeds(self._plant.q, self._plant.qd)
             if max(abs(one.values["T"]) for one in self._motors) > values["TL2"]:
                 self._fault("torque", SafetyMode.IDLE)
             elif 0 < values["VL2"] < max(speeds) * 4096:
                 self._fault("velocity", SafetyMode.IDLE)
-            elif not is_asked:
+            elif not is_requested:
                 self._fault("heartbeat", SafetyMode.ESTOP)
         elif self.is_attended and self.time - self._pressed > nanoseconds(BUS.attention):
             if values["MODE"] == SafetyMode.ESTOP or Pendant.of(values["PEN"]).faults:
                 self.press(Button.IDLE)
-            elif values["ZERO"] and is_asked:
+            elif values["ZERO"] and is_requested:
                 self.press(Button.ACTIVATE)

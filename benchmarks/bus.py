@@ -1,0 +1,158 @@
+"""The driver of a real arm on its bus: its cost next to python-can alone, and its late cycles."""
+
+import time
+from itertools import count
+from statistics import median
+
+import can
+from bench import Benchmark, Measured, Row
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from wam_cli.commands.conform import driver_alone, on_bus
+from wam_description.configuration import Configuration, packaged
+from wam_driver.bus import frames, properties
+from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
+from wam_driver.bus.interface import BusParameters
+from wam_driver.bus.line import CanLine, Line
+from wam_driver.bus.safety_module import SafetyMode
+from wam_driver.bus.simulator import SimulatedBus
+from wam_ros.bring_up import NodeProcess
+from wam_ros.run import Connection
+
+CONFIGURATION = on_bus(Configuration.load(packaged("barrett-wam4-bus")), "simulated:200")
+FIRMWARE, PERIOD, POLL = 200, CONFIGURATION.shared.timing.period, 10  # of these periods one requests the modes
+SENDER = 0x3E0  # of an identifier; 0 is the host
+QUEUE, BARE_QUEUE = "driver on virtual", "python-can on virtual"
+SOCKETS, BARE_SOCKETS = "driver on udp_multicast", "python-can on udp_multicast"
+LATE = "late cycles at 500 Hz [%]"
+
+
+class Switched:
+    """A line that is that of the simulated arm for the start, and then one of python-can."""
+
+    def __init__(self, line: SimulatedBus) -> None:
+        self._line: Line = line
+        self.sleep, self.counts, self.close = line.sleep, line.counts, line.close
+
+    def use(self, line: Line) -> None:
+        """Send and receive on another line."""
+        self._line = line
+
+    def now(self) -> float:
+        """Its clock, s."""
+        return self._line.now()
+
+    def let_pass(self, seconds: float) -> None:
+        """Only the clock passes."""
+
+    def send(self, frame: Frame) -> bool:
+        """Whether the frame was sent."""
+        return self._line.send(frame)
+
+    def receive(self, timeout: float) -> Frame | None:
+        """The next frame."""
+        return self._line.receive(timeout)
+
+
+def message(frame: Frame) -> can.Message:
+    """As python-can has it."""
+    return can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
+
+
+def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
+    """Processor time of a cycle of four controllers, us, and of the bare loop; their answers are sent before."""
+    host, arm = (can.Bus(interface=interface, channel=channel) for _ in range(2))
+    numbers = {name: properties.number(name, FIRMWARE) for name in ("P", "T", "MODE")}
+    positions = [message(frames.position(node, 1000 * node)) for node in range(1, 5)]
+    modes = [message(frames.reply(BusNode.SAFETY_MODULE, numbers["MODE"], SafetyMode.ACTIVE))]
+    modes += [message(frames.reply(node, numbers["MODE"], 2)) for node in range(1, 5)]
+    modes.append(message(frames.reply(BusNode.SAFETY_MODULE, properties.number("PEN", FIRMWARE, True), 3 << 26)))
+    request = frames.get(BusGroup.MOTORS, numbers["P"], Bit.GROUP)
+    torques = frames.torques(BusGroup.ARM, numbers["T"], [100, -100, 100, -100])
+    questions = [frames.get(node, numbers["MODE"]) for node in range(3)]
+
+    def bare(tick: int) -> None:
+        is_polled = tick % POLL == 0
+        for frame in [*questions * is_polled, request]:
+            host.send(message(frame), 0.0)
+        missing = len(positions) + len(modes) * is_polled
+        while missing:
+            found = host.recv(0.01)
+            missing -= bool(found and found.arbitration_id & SENDER)  # not an echo
+        host.send(message(torques), 0.0)
+
+    line = Switched(SimulatedBus.of(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE))
+    driver = ArmBus(line, CONFIGURATION.shared.arm, PERIOD)  # type: ignore[arg-type]
+    while not driver.is_running:
+        driver.exchange()
+    clock = count(line.now() + PERIOD, PERIOD)
+    at = [next(clock)]
+    line.use(CanLine(host, lambda: at[0], time.sleep, 64 * (interface == "udp_multicast")))
+
+    def driven(tick: int) -> None:
+        driver.exchange()
+        driver.command([0.1, -0.1, 0.1, -0.1])
+
+    loops, spent = (driven, bare), ([], [])
+    driver.release()
+    for _ in range(chunks):
+        for loop, times in zip(loops, spent, strict=True):
+            times.append(0)
+            for tick in range(POLL):
+                at[0] = next(clock)
+                for one in [*modes * (tick == 0), *positions]:
+                    arm.send(one)
+                begin = time.thread_time_ns()
+                loop(tick)
+                times[-1] += time.thread_time_ns() - begin
+                while arm.recv(0.0) or (loop is bare and host.recv(0.0)):
+                    pass
+    if driver.fault:
+        raise SystemExit(driver.fault)
+    host.shutdown()
+    arm.shutdown()
+    return median(spent[0]) / POLL / 1e3, median(spent[1]) / POLL / 1e3
+
+
+def late(seconds: float) -> float:
+    """Periods of 2 ms that the node of the driver leaves out, in percent, with the simulated arm in its process."""
+    configuration = driver_alone(CONFIGURATION)
+    reports: list[tuple[float, float]] = []
+
+    def take(report: DiagnosticArray) -> None:
+        facts = {pair.key: pair.value for pair in report.status[0].values}
+        if "late periods" in facts and "steps" in facts:
+            reports.append((float(facts["late periods"]), float(facts["steps"])))
+
+    connection = Connection()
+    listener = Node("listener", context=connection.context)
+    connection.add(listener)
+    listener.create_subscription(DiagnosticArray, "/diagnostics", take, 10)
+    driver = NodeProcess(configuration, configuration.shared.nodes[0], "wam")
+    try:
+        while len(reports) < seconds + 2.0:  # the first two are those of the start
+            connection.executor.spin_once(timeout_sec=0.1)
+    finally:
+        driver.close()
+        connection.close()
+    (missed, steps), (all_missed, all_steps) = reports[1], reports[-1]
+    return 100.0 * (all_missed - missed) / (all_missed - missed + all_steps - steps)
+
+
+def bus(quick: bool) -> Measured:
+    """A cycle of the driver and the bare loop, on a queue and on sockets; and the late cycles of its node."""
+    chunks = 20 if quick else 200
+    while True:
+        queue, sockets = cost(chunks, "virtual", "cost"), cost(chunks, "udp_multicast", "239.74.163.48")
+        found = dict(zip((QUEUE, BARE_QUEUE, SOCKETS, BARE_SOCKETS), (*queue, *sockets), strict=True))
+        yield {**found, LATE: late(2.0 if quick else 10.0)}
+
+
+BUS = Benchmark(
+    bus,
+    "a cycle of a real arm's driver [us]",
+    (Row(QUEUE, BARE_QUEUE, 2.0, 1.5), Row(SOCKETS, BARE_SOCKETS, 2.0, 1.5), Row(LATE, "", 1.0, 0.3)),
+    rounds=5,
+)
