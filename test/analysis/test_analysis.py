@@ -22,7 +22,7 @@ from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import largest_force, node_at
 from wam_analysis.findings.tabulated import MARK, tabulated
-from wam_analysis.findings.text import SCHEMA, document, json_text, text
+from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
 from wam_analysis.table import bounded
@@ -415,16 +415,6 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
             angles = [math.sin(0.02 * i), 0.1]
             writer.write(connection, stamp, joint_state(stamp, ["elbow", "wrist"], angles, [0.0, 0.0], []))
     return path
-
-
-@pytest.mark.slow
-def test_a_foreign_bag_of_joint_states_is_told_as_far_as_it_goes(foreign: Path) -> None:
-    found = analyse(foreign, lambda doing: None)
-    said = text(found)
-    assert "/robot/joint_states: 400 messages of the joints elbow, wrist" in " ".join(said.split())
-    assert "elbow stood" in said or "elbow" in said
-    assert page(found).count('<figure class="chart"') == len(list(charts(found)))
-    assert document(found)["duration"] == pytest.approx(3.99)
 
 
 # the ways out

@@ -1,14 +1,10 @@
 """The analysis functions on signals of known answer, with seeded noise: within 2 %."""
 
 import math
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from wam_analysis.findings.transmission import _friction_of_joints
-from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
@@ -577,38 +573,3 @@ def test_a_shaft_whose_encoder_counts_in_a_rest_is_not_at_rest() -> None:
     creeping = velocity == 0.0
     velocity[creeping & (np.arange(len(time)) % 5 == 0)] = 4.0
     assert identify_friction(time, velocity, torque, rest=0.05, window=0.03).breakaways == 0
-
-
-def signals_of(time: np.ndarray, **given: np.ndarray | str) -> TransmissionSignals:
-    """Signals of an arm with one motor and one joint; what is not given is zero."""
-    zero, every = np.zeros((len(time), 1)), np.ones(len(time), dtype=np.bool_)
-    names = ("angle", "velocity", "torque", "load", "joint_velocity", "cable_torque", "strain")
-    rest: dict[str, Any] = {**dict.fromkeys(names, zero), "use": every, "sampled": every, "load_from": CABLE}
-    return TransmissionSignals(time=time, caveats=(), **{**rest, **given})
-
-
-ONE_JOINT: Any = SimpleNamespace(motors=SimpleNamespace(names=("motor1",)), joints=SimpleNamespace(names=("joint1",)))
-SMOOTH: Any = SimpleNamespace(commutation=(), effects=None)
-
-
-def every_fifth(values: np.ndarray) -> np.ndarray:
-    rows = np.arange(len(values))
-    return np.interp(rows, rows[::5], values[::5])[:, np.newaxis]
-
-
-def test_friction_of_a_joint_is_not_that_of_a_torque_between_its_samples() -> None:
-    """The strain gauges read at 1 kHz what swings in the cables, which are recorded at 200 Hz."""
-    time = np.arange(12_000) / 1e3
-    swing = np.sin(2.0 * math.pi * 25.0 * time)
-    velocity = 0.6 * np.sin(1.1 * time) + 0.1 * np.sin(4.3 * time) + 0.05 * swing
-    free = 0.45 * np.sign(velocity) + 0.05 * velocity
-    signals = signals_of(
-        time,
-        sampled=np.arange(len(time)) % 5 == 0,
-        joint_velocity=velocity[:, np.newaxis],
-        strain=2.0 * swing[:, np.newaxis],
-        cable_torque=every_fifth(2.0 * swing + free),
-    )
-    found = _friction_of_joints(signals, ONE_JOINT)["joint1"]
-    assert found.dynamic == PRECISE(0.45, rel=0.002)
-    assert found.viscous == PRECISE(0.05, rel=0.02)

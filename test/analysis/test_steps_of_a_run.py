@@ -29,7 +29,7 @@ from wam_analysis.findings.plots import arm_plot
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.recorded import RecordedArm, recorded_arm
-from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.task.scenario import load as load_steps
@@ -752,41 +752,6 @@ def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
     assert any(line.startswith("move: reported (at_limit) from 1.20 to 1.70 s") for line in force.sentences)
 
 
-def test_failed_scenario_says_why_and_ends_its_last_step():
-    recording = Recording()
-    recording.statuses = [*recording.statuses[:3], ("step 'lower': no contact estimated", START + 4900 * MS, 2)]
-    summary = recording.summary()
-    assert [step.name for step in summary.steps] == ["push outer", "push inner", "lower"]
-    assert summary.steps[-1].end == START + 4900 * MS
-    assert "Wrong: Step 'lower': no contact estimated." in told(recording.bag())
-
-
-def test_signal_that_stops_is_unknown_after_a_while():
-    recording = Recording()
-    bag = recording.bag()
-    estimated = bag.topics["/wam/contact/wrench"]
-    assert isinstance(estimated, WrenchColumns)
-    cut = WrenchColumns(*(column[:1500] for column in estimated))  # at 7.5 s
-    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": cut}))
-    first, second = (held.estimated_accuracy for held in summary.held)
-    assert (first.bias, math.isnan(second.bias)) == (pytest.approx(-0.16), True)
-
-
-def test_of_several_arms_one_is_chosen_and_the_others_are_named():
-    recording, other = Recording(), Recording()
-    recording.namespace, other.namespace = "/left", "/right"
-    other.set(other.true, 7.0, 9.0, "outer_link", (0.0, 5.0, 0.0), 0.25)
-    bag = recording.bag()
-    bag = bag._replace(topics=other.bag().topics | bag.topics, types=other.bag().types | bag.types)
-    assert summary_of(recorded_run(bag)).held[1].true_accuracy.bias == pytest.approx(0.2)
-    chosen = summary_of(recorded_run(bag, "right"))
-    assert (chosen.namespace, chosen.held[1].true_accuracy.bias) == ("/right", pytest.approx(1.0))
-    verdict_of = analysed(bag, "right").sections[0]
-    assert "This is /right alone; other arms in this bag: --namespace left." in verdict_of.sentences[1]
-    with pytest.raises(BagError, match="has no arm in the namespace /middle; its arms: /left, /right"):
-        recorded_run(bag, "middle")
-
-
 def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
     recording = Recording()
     recording.recording = {"mode": "lockstep"}
@@ -857,40 +822,12 @@ def test_the_report_of_a_run_that_failed_ends_with_exit_code_1(tmp_path, capsys,
     assert [one.partition(failure)[:2] for one in analyse_steps(bag).unmet] == [("FAILED: ", failure)] * bool(failure)
 
 
-def test_report_reads_a_bag_from_disk_and_leaves_it_as_it_is(tmp_path):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
-    kind = "diagnostic_msgs/msg/DiagnosticStatus"
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = [writer.add_connection(f"/wam/{name}", kind, typestore=store) for name in ("status", "other")]
-        for stamp, said in ((1, "release the brakes"), (2, "done")):
-            facts = {"stamp": str(stamp * 10**9), **({} if said == "done" else {"step": said})}
-            values = [kinds["KeyValue"](key, value) for key, value in facts.items()]
-            message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
-            for connection in connections:
-                writer.write(connection, stamp, store.serialize_cdr(message, kind))
-    before = sorted((tmp_path / "bag").iterdir())
-    assert analyse_steps(tmp_path / "bag").sections[0].sentences[0].endswith("1 step, done.")
-    assert sorted((tmp_path / "bag").iterdir()) == before
-    assert list(read(tmp_path / "bag", OF_STEPS, may_lack=True).topics) == ["/wam/status"]
-
-
-def test_a_recording_of_something_else_is_refused_and_nothing_is_written_into_it(tmp_path, capsys):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    kind = "std_msgs/msg/String"
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/chat", kind, typestore=store)
-        writer.write(connection, 1, store.serialize_cdr(store.types[kind]("hello"), kind))
-    before = sorted((tmp_path / "bag").iterdir())
+def test_a_recording_without_a_step_is_refused_with_what_analyses_it(tmp_path, capsys):
+    bag = with_outcome(tmp_path / "bag", ("driver", "enabled", 0))
     with pytest.raises(SystemExit) as ended:
-        main(["analyse", str(tmp_path / "bag"), "--steps"])
+        main(["analyse", str(bag), "--steps"])
     assert ended.value.code == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "is not a recording of the demonstration" in said.err
-    assert f"no step of a scenario; 'wam analyse {tmp_path}/bag' analyses any recording" in said.err
-    assert "/chat" not in said.err, "a recording of the stack has 37 topics, which would hide the hint"
-    assert sorted((tmp_path / "bag").iterdir()) == before
+    assert f"no step of a scenario; 'wam analyse {bag}' analyses any recording" in capsys.readouterr().err
 
 
 def test_arm_is_drawn_with_the_parameters_in_the_bag():

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, MEASURED, SHAFTS, TRUE
+from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, SHAFTS
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.foreign.cycles import held as held_command
@@ -61,7 +61,7 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     over_time = list(_over_time(analysis))
     for i, chart in enumerate(over_time):
         yield chart._replace(section=FIRST if i < LAYOUT.first_charts else SIGNALS)
-    yield from map(_thinned, (*_holds(analysis), *_positions(analysis)))
+    yield from map(_thinned, _positions(analysis))
     for one in _shown(analysis.recording):
         yield from _of_motion(one)
     yield from _friction(analysis)
@@ -115,16 +115,6 @@ def _forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Number
     rising = np.concatenate(([True], np.diff(traces.stamp) > 0))
     time = (traces.stamp - traces.stamp[0])[rising] / 1e9
     return time, {name: value[rising] for name, value in found.items()}
-
-
-def _holds(analysis: Analysis) -> Iterator[Chart]:
-    for one in analysis.recording.held:
-        if len(one.time):
-            level = np.full(len(one.time), one.hold.commanded)
-            lines = [ChartLine("measured", MEASURED, one.measured), ChartLine("commanded", COMMANDED, level, True)]
-            if len(one.true):
-                lines.insert(0, ChartLine("true", TRUE, np.interp(one.time, one.time_true, one.true)))
-            yield Chart("force", f"{one.hold.name}.", TIME, FORCE, one.time, tuple(lines))
 
 
 def _positions(analysis: Analysis) -> Iterator[Chart]:
