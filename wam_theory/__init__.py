@@ -8,7 +8,7 @@ linear_loop          5.3, 5.5, 5.7: force loop without friction; margin of the s
 velocity_servo       sampled velocity servo on motors behind elastic cables
 thresholds           where the searches begin and end
 zero_order_hold      a linear system and its input held over a sample, as one matrix exponential
-stiction             5.4: node with little inertia; staircase: its step response
+stiction             5.4: node with little inertia
 regimes              5.5: behaviour of an inertial node by gamma and zeta; half_cycle: its slip
 describing_function  5.5.1: the unstable cycle of domain II
 backlash_cycle       2.2: the limit cycle of backlash in a torque loop

@@ -19,7 +19,6 @@ from wam_theory.friction_model import FrictionNode, IntegralLoop, require
 from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from, state_after
-from wam_theory.staircase import Staircase, inertialess_staircase
 from wam_theory.thresholds import SEARCH
 from wam_theory.verdicts import Outcome, Verdict, assess
 
@@ -31,12 +30,10 @@ __all__ = [
     "Motion",
     "Outcome",
     "PhaseEvent",
-    "Staircase",
     "Trajectory",
     "Verdict",
     "assess",
     "half_cycle",
-    "inertialess_staircase",
     "simulate",
 ]
 

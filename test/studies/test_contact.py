@@ -124,7 +124,7 @@ def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_start_
     assert found.moving == (4.0 * found.moving_count, 0.0, 0.0, 0.0)
     assert found.moving_z[0] == pytest.approx(16.0 * found.moving_count)
     assert found.still_count == 0
-    assert found.rms("sliding").tolist() == [2.0, 0.0, 0.0, 0.0]
+    assert found.sliding == (4.0 * found.sliding_count, 0.0, 0.0, 0.0)
     assert score(story(NONE * 2, {}, speed=0.03), ARM).torques.still_count == 159
     with_contact = score(story([*NONE, *[5.0] * 50, *[0.0] * 50], {}, error=2.0), ARM).torques
     assert 159 - 2 * 25 <= with_contact.moving_count <= 159 - 2 * 22
@@ -137,7 +137,7 @@ def test_a_dithered_arm_is_compared_with_the_truth_over_a_whole_cycle() -> None:
     errors = {}
     for group in ("rest", "dither"):
         found = score(played._replace(scenario=played.scenario._replace(group=group)), ARM)
-        errors[group] = found.torques.rms("still")[0]
+        errors[group] = math.sqrt(found.torques.still[0] / found.torques.still_count)
     assert errors["rest"] == pytest.approx(3.0 / math.sqrt(2.0), rel=0.02)
     assert errors["dither"] < 1e-9
 

@@ -16,7 +16,7 @@ from wam_studies.contact.degradations import NAMES, drawn
 from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
 from wam_studies.contact.recording import Drive, _identified, record
-from wam_studies.contact.replay import SignalFaults, names_payload
+from wam_studies.contact.replay import arriving, names_payload
 from wam_studies.contact.rows import IDENTIFIED_ARM
 from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.study import ContactCase, ContactStudy, play_case
@@ -118,7 +118,7 @@ def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
     own = drive.configuration.node("contact_estimator", ContactEstimatorParameters)
     estimator, body = ContactEstimator(WAM, shared.timing, own, shared.model), RigidBody(WAM)
     products = squares = 0.0
-    for i, state, dt in SignalFaults(recording, 1e-3, 905):
+    for i, state, dt in arriving(recording, 1e-3, 905):
         estimator.observe(state, None, dt)
         for touch in recording.touches:
             if i == round(1e3 * (touch.begin + 0.2)):
@@ -181,7 +181,7 @@ def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_r
 @pytest.mark.slow
 def test_an_arm_is_identified_from_signals_with_the_degradation_of_its_own() -> None:
     exact = drawn("as stated", WAM, np.random.default_rng(3401))
-    scaled = exact._replace(torque_scale=(1.1,), delay=1, dropped=0.02)
+    scaled = exact._replace(signals=MeasuredSignals((1.1,), delay=1, dropped=0.02))
     configured = CONFIGURATION.with_values(dict(exact.plant))
     levels = [
         np.array(dict(_identified(configured, one, 3401))["model.motors.coulomb_positive"]) for one in (exact, scaled)

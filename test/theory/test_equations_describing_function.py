@@ -1,7 +1,6 @@
 """The unstable cycle of domain II against Fourier, matrices and the exact response."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -68,16 +67,3 @@ def test_cycle_grows_with_the_friction_and_arguments_broadcast() -> None:
     force = describing_function.predicted_unstable_cycle(gains, *QUARTER, friction).force
     assert force.shape == (2, 3)
     np.testing.assert_allclose(force / force[:, :1], [[1.0, 2.0, 4.0]] * 2)
-
-
-@pytest.mark.parametrize(
-    ("call", "names"),
-    [
-        (lambda: describing_function.coulomb_describing_function(1.0, 0.0), "amplitude is 0"),
-        (lambda: describing_function.friction_to_velocity(1j, 1.0, 0.0, 1.0, 1.0, 1.0), "inertia is 0"),
-        (lambda: describing_function.predicted_unstable_cycle(1.0, *QUARTER, 0.0), "friction is 0"),
-    ],
-)
-def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
-    with pytest.raises(ValueError, match=names):
-        call()

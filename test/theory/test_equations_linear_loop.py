@@ -1,7 +1,6 @@
 """The linear loop of chapter 5 against state matrices, polynomial roots and the exact response."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -181,23 +180,3 @@ def test_friction_multiplies_the_gain_that_takes_small_steps_by_3_3() -> None:
     limit = linear_loop.sampled_margin(*TESTBED, 0.02).gain
     assert verdict(3.3 * limit, 4.0, 0) is Verdict.SETTLED
     assert verdict(3.5 * limit, 4.0, 0) is Verdict.DIVERGED
-
-
-@pytest.mark.parametrize(
-    ("call", "names"),
-    [
-        (lambda: linear_loop.series_stiffness(0.0, 1.0), "transmission_stiffness is 0"),
-        (lambda: linear_loop.proportional_error(1.0, -1.0, 1.0), "proportional_gain is -1"),
-        (lambda: linear_loop.integral_time_constant([1.0, -2.0], 1.0), r"gain is \[1.0, -2.0\]"),
-        (lambda: linear_loop.damping_ratio(1.0, -1.0, 1.0, 1.0), "damping is -1"),
-        (lambda: linear_loop.closed_loop(1j, 1.0, 0.0, 1.0, 1.0, 1.0), "inertia is 0"),
-        (lambda: linear_loop.characteristic_polynomial(-1.0, 1.0, 1.0, 1.0, 1.0), "gain is -1"),
-        (lambda: linear_loop.routh_gain(1.0, math.nan, 1.0, 1.0), "damping is nan"),
-        (lambda: linear_loop.gain_ratio(0.0, 1.0, 1.0, 1.0, 1.0), "gain is 0"),
-        (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.0), "sample_period is 0"),
-        (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.1, -1), "delay_samples is -1"),
-    ],
-)
-def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
-    with pytest.raises(ValueError, match=names):
-        call()

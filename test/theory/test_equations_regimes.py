@@ -1,7 +1,6 @@
 """Regimes of an inertial node (section 5.5) against matrix steps and the exact response."""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -211,18 +210,3 @@ def test_arguments_broadcast() -> None:
     assert regimes.point_b(0.25, row, column).shape == (2, 3)
     assert regimes.actuator_cycle(row, 2.0, 0.9, column).shape == (2, 3)
     assert regimes.spin_up_time(1.0, 2.0, 2.0, row, column, 0.9, 0.25).shape == (2, 3)
-
-
-@pytest.mark.parametrize(
-    ("call", "names"),
-    [
-        (lambda: regimes.psi(1.0, 0.0), "zeta is 0"),
-        (lambda: regimes.gamma_b(math.inf), "zeta is inf"),
-        (lambda: regimes.spin_up_time(1.0, 2.0, 2.0, 1.0, 0.0, 0.9, 0.25), "error is"),
-        (lambda: regimes.spin_up_time(1.0, 2.0, 2.0, 0.0, 1.0, 0.9, 0.25), "friction is 0"),
-        (lambda: regimes.actuator_cycle_power(1.0, 1.0, -1.0), "friction is -1"),
-    ],
-)
-def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
-    with pytest.raises(ValueError, match=names):
-        call()

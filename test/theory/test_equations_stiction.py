@@ -1,7 +1,6 @@
 """The nearly inertialess node of section 5.4 against small steps and the exact response."""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -143,22 +142,3 @@ def test_arguments_broadcast() -> None:
     assert stiction.staircase_number(row, column, 1.0, 0.1, 2.0, 2.0, 0.3).shape == (2, 3)
     assert linear_loop.closed_loop(1j * row, column, 1.0, 1.0, 1.0, 1.0).shape == (2, 3)
     assert linear_loop.characteristic_polynomial(row, column, 1.0, 1.0, 1.0).shape == (2, 3, 4)
-
-
-@pytest.mark.parametrize(
-    ("call", "names"),
-    [
-        (lambda: stiction.breakaway_delay(1.0, 1.0, 1.0, 1.0, 1.5), "spring_force is 1.5"),
-        (lambda: stiction.slip_overshoot(-0.1), "zeta is -0.1"),
-        (lambda: stiction.stiction_cycle_force(1.0, 1.0, 0.9, 1.0, 0.1), "static_friction is 0.9"),
-        (lambda: stiction.friction_drop(1.0, -1.0), "dynamic_friction is -1"),
-        (lambda: stiction.stuck_motor_speed(0.0, 1.0), "gain is 0"),
-        (lambda: stiction.slip_force(-1.0, 1.0, 0.0, 1.0, 1.0, 1.0), "time is -1"),
-        (lambda: stiction.slip_force(1.0, 1.0, 9.0, 1.0, 1.0, 1.0), "damping is 9.0; zeta is .*; it must be below 1"),
-        (lambda: stiction.staircase_number(1.0, 1.0, 1.0, 0.0, 1.0, 1.0, -1.0), "drop is -1"),
-        (lambda: stiction.inertia_number(1.0, 0.0, 1.0, 1.0), "inertia is 0"),
-    ],
-)
-def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
-    with pytest.raises(ValueError, match=names):
-        call()

@@ -17,7 +17,6 @@ from wam_theory.stick_slip import (
     Trajectory,
     Verdict,
     assess,
-    inertialess_staircase,
     simulate,
 )
 
@@ -384,21 +383,6 @@ def test_exact_cycle_comes_nearer_to_the_formula_as_the_loop_slows() -> None:
     assert off[0] > 5.0 * off[1] > 15.0 * off[2]
 
 
-def test_inertialess_staircase_is_the_limit_of_the_exact_response() -> None:
-    node = unit_node(1.0, 1.3)
-    stairs = inertialess_staircase(node, 1e-5, 0.5, 12)
-    kept = [e for e in simulate(node, IntegralLoop(1e-5), 0.5, 1e8).events if e.kind is Kind.STICK][:12]
-    np.testing.assert_allclose(stairs.times[:6], [e.time for e in kept[:6]], rtol=2e-3)
-    np.testing.assert_allclose(stairs.contact_forces, [e.contact_force for e in kept], atol=1e-4)
-    # its cycle: up and down by one jump, and the times of (5.3) from one to the next
-    late = np.diff(stairs.contact_forces)[-4:]
-    assert late == pytest.approx(np.array([1, -1, 1, -1]) * late[0], rel=1e-12)
-    jump = abs(late[0])
-    ups = 0.5 - stairs.contact_forces[-2]
-    wait = (2.6 - 2.0 * jump) / (2e-5 * abs(ups))  # net spring force from +-(1.3 - 2 jump) to -+1.3
-    assert stairs.times[-1] - stairs.times[-2] == pytest.approx(wait, rel=1e-9)
-
-
 def test_deadband_of_half_the_stiction_cycle_ends_it_from_every_step_and_a_smaller_one_does_not() -> None:
     node = unit_node(1.0, 1.3)
     steps = [0.5 + 0.02 * n for n in range(12)]
@@ -504,7 +488,6 @@ def test_one_sample_more_reverses_what_friction_does() -> None:
         (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 0.0), "until is 0"),
         (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0, (0.0, math.nan, 0.0)), "start is"),
         (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0).at([2.0]), "times go from 2"),
-        (lambda: inertialess_staircase(unit_node(), 1.0, 1.0, 5), "no jumps"),
     ],
 )
 def test_a_refusal_names_the_value(build: object, names: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_studies.identification.plants import MeasuredSignals
+from wam_studies.identification.plants import EXACT, MeasuredSignals
 
 Random = np.random.Generator
 Values = tuple[tuple[str, Any], ...]  # of a configuration, by name
@@ -24,29 +24,20 @@ class Degradation(NamedTuple):
     ----------
     plant : values of the configuration that is simulated.
     model : values of the configuration of which the estimator has its arm.
-    torque_scale : measured over true torque, of each motor or one for all.
-    torque_noise : sd of the measured torque, per torque.
-    delay : samples by which measured torques are late.
-    dropped : share of samples that do not arrive.
+    signals : how the torques of the motors are measured.
     drift : Coulomb friction that joints gain from the start to the end of a recording, per nominal friction.
     """
 
     plant: Values
     model: Values = ()
-    torque_scale: tuple[float, ...] = (1.0,)
-    torque_noise: float = 0.0
-    delay: int = 0
-    dropped: float = 0.0
+    signals: MeasuredSignals = EXACT
     drift: float = 0.0
 
-    @property
-    def signals(self) -> MeasuredSignals:
-        """How the torques of the motors are measured."""
-        return MeasuredSignals(self.torque_scale, self.torque_noise, self.delay, self.dropped)
 
-
-def _degraded(plant: dict[str, Any], model: dict[str, Any] | None = None, **signals: Any) -> Degradation:
-    return Degradation(tuple(plant.items()), tuple((model or {}).items()), **signals)
+def _degraded(
+    plant: dict[str, Any], model: dict[str, Any] | None = None, drift: float = 0.0, **signals: Any
+) -> Degradation:
+    return Degradation(tuple(plant.items()), tuple((model or {}).items()), MeasuredSignals(**signals), drift)
 
 
 def _around(random: Random, low: float, high: float, count: int) -> list[float]:
@@ -124,8 +115,8 @@ def _mix(random: Random, arm: Arm) -> Degradation:
     return _degraded(
         plant,
         _centre(random, arm, 0.003),
-        torque_scale=_constant(random, arm, 0.02),
-        torque_noise=0.005,
+        scale=_constant(random, arm, 0.02),
+        noise=0.005,
         delay=1,
         dropped=0.02,
         drift=0.1,
@@ -188,13 +179,13 @@ def drawn(name: str, arm: Arm, random: Random) -> Degradation:
         "load-dependent 6 %": _degraded({**stated, **_load(0.06)}),
         "friction drifts 20 %": _degraded(stated, drift=0.2),
         "mass 5 %, centre 5 mm": _degraded(heavy, _centre(random, arm, 0.005)),
-        "torque constant 3 %": _degraded(stated, torque_scale=_constant(random, arm, 0.03)),
+        "torque constant 3 %": _degraded(stated, scale=_constant(random, arm, 0.03)),
         "payload 0.1 kg": _degraded({**stated, "driver:mismatch.payload": 0.1}),
         "payload 0.3 kg": _degraded({**stated, "driver:mismatch.payload": 0.3}),
         "encoder 4096": _degraded({**stated, **_encoder(arm, 4096)}),
         "encoder 16384": _degraded({**stated, **_encoder(arm, 16384)}),
         "encoder 65536": _degraded({**stated, **_encoder(arm, 65536)}),
-        "torque noise, ripple, cogging": _degraded(noisy, torque_noise=0.01),
+        "torque noise, ripple, cogging": _degraded(noisy, noise=0.01),
         "delay 2 ms": _degraded(stated, delay=2),
         "10 % dropped": _degraded(stated, dropped=0.1),
         "realistic mix": _mix(random, arm),

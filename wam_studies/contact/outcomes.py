@@ -176,11 +176,6 @@ class TorqueErrors(NamedTuple):
     still_count: int
     sliding_count: int
 
-    def rms(self, state: str) -> Array:
-        """Root mean squares of the joints, (n,), N m, of 'moving', 'still' or 'sliding'."""
-        found: Array = np.sqrt(np.array(getattr(self, state)) / max(1, getattr(self, f"{state}_count")))
-        return found
-
 
 def torque_errors(moments: Sequence[EstimatedMoment], truth: Array, counts: Mask, sliding: float) -> TorqueErrors:
     """Errors of the external torques.

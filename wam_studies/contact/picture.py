@@ -1,4 +1,4 @@
-"""The picture of contact estimation: position errors, calibration of positions and of links, detection latency."""
+"""The picture of contact estimation: position errors and their calibration."""
 
 import math
 from collections.abc import Sequence
@@ -7,18 +7,18 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore
-from wam_studies.contact.rows import STATED, contacts_of, error_of, near, on_outer_link, outer_links
+from wam_studies.contact.rows import STATED, error_of, near, on_outer_link
 from wam_studies.contact.scenarios import KINDS, RANGES
-from wam_studies.figures.panels import Mark, Panel, Panels, Series, line_only, measured
+from wam_studies.figures.panels import Panel, Panels, line_only, measured
 
 BINS = 6
-CENTIMETRES, MILLISECONDS = 100.0, 1e3
+CENTIMETRES = 100.0
 
 
 def panels_of(scores: Sequence[ContactScore], arm: Arm) -> Panels:
     """What is drawn of the scores of scenarios."""
-    found, every = on_outer_link(scores, arm), [one for one in contacts_of(scores) if one.detected]
-    return _errors(found), _deviations(found), _links(every), _latency(near(found, 5.0), outer_links(arm))
+    found = on_outer_link(scores, arm)
+    return _errors(found), _deviations(found)
 
 
 def _errors(found: Sequence[ContactOutcome]) -> Panel:
@@ -43,23 +43,6 @@ def _deviations(found: Sequence[ContactOutcome]) -> Panel:
     ends = np.array([0.3, 15.0])
     lines = [("68 % quantile of the error", measured(middle, inner)), ("one reported sd", line_only(ends, ends))]
     return Panel("reported standard deviation", "reported sd of the position [cm]", "error [cm]", lines, "xy")
-
-
-def _links(every: Sequence[ContactOutcome]) -> Panel:
-    stated = np.array([one.probability for one in every])
-    right = np.array([one.right_link for one in every])
-    pairs = [(np.mean(stated[group]), np.mean(right[group])) for group in _bins(stated)]
-    x, y = np.array(pairs).reshape(-1, 2).T
-    one = Series(np.array([0.0, 1.0]), np.array([0.0, 1.0]), x, y)
-    return Panel("links", "reported probability", "part identified correctly", [("calibrated", one)])
-
-
-def _latency(found: Sequence[ContactOutcome], links: str) -> Panel:
-    times = np.sort([MILLISECONDS * one.latency for one in found if not math.isnan(one.latency)])
-    part = np.arange(1.0, len(times) + 1.0) / max(len(times), 1)
-    shown = np.isfinite(times)
-    line, mark = ("", line_only(times[shown], part[shown])), Mark("required", 60.0, 0.95)
-    return Panel(f"5 N on the {links}", "latency [ms]", "part of contacts", [line], marks=(mark,))
 
 
 def _bins(values: np.ndarray) -> list[np.ndarray]:

@@ -46,23 +46,16 @@ class ReplayLimits:
 REPLAY = ReplayLimits()
 
 
-class SignalFaults:
-    """Samples as the estimator gets them: state, torque, time since the last sample that arrived."""
-
-    def __init__(self, recording: DriveRecording, period: float, seed: int) -> None:
-        self._recording, self._period = recording, period
-        self._random = np.random.default_rng((seed, 3))
-
-    def __iter__(self) -> Iterator[tuple[int, State, float]]:
-        recording = self._recording
-        measured, arrives = recording.degradation.signals.of(recording.torque, self._random)
-        signals = zip(recording.theta.tolist(), recording.thetad.tolist(), measured.tolist(), strict=True)
-        gap = 0.0
-        for i, (theta, thetad, torque) in enumerate(signals):
-            gap += self._period
-            if arrives[i]:
-                yield i, State(theta, thetad, torque), gap
-                gap = 0.0
+def arriving(recording: DriveRecording, period: float, seed: int) -> Iterator[tuple[int, State, float]]:
+    """Samples as the estimator gets them: number, state and torque, s since the last sample that arrived."""
+    measured, arrives = recording.degradation.signals.of(recording.torque, np.random.default_rng((seed, 3)))
+    signals = zip(recording.theta.tolist(), recording.thetad.tolist(), measured.tolist(), strict=True)
+    gap = 0.0
+    for i, (theta, thetad, torque) in enumerate(signals):
+        gap += period
+        if arrives[i]:
+            yield i, State(theta, thetad, torque), gap
+            gap = 0.0
 
 
 def replay(configuration: Configuration, name: str, group: str, recording: DriveRecording, seed: int) -> ContactScore:
@@ -79,7 +72,7 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
     ]
     trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
     started: dict[int, tuple[bool, bool]] = {}
-    for i, state, dt in SignalFaults(recording, period, seed):
+    for i, state, dt in arriving(recording, period, seed):
         time = i * period
         estimator.observe(state, None, dt)
         for number, touch in enumerate(singles):

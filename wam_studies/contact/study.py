@@ -109,7 +109,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         return record.failure
 
     def picture(self, records: Sequence[ContactScore], file: Path) -> bool:
-        """Position errors, calibration, latency on the arm as stated."""
+        """Position errors and calibration on the arm as stated."""
         from wam_studies.contact.picture import panels_of  # matplotlib is slow to import
         from wam_studies.figures.panels import draw_panels
 

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_studies.figures.conditions import CASE
-from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
+from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series
 from wam_studies.plant.force_response import PlantResponse, force_step
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
 from wam_theory.friction_model import IntegralLoop
 from wam_theory.linear_loop import integral_time_constant, proportional_error, routh_gain, series_stiffness
 from wam_theory.regimes import gamma_3
-from wam_theory.stick_slip import Kind, Trajectory, inertialess_staircase, simulate
+from wam_theory.stick_slip import Kind, Trajectory, simulate
 
 TIME, FORCE, MOTOR = "time [s]", "contact force F_c [N m]", "motor x_m at the joint [rad]"
 EVENLY = 2000  # times at which an exact motion is drawn
@@ -67,22 +67,14 @@ def simple_responses() -> Panels:
 
 
 def staircase() -> Panels:
-    """Figure 5.5: stiction, with a nearly inertialess node; the force of a node without inertia next to it."""
+    """Figure 5.5: stiction, with a nearly inertialess node."""
     gain, seconds, friction = 2e-3, 12.0, (6.0, 3.0)
     found = force_step(CASE.stairs, CASE.contact, gain, 24.0, friction, seconds)
     exact = simulate(found.node, IntegralLoop(gain), CASE.stairs, seconds)
-    steps = inertialess_staircase(found.node, gain, CASE.stairs, 60)
-    shown = steps.times <= seconds
-    times, forces = steps.times[shown], steps.contact_forces[shown]
-    corners = np.concatenate([[0.0], np.repeat(times, 2), [seconds]])
-    levels = np.repeat(np.concatenate([[0.0], forces]), 2)
     motor = _series(found, found.motor, exact, "x_m", 70).scaled(1.0, found.node.transmission_stiffness)
-    lines = (
-        ("exact", _series(found, found.force, exact, "contact_force", 70)),
-        ("no inertia (5.3), (5.8)", line_only(corners, levels)),
-    )
+    force = _series(found, found.force, exact, "contact_force", 70)
     return (
-        Panel("a) contact force", TIME, FORCE, lines, marks=(Mark("F_des", y=CASE.stairs),)),
+        Panel("a) contact force", TIME, FORCE, (("exact", force),), marks=(Mark("F_des", y=CASE.stairs),)),
         Panel("b) motor", TIME, "k_tr x_m [N m]", (("exact", motor),)),
     )
 

@@ -11,7 +11,7 @@ from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.sensors import Encoders
 from wam_studies.plant import effects
-from wam_studies.plant.effects import PlantCurve, breakaway, level, torque_loop, torque_loop_response
+from wam_studies.plant.effects import PlantCurve, level, torque_loop, torque_loop_response
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     STEP,
@@ -21,13 +21,6 @@ from wam_studies.plant.ideal_testbed import (
     released_plant,
 )
 from wam_theory.backlash_cycle import exact_cycle
-
-
-def added_friction() -> PlantCurve:
-    """Breakaway torque of the joint with an added Coulomb friction of 0.7 N m, motor free."""
-    plant = released_plant(ideal_testbed(friction=(0.3, 0.3)))
-    plant.set_added_friction((0.7,))
-    return level(breakaway(plant, True, 0.9), 1.0)
 
 
 def circuit_damping() -> PlantCurve:
@@ -76,7 +69,6 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "impact": effects.impact,
     "backlash in the loop": effects.actuator_cycle_with_backlash,
     "backlash in a torque loop": effects.backlash_in_a_torque_loop,
-    "added friction, breakaway": added_friction,
     "damping of the circuit, decay": circuit_damping,
     "amplifier, time to the continuous limit": heating,
     "cycle by backlash in a torque loop, peak to peak": torque_cycle,
