@@ -46,7 +46,7 @@ def moment(i: int, hypotheses: tuple[Hypothesis, ...], speed: float, error: floa
         (error, 0.0, 0.0, 0.0), (0.5,) * 4, 0.0, bool(hypotheses), best.cover, best.position, best.position_sd,
         best.probability, 0.1, best.force, best.moment, hypotheses, NO_REASON,
     )  # fmt: skip
-    return EstimatedMoment((i + 1) * PERIOD, estimate, speed > 0.1, 30.0 * speed)
+    return EstimatedMoment((i + 1) * PERIOD, estimate, speed > 0.1)
 
 
 def story(
@@ -124,7 +124,6 @@ def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_start_
     assert found.moving == (4.0 * found.moving_count, 0.0, 0.0, 0.0)
     assert found.moving_z[0] == pytest.approx(16.0 * found.moving_count)
     assert found.still_count == 0
-    assert found.sliding == (4.0 * found.sliding_count, 0.0, 0.0, 0.0)
     assert score(story(NONE * 2, {}, speed=0.03), ARM).torques.still_count == 159
     with_contact = score(story([*NONE, *[5.0] * 50, *[0.0] * 50], {}, error=2.0), ARM).torques
     assert 159 - 2 * 25 <= with_contact.moving_count <= 159 - 2 * 22

@@ -25,7 +25,7 @@ from wam_studies.identification.plants import MeasuredSignals
 from wam_studies.scores import Row, ScoreTable
 
 TOUCH = ContactOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, "outer", 0.0, 0.01, True)
-QUIET = TorqueErrors(*[(0.0,)] * 4, 1, 1, 1)
+QUIET = TorqueErrors(*[(0.0,)] * 3, 1, 1)
 OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
 EXACT = ("moving", "asymmetry", "load", "shape", "payload", "mass")

@@ -19,8 +19,6 @@ PROMISED = {
     "impact": 5e-3,  # (3.1) 0.5 %
     "backlash in the loop": 1e-2,
     "backlash in a torque loop": 2e-3,  # a step of the plant is a thousandth of a cycle
-    "damping of the circuit, decay": 1e-2,  # explicit damping, h d N^2/J
-    "amplifier, time to the continuous limit": 1e-3,  # a period of 1 ms
     "cycle by backlash in a torque loop, peak to peak": 2e-2,  # which is half a step of delay
     "sensor noise, 20 000 readings": 2e-2,  # 1/sqrt(2 n) is 0.5 %
 }

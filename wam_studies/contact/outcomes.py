@@ -43,13 +43,11 @@ class EstimatedMoment(NamedTuple):
     time : s.
     estimate : of the estimator.
     is_moving : whether a joint truly moves.
-    slowest : rad/s, of the slowest motor.
     """
 
     time: float
     estimate: ContactEstimate
     is_moving: bool
-    slowest: float
 
 
 class TrueContact(NamedTuple):
@@ -162,41 +160,35 @@ class TorqueErrors(NamedTuple):
 
     Attributes
     ----------
-    moving, still, sliding : (n,), sums of squares, N^2 m^2, over the moments in which the arm moves, is at rest, and
-        in which every motor slides.
+    moving, still : (n,), sums of squares, N^2 m^2, over the moments in which the arm moves, and is at rest.
     moving_z : (n,), sum of squared errors over reported variances, moving.
-    moving_count, still_count, sliding_count : of moments.
+    moving_count, still_count : of moments.
     """
 
     moving: tuple[float, ...]
     still: tuple[float, ...]
-    sliding: tuple[float, ...]
     moving_z: tuple[float, ...]
     moving_count: int
     still_count: int
-    sliding_count: int
 
 
-def torque_errors(moments: Sequence[EstimatedMoment], truth: Array, counts: Mask, sliding: float) -> TorqueErrors:
+def torque_errors(moments: Sequence[EstimatedMoment], truth: Array, counts: Mask) -> TorqueErrors:
     """Errors of the external torques.
 
     Parameters
     ----------
     truth : (k, n), true torques, N m.
     counts : (k,), whether a moment counts.
-    sliding : rad/s, of the slowest motor where every motor slides.
     """
     square = (np.array([one.estimate.external_torques for one in moments]) - truth) ** 2
     variance = np.array([one.estimate.torque_sd for one in moments]) ** 2
     is_moving = np.array([one.is_moving for one in moments])
     moving, still = counts & is_moving, counts & ~is_moving
-    slides = counts & (np.array([one.slowest for one in moments]) > sliding)
     return TorqueErrors(
         _sums(square[moving]),
         _sums(square[still]),
-        _sums(square[slides]),
         _sums(square[moving] / variance[moving]),
-        *(int(there.sum()) for there in (moving, still, slides)),
+        *(int(there.sum()) for there in (moving, still)),
     )
 
 

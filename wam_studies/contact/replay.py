@@ -38,7 +38,6 @@ class ReplayLimits:
     start_after: float = 0.1  # s, of an estimator that starts in contact
     start_within: float = 0.3  # s
     start_force: float = 9.0  # N
-    sliding: float = 0.3  # rad/s, slowest motor
     setting_down: float = 0.5  # s after a mass is set down, in which the model is still that with it
     observer: float = 1.0  # s at the start, whose torques are the observer's own transient
 
@@ -88,9 +87,7 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
                     started[number] = before[0] or now[0], before[1] or now[1]
         if i % outer == 0:
             is_moving = bool(recording.speed[i] > EVALUATION.moving)
-            moments.append(
-                EstimatedMoment(time, estimator.estimate(), is_moving, float(np.abs(recording.thetad[i]).min()))
-            )
+            moments.append(EstimatedMoment(time, estimator.estimate(), is_moving))
     return _scored(recording, moments, shared.arm, name=name, group=group, started=tuple(started.values()))
 
 
@@ -109,7 +106,7 @@ def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: 
         [_contact(touch, moments) for touch in touches],
         acting,
         busy,
-        torques=torque_errors(moments, truth, free, REPLAY.sliding),
+        torques=torque_errors(moments, truth, free),
         warnings=sum(warned) / max(1, len(warned)),
         contact_seconds=sum(touch.end - touch.begin for touch in touches if not touch.mass),
         masses=tuple(_mass(touch, moments, acts) for touch, acts in zip(touches, acting, strict=True) if touch.mass),

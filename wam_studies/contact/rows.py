@@ -9,7 +9,7 @@ from typing import Final
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_studies.contact.outcomes import EVALUATION, ContactOutcome, ContactScore
-from wam_studies.contact.scenarios import KINDS, RANGES
+from wam_studies.contact.scenarios import RANGES
 from wam_studies.scores import ANY, NONE_AT_ALL, Bound, Interval, Row, events, quantile, rms, share
 
 IN_MOTION = ("moving", "free")
@@ -215,8 +215,7 @@ def further_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
     yield Row("position: 68 % quantile of error over reported sd", quantile(z_scores(outer), 0.683))
     yield Row("torque: rms of error over reported sd, in motion", torque_z(in_groups(scores, *IN_MOTION)))
     yield Row("false alarms between contacts", false_alarms(in_groups(scores, "moving", "rest", "dither")))
-    for when, groups, state in (("while every motor slides", IN_MOTION, "sliding"), ("at rest", ("rest",), "still")):
-        yield from torque_rows(scores, arm, when, groups, state)
+    yield from torque_rows(scores, arm, "at rest", ("rest",), "still")
     for group, when in (("rest", "at rest"), ("dither", DITHERED)):
         resting = on_outer_link(scores, arm, group)
         for force in RANGES.levels:
@@ -224,13 +223,10 @@ def further_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
             yield percent(f"{name} detected {when}", detected(own))
             yield centimetres(f"position, {name} {when}, median error", error_of(own))
         yield percent(f"90 % set contains the truth {when}", covered(contacts_of(scores, group)))
-    for kind in KINDS:
-        own = [one for one in outer if one.kind == kind]
-        yield centimetres(f"position on the {links}, {kind}, median error", error_of(own))
 
 
 def torque_rows(scores: Scores, arm: Arm, when: str, groups: Sequence[str], state: str) -> Iterator[Row]:
-    """Errors of the external torque of each joint in some groups; `state` is 'moving', 'still' or 'sliding'."""
+    """Errors of the external torque of each joint in some groups; `state` is 'moving' or 'still'."""
     parts = [score.torques for score in in_groups(scores, *groups)]
     counts: list[int] = [getattr(part, f"{state}_count") for part in parts]
     for i, name in enumerate(arm.joints.names):

@@ -26,8 +26,6 @@ from wam_studies.contact.outcomes import (
 )
 from wam_studies.contact.scenarios import RANGES, BenchmarkScenario, PlannedContact
 
-SLIDING = 1.0  # rad/s of the slowest motor
-
 
 class Played(NamedTuple):
     """A scenario with its moments, the true loads and external torques of each, and why it ended early."""
@@ -52,13 +50,13 @@ def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
     done = False
     while not done:
         is_outer, stamp = run.driver.is_outer, run.driver.stamp
-        joints, motors = run.driver.true_joint_state, run.driver.motor_state
+        joints = run.driver.true_joint_state
         load = run.driver.true_contact if is_outer else None
         done = run.step()
         if load is None:
             continue
         is_moving = max(map(abs, joints.velocity)) > EVALUATION.moving
-        played.moments.append(EstimatedMoment(stamp * 1e-9, run.estimate, is_moving, min(map(abs, motors.velocity))))
+        played.moments.append(EstimatedMoment(stamp * 1e-9, run.estimate, is_moving))
         played.loads.append(load)
         played.torques.append(torques_of(body, joints.position, load))
         if run.driver.safety.mode is Mode.FAULT:
@@ -114,7 +112,7 @@ def score(played: Played, arm: Arm) -> ContactScore:
         busy,
         name=played.scenario.name,
         group=played.scenario.group,
-        torques=torque_errors(moments, _truth(played, period), _settled(moments, found), SLIDING),
+        torques=torque_errors(moments, _truth(played, period), _settled(moments, found)),
         excluded=len(found) - len(counted),
         not_made=max(0, len(played.scenario.planned) - len(found)),
         failure=played.failure,

@@ -3,5 +3,5 @@
 ideal_testbed    one link on one cable circuit, with the requested effects only
 effects          curves of the plant and of theory: slack, creep, efficiency, ripple, resonances, impact, cycles
 force_response   the force loop of figure 5.4 around the plant, its motor an ideal velocity source
-table            all of them and single numbers as one table: damping, heating, noise, cycles
+table            all of them as one table, with noise and the size of a cycle
 """

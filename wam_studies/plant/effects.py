@@ -329,23 +329,9 @@ def pretension(coefficient: float = 1e-4) -> PlantCurve:
     for value in tension.tolist():
         less = replace(arm, cables=replace(arm.cables, pretension=(value,)))
         plant = released_plant(less, tension_friction=(coefficient,))
-        found.append(breakaway(plant, False, 0.9 * coefficient * 2.0 * value))
+        torque = 0.9 * coefficient * 2.0 * value
+        while abs(plant.thetad[0]) < 1e-5:
+            torque *= 1.00001
+            plant.step([torque])
+        found.append(torque)
     return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)
-
-
-def breakaway(plant: Plant, at_joint: bool, start: float) -> float:
-    """Torque, N m, at which a shaft at rest starts to turn, increased by 1e-5 of itself in each step.
-
-    Parameters
-    ----------
-    plant : at rest.
-    at_joint : whether the joint is pushed, otherwise the motor gives the torque.
-    start : torque at the start, N m.
-    """
-    torque = start
-    while abs(plant.qd[0] if at_joint else plant.thetad[0]) < 1e-5:
-        torque *= 1.00001
-        if at_joint:
-            plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
-        plant.step([0.0 if at_joint else torque])
-    return torque

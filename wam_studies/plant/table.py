@@ -1,4 +1,4 @@
-"""The table of the plant's effects: curves of `effects` and single numbers, on the simulated plant and by theory."""
+"""The table of the plant's effects, on the simulated plant and by theory."""
 
 from collections.abc import Callable, Mapping
 
@@ -6,42 +6,10 @@ import numpy as np
 
 from wam_analysis.measures.limit_cycle import mean_cycle
 from wam_analysis.table import markdown
-from wam_description.configuration import Configuration, packaged
-from wam_driver.amplifier import Amplifier
-from wam_driver.driver import DriverParameters
 from wam_driver.sensors import Encoders
 from wam_studies.plant import effects
 from wam_studies.plant.effects import PlantCurve, level, torque_loop, torque_loop_response
-from wam_studies.plant.ideal_testbed import (
-    IMMOVABLE,
-    STEP,
-    ideal_testbed,
-    link_inertia,
-    one_step_map,
-    released_plant,
-)
 from wam_theory.backlash_cycle import exact_cycle
-
-
-def circuit_damping() -> PlantCurve:
-    """Decay rate of the link against a motor at rest, s^-1: N^2 d/(2 J)."""
-    damping = 0.02
-    arm = ideal_testbed(rotor=IMMOVABLE, damping=damping)
-    values = np.linalg.eigvals(one_step_map(released_plant(arm)))
-    swinging = values[np.abs(values.imag) > 1e-6][0]
-    inertia = link_inertia(arm)
-    return level(-float(np.log(np.abs(swinging))) / STEP, 14.0**2 * damping / (2.0 * inertia))
-
-
-def heating(overload: float = 2.0) -> PlantCurve:
-    """Time until an overload of the continuous torque is limited, s: T ln(r^2/(r^2 - 1))."""
-    configuration = Configuration.load(packaged("testbed"))
-    parameters = configuration.node("driver", DriverParameters).amplifier
-    amplifier = Amplifier(configuration.shared.arm.motors, parameters, np.random.default_rng(0))
-    command, ticks = overload * amplifier.continuous[0], 0
-    while amplifier.step([command], 1e-3)[0] == command:
-        ticks += 1
-    return level(ticks * 1e-3, parameters.thermal_time * float(np.log(overload**2 / (overload**2 - 1.0))))
 
 
 def noise(sd: float = 1e-3) -> PlantCurve:
@@ -69,8 +37,6 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "impact": effects.impact,
     "backlash in the loop": effects.actuator_cycle_with_backlash,
     "backlash in a torque loop": effects.backlash_in_a_torque_loop,
-    "damping of the circuit, decay": circuit_damping,
-    "amplifier, time to the continuous limit": heating,
     "cycle by backlash in a torque loop, peak to peak": torque_cycle,
     "sensor noise, 20 000 readings": noise,
 }
