@@ -50,7 +50,7 @@ def arm_plot(recording: AnalysedRun) -> tuple[str, bytes] | None:
             arm_picture.arrow(axes, start, end, colour, width)
             axes.plot([], [], color=colour, lw=width, label=label)
         if arrows:
-            axes.legend(loc="upper right")
+            axes.legend(loc="upper right", fontsize=13)  # readable on a narrow page
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     seconds = (moment.stamp - traces.zero) / 1e9
     note = f" ({recorded.note})" if recorded.note else ""
