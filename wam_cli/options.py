@@ -269,12 +269,6 @@ def processes_of(configuration: Configuration, given: argparse.Namespace) -> str
     return given.processes or (GROUPED if configuration.shared.timing.mode == "realtime" else ONE)
 
 
-def is_paced(configuration: Configuration) -> bool:
-    """Whether the nodes leave the processor time to others; not in lockstep as fast as it can."""
-    timing = configuration.shared.timing
-    return timing.mode == "realtime" or timing.real_time_factor > 0.0
-
-
 def take_port(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --port."""
     parser.add_argument(

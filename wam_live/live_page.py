@@ -18,7 +18,7 @@ from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
-from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
+from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of, paragraph
 from wam_live.push import release
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import Scene
@@ -40,7 +40,7 @@ class LivePage:
     ----------
     namespace : of the stack.
     port : to listen on.
-    say : called with lines for people.
+    notify : called with lines for people.
     domain_id : ROS domain, the one of the environment where None.
 
     Attributes
@@ -66,13 +66,19 @@ class LivePage:
         self._bent: tuple[float, ...] = ()  # posture for a press, rad
         self._player: ScenarioPlayer | None = None
 
-    def run(self, until: Callable[[], bool]) -> None:
-        """Serve the page until a condition holds; a stack that is not there yet is waited for."""
+    def open(self) -> None:
+        """Serve a page that waits for the stack."""
         self._server = serve(self._port)
+        self._waiting = self._server.gui.add_html(paragraph("waiting for the arm; <code>wam up</code> starts one"))
+        self._notify(f"live page: {url(self._port)}")
+
+    def run(self, until: Callable[[], bool]) -> None:
+        """Show the stack until a condition holds; it may start later."""
         try:
             flat = self._parameters(until)
             if flat is None:
                 return
+            self._waiting.remove()
             driver = flat["driver"]
             shared = build_part(Shared, driver)
             world = build_part(World, driver, "world.")
@@ -90,7 +96,6 @@ class LivePage:
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: panel.requests.put(NO_PRESS))  # nobody sees the force
-            self._notify(f"live page: {url(self._port)}  ({label}{more})")
             self._draw(source, scene, objects, panel, until)
             self._end_press()
             self._send(source, panel, None)

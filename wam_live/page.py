@@ -19,7 +19,8 @@ from wam_live.thresholds import LIVE
 
 HOST: Final = "127.0.0.1"
 TITLE: Final = "WAM"
-CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
+CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.1)  # m, where it is and what it looks at
+VIEW: Final = math.radians(52.0)  # vertical angle, which the arm on its base fills
 UP: Final = np.array([0.0, 0.0, 1.0])
 INSTALL: Final = "pip install 'wam_stack[live]'"
 
@@ -45,7 +46,7 @@ def free_port(wanted: int | None, notify: Callable[[str], None]) -> int:
     Parameters
     ----------
     wanted : the one of an option; None takes `port`, or the next one that is free.
-    say : called with a line for people where `port` was not free.
+    notify : called with a line for people where `port` was not free.
     """
     if wanted is not None or port_is_free(LIVE.port):
         return LIVE.port if wanted is None else wanted
@@ -113,6 +114,8 @@ def serve(port: int) -> Any:
     with _only_this_page(server, port), quiet():
         made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
     made.initial_camera.position, made.initial_camera.look_at = CAMERA
+    made.initial_camera.fov = VIEW
+    made.gui.set_panel_label("loading ...")
     made.on_client_connect(_look_next_to_the_panel)
     return made
 
@@ -127,14 +130,13 @@ def name_page(server: Any, label: str, more: str = "") -> None:
 
 
 def _look_next_to_the_panel(client: Any) -> None:
-    """Where the panel covers the lower half of a window, or much of its right, see the arm amid the rest."""
+    """Show the arm amid the free part: the panel covers the right of a window, or the lower half of a narrow one."""
     camera = client.camera
-    if camera.image_width >= LIVE.wide:
-        return
     is_narrow = camera.image_width < LIVE.narrow
     position, target = map(np.array, CAMERA)
-    away = LIVE.farther[not is_narrow] * (position - target)
-    metres = np.linalg.norm(away) * math.tan(0.5 * camera.fov) / (0.5 * camera.image_height)  # of a pixel
+    farther = 1.0 if camera.image_width >= LIVE.wide else LIVE.farther[not is_narrow]
+    away = farther * (position - target)
+    metres = np.linalg.norm(away) * math.tan(0.5 * VIEW) / (0.5 * camera.image_height)  # of a pixel
     right = np.cross(UP, away) / np.linalg.norm(np.cross(UP, away))
     camera.position = target + away
     camera.look_at = target + metres * (-0.29 * camera.image_height * UP if is_narrow else 0.5 * LIVE.panel * right)

@@ -25,10 +25,10 @@ PLACES: Final = ("true", "estimated")
 FORCE_TITLE: Final = "force [N]"
 HINT: Final = "Enable releases the brakes; then drag a link to push it."  # until there is an answer
 LEGEND: Final = (  # of the arrows and the range in the scene
-    ("&#10145;", "true", "true (simulator)"),
-    ("&#10145;", "estimated", "estimated"),
-    ("&#9646;", "likely", "holds it with 90 %"),
-    ("&#10145;", "hand", "your hand"),
+    ("&#10145;", "true", "true force (simulator)"),
+    ("&#10145;", "estimated", "estimated force"),
+    ("&#9646;", "likely", "contact, with 90 %"),
+    ("&#10145;", "hand", "pull of your hand"),
 )
 BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and its requests
     "arm": {"Enable": (Call("driver", "enable", True),), "Brake": (Call("driver", "enable", False),)},

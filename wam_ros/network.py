@@ -21,7 +21,6 @@ THIS_MACHINE, OPEN = "this_machine", "open"  # its values
 PROFILE: Final = Path(__file__).with_name("this_machine.xml")
 WIDER: Final = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")  # environment variables that name other machines
 FIRST_PORT, PORTS = 7400, 250  # UDP ports of ROS domain 0; ports of each domain
-USUAL_DOMAINS: Final = range(1, 102)  # those that every system has ports for
 LONGEST_ADDRESS = 100  # bytes
 _PEER: Final = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
@@ -147,27 +146,6 @@ def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
     """The ROS domain of the environment; ROS itself refuses what is no number."""
     text = environment.get("ROS_DOMAIN_ID", "")
     return int(text) if text.isascii() and text.isdigit() else 0
-
-
-def move_to_free_domain(namespace: str, environment: MutableMapping[str, str]) -> str:
-    """Leave the default ROS domain, if an arm runs in it in this namespace, for one that nobody is in.
-
-    For programs that nobody has to find, such as the demonstration.  `environment` is changed.  The domain of a shell
-    that names one is not left: what else the shell starts is to be in the same one.
-
-    Returns
-    -------
-    what was done, '' where nothing had to be.
-    """
-    domain, full = requested_domain(environment), f"/{namespace.strip('/')}"
-    pid = occupant(domain, full, "driver")
-    if not pid or environment.get("ROS_DOMAIN_ID"):
-        return ""  # the nodes report that the place is taken
-    free = next((one for one in USUAL_DOMAINS if not is_inhabited(one)), None)
-    if free is None:
-        return ""  # the nodes report that the place is taken
-    environment["ROS_DOMAIN_ID"] = str(free)
-    return f"another arm runs in ROS domain {domain} (process {pid}), so this one runs in ROS_DOMAIN_ID={free}"
 
 
 def is_inhabited(domain: int) -> bool:

@@ -30,7 +30,7 @@ from conftest import LONG
 from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
-from wam_cli.commands.live import NICENESS, PageProcess, lateness, page_next_to
+from wam_cli.commands.live import NICENESS, PageProcess, page_next_to
 from wam_cli.options import take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
@@ -340,6 +340,7 @@ class Shown:
         self.port = free_port()
         self._end = threading.Event()
         self.page = LivePage("wam", self.port, lambda line: None, domain_id)
+        self.page.open()
         self._thread = threading.Thread(target=self.page.run, args=(self._end.is_set,))
         self._thread.start()
 
@@ -650,33 +651,22 @@ def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: py
 def test_the_page_runs_beside_the_stack_and_ends_with_it(domain_id: int) -> None:
     port = free_port()
     with page_next_to(options("--port", str(port)), "wam"):
-        until(lambda: not port_is_free(port))
+        assert not port_is_free(port), "the stack starts after its page"
     assert port_is_free(port)
 
 
-def test_a_page_that_is_late_is_reported_and_one_that_is_there_is_not() -> None:
-    port = free_port()
-    text = f"the live page is still starting, as the nodes come first; it will be at http://{HOST}:{port}"
-    assert lateness(port, is_paced=True) == text
-    assert (
-        lateness(port, is_paced=False) == f"{text}; the run may end before it: --real-time-factor 1 leaves it the time"
-    )
-    with socket.socket() as page:
-        page.bind((HOST, port))
-        page.listen()
-        assert lateness(port, is_paced=False) == ""
-
-
-def test_the_command_prints_once_that_its_page_is_late(
+def test_a_page_that_is_late_is_reported_once(
     domain_id: int, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("wam_cli.commands.live.LATE", 0.0)  # no page is there at once
-    printed: list[str] = []
-    port = free_port()
-    with page_next_to(options("--port", str(port)), "wam"):
-        until(lambda: printed.append(capfd.readouterr().out) or "".join(printed))
+    with page_next_to(options("--port", str(port := free_port())), "wam"):
         until(lambda: not port_is_free(port))
-    assert "".join([*printed, capfd.readouterr().out]).count("still starting") == 1
+    assert capfd.readouterr().out.count("still starting") == 1
+
+
+def test_nobody_waits_for_a_page_that_is_stopped(domain_id: int) -> None:
+    with page_next_to(options("--port", str(port := free_port())), "wam", lambda: True):
+        assert port_is_free(port)
 
 
 def test_the_page_of_a_stack_lets_its_nodes_go_first(domain_id: int) -> None:

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -28,7 +27,6 @@ from wam_ros.network import (
     THIS_MACHINE,
     Place,
     limit_to_this_machine,
-    move_to_free_domain,
     occupant,
     require_places,
 )
@@ -366,18 +364,6 @@ def test_a_node_that_runs_already_is_refused_and_the_first_one_does_not_notice(
     first.send_signal(signal.SIGINT)
     assert "another driver" not in said(first)
     assert first.returncode == 0
-
-
-def test_a_demonstration_next_to_another_arm_takes_a_domain_of_its_own(domain_id: int) -> None:
-    namespace, exported = f"/test_{os.getpid()}", {"ROS_DOMAIN_ID": str(domain_id)}
-    environment: dict[str, str] = {}
-    assert move_to_free_domain(namespace, environment) == ""
-    with closing(Place(0, namespace, "driver")), closing(Place(domain_id, namespace, "driver")):
-        said = move_to_free_domain(namespace, environment)
-        assert move_to_free_domain(namespace, exported) == "", "the shell names a domain, which is not left"
-    own = environment["ROS_DOMAIN_ID"]
-    assert said == f"another arm runs in ROS domain 0 (process {os.getpid()}), so this one runs in ROS_DOMAIN_ID={own}"
-    assert exported == {"ROS_DOMAIN_ID": str(domain_id)}
 
 
 @pytest.mark.parametrize("name", ["driver", "velocity_loop", "recorder"])

@@ -15,7 +15,6 @@ from wam_cli.options import (
     configuration_of,
     exit_code_of,
     filled,
-    is_paced,
     processes_of,
     recording_folder,
     take_configuration,
@@ -236,17 +235,14 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
     from wam_cli.commands.live import page_next_to
     from wam_cli.commands.up import import_nodes
     from wam_ros.bring_up import start
-    from wam_ros.network import move_to_free_domain
     from wam_ros.topics import NAMESPACE
 
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     import_nodes(configuration, given)
     stop = Stop()
-    if moved := move_to_free_domain(NAMESPACE, os.environ):
-        print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
     with (
-        page_next_to(given, NAMESPACE, is_paced(configuration)) as close_page,
+        page_next_to(given, NAMESPACE, lambda: stop.is_set) as close_page,
         start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
     ):
         driver: Any = getattr(stack, "nodes", {}).get("driver")

@@ -33,9 +33,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, files_of
 from wam_description.parameters import ParameterError
 from wam_ros.bring_up import Composition
-from wam_ros.network import move_to_free_domain
 from wam_ros.process_signals import Stop
-from wam_ros.topics import NAMESPACE
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
 from wam_studies.identification.excitation import scenario
@@ -177,8 +175,6 @@ def _play(configuration: Configuration, seconds: float) -> bool:
         where it failed.
     """
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
-    if moved := move_to_free_domain(NAMESPACE, os.environ):
-        print(moved, flush=True)
 
     def is_stopped(now: float) -> bool:
         progress(min(int(now), int(seconds)), int(seconds))

@@ -4,7 +4,7 @@ import argparse
 import os
 import subprocess
 import sys
-import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +16,7 @@ from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
-LATE: Final = 5.0  # s, after which a page that is not there yet is reported
+LATE: Final = 20.0  # s, for which a stack waits for its page
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
     "The page needs viser, pip install 'wam_stack[live]', and is reachable from this machine alone; --tf needs "
@@ -65,12 +65,14 @@ def run(given: argparse.Namespace) -> int:
 def _page(given: argparse.Namespace) -> None:
     from wam_ros.run import PARENT
 
-    if PARENT in os.environ:  # the stack comes first
-        set_priority(0, NICENESS)
     with needing_viser():
         from wam_live.live_page import LivePage
     stop = Stop()
-    LivePage(given.namespace, free_port(given.port, _print), _print).run(lambda: stop.is_set)
+    page = LivePage(given.namespace, free_port(given.port, _print), _print)
+    page.open()
+    if PARENT in os.environ:  # from now on the stack comes first
+        set_priority(0, NICENESS)
+    page.run(lambda: stop.is_set)
 
 
 def _frames(given: argparse.Namespace) -> None:
@@ -133,16 +135,18 @@ def _run_of(given: argparse.Namespace) -> Any:
 
 
 @contextmanager
-def page_next_to(given: argparse.Namespace, namespace: str, is_paced: bool = True) -> Iterator[Callable[[], None]]:
+def page_next_to(
+    given: argparse.Namespace, namespace: str, is_stopped: Callable[[], bool] = lambda: False
+) -> Iterator[Callable[[], None]]:
     """The page of a stack that is about to start, as its options set it; yields what ends it.
 
-    It is to be ended before the stack, which at its end waits for its listeners.
+    It waits until the page can be opened.  End the page before the stack, which at its end waits for its listeners.
 
     Parameters
     ----------
     given : options of `take_page`.
     namespace : of the stack.
-    is_paced : whether the stack leaves the processor time to others, see `wam_cli.commands.is_paced`.
+    is_stopped : whether to wait no longer.
 
     Raises
     ------
@@ -161,8 +165,8 @@ def page_next_to(given: argparse.Namespace, namespace: str, is_paced: bool = Tru
         yield lambda: None
         return
     page = PageProcess(port, namespace)
-    page.report_if_late(is_paced)
     try:
+        page.wait(is_stopped)
         yield page.close
     finally:
         page.close()
@@ -180,23 +184,18 @@ class PageProcess:
             command, start_new_session=True, stdin=subprocess.DEVNULL, env={**os.environ, PARENT: str(os.getpid())}
         )
         self._port = port
-        self._report: threading.Timer | None = None
 
-    def report_if_late(self, is_paced: bool) -> None:
-        """Print a line if the page is not there after LATE; `is_paced` as in `page_next_to`."""
-
-        def report() -> None:
-            if self._process.poll() is None and (text := lateness(self._port, is_paced)):
-                _print(text)
-
-        self._report = threading.Timer(LATE, report)
-        self._report.daemon = True
-        self._report.start()
+    def wait(self, is_stopped: Callable[[], bool]) -> None:
+        """Wait until the page can be opened, has ended, or is LATE."""
+        late = time.monotonic() + LATE
+        while self._process.poll() is None and port_is_free(self._port) and not is_stopped():
+            if time.monotonic() > late:
+                _print(f"the live page is still starting; it will be at {url(self._port)}")
+                return
+            time.sleep(0.05)
 
     def close(self) -> None:
         """End the page."""
-        if self._report is not None:
-            self._report.cancel()
         if self._process.poll() is None:
             self._process.terminate()
             try:
@@ -204,14 +203,6 @@ class PageProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-
-
-def lateness(port: int, is_paced: bool) -> str:
-    """That the page at a port of this machine is not there yet, and what helps; '' where it is."""
-    if not port_is_free(port):
-        return ""
-    text = f"the live page is still starting, as the nodes come first; it will be at {url(port)}"
-    return text if is_paced else f"{text}; the run may end before it: --real-time-factor 1 leaves it the time"
 
 
 def _print(line: str) -> None:

@@ -8,7 +8,6 @@ from wam_cli.commands.live import page_next_to
 from wam_cli.options import (
     configuration_of,
     filled,
-    is_paced,
     processes_of,
     take_configuration,
     take_page,
@@ -68,7 +67,7 @@ def run(given: argparse.Namespace) -> int:
     stop = Stop()
     processes = processes_of(configuration, given)
     with (
-        page_next_to(given, given.namespace, is_paced(configuration)) as close_page,
+        page_next_to(given, given.namespace, lambda: stop.is_set) as close_page,
         start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
