@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
-from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.configuration import Configuration, differences, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.thresholds import LIVE
 from wam_sim.batch import executor
@@ -161,8 +161,10 @@ def take_configuration(parser: argparse.ArgumentParser, default: str | None = BA
 
 
 def configuration_of(given: argparse.Namespace) -> Configuration:
-    """The configuration that --config names, with the values of --set."""
-    loaded = Configuration.load(configuration_file(given))
+    """The configuration that --config names, with the values of --set; prints what a file of your own changes."""
+    file = configuration_file(given)
+    print(*(f"{line}\n" for line in differences(file)), sep="", end="", file=sys.stderr, flush=True)
+    loaded = Configuration.load(file)
     return loaded.with_values(option_values(given.values)) if given.values else loaded
 
 

@@ -4,6 +4,7 @@ import difflib
 import hashlib
 import os
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +22,10 @@ BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
 LONGEST = 60  # characters of a value that is refused
 MOST_OVERLAYS = 20  # files that build on each other
+MOST_DIFFERENCES = 12  # parameters that are named
+LONGEST_DIFFERENCE = 100  # characters of two values
+LENGTHS = ("arm.covers.length", "arm.joints.length", "arm.joints.offset")
+MASSES = ("arm.links.mass", "arm.links.centre", "arm.links.inertia")
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
 _DERIVED = frozenset(field.name for field in fields(Shared) if field.derived)  # a file need not give them
 
@@ -227,6 +232,47 @@ def files_of(path: str | Path) -> list[Path]:
         tree = _tree(name, name.read_text(encoding="utf-8"))
         name = _base(name, tree[BASE], ()) if isinstance(tree, dict) and BASE in tree else None
     return found
+
+
+def differences(path: str | Path) -> list[str]:
+    """What a file of your own changes in the packaged configuration that it is based on, as lines for people.
+
+    Parameters
+    ----------
+    path : of the configuration; of a packaged one, or one without a base, there are no lines.
+
+    Raises
+    ------
+    ParameterError
+        as `Configuration.load`.
+    """
+    files = files_of(path)
+    first, last = files[0], files[-1]
+    if first is last or first.resolve().parent in _present_folders():
+        return []
+    own, base = Configuration.load(first).sections, Configuration.load(last).sections
+    changed = {
+        key if section == SHARED else f"{section}:{key}": (base.get(section, {}).get(key), value)
+        for section, flat in own.items()
+        for key, value in flat.items()
+        if base.get(section, {}).get(key) != value
+    }
+    rows = [row for name, (old, new) in changed.items() for row in _changes(name, old, new)]
+    more = [f"  and {len(rows) - MOST_DIFFERENCES} more"] if len(rows) > MOST_DIFFERENCES else []
+    lengths = [name for name in LENGTHS if name in changed]
+    is_asked = lengths and not any(name in changed for name in MASSES)
+    question = (
+        f"{', '.join(lengths)} changed: does the link weigh as much as before? If not, change {', '.join(MASSES)}"
+    )
+    return [f"{first} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_asked else [])]
+
+
+def _changes(name: str, old: Any, new: Any) -> list[str]:
+    """A line for a value that has changed; of two lists of one length, a line for each element that has."""
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [f"  {name}[{i}]: {one}, now {other}" for i, (one, other) in pairs if one != other]
+    return [f"  {name}: {textwrap.shorten(f'{old}, now {new}', LONGEST_DIFFERENCE)}"]
 
 
 def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from wam_control.task.scenario_values import number
-from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.configuration import Configuration, differences, option_values, packaged
 from wam_description.parameters import ParameterError, build, parameter
 from wam_sim.simulation import Simulation
 
@@ -421,3 +421,21 @@ def test_a_node_that_is_listed_already_is_not_added_again() -> None:
     listed = Configuration.load(packaged("wam")).with_nodes("scenario", "recorder")
     assert listed.shared.nodes[-2:] == ("scenario", "recorder")
     assert listed.with_nodes("recorder", "scenario").shared.nodes == listed.shared.nodes
+
+
+LONGER = "covers: {length: [0.5588, 0.5]}, tool: [0.5, 0.0, 0.0]"
+
+
+@pytest.mark.parametrize(
+    ("arm", "is_asked"), [(LONGER, True), (f"{LONGER}, links: {{mass: [7.68, 3.59, 1.95, 1.2]}}", False)]
+)
+def test_a_file_shows_what_it_changes_and_asks_about_the_mass_of_a_longer_link(
+    arm: str, is_asked: bool, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"base: wam\n/**: {{ros__parameters: {{arm: {{{arm}}}}}}}\n")
+    lines = differences(file)
+    assert lines[0] == f"{file} differs from wam:"
+    assert {"  arm.covers.length[1]: 0.4064, now 0.5", "  arm.tool[0]: 0.4064, now 0.5"} <= set(lines)
+    assert ("as heavy as before?" in lines[-1]) == is_asked
+    assert differences(packaged("wam")) == differences(packaged("barrett-wam7")) == []
