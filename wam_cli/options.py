@@ -215,7 +215,9 @@ def _is_given(given: argparse.Namespace, option: str) -> bool:
 
 def take_arm(parser: argparse.ArgumentParser) -> None:
     """Give a command that reads a bag the option --namespace."""
-    parser.add_argument("--namespace", type=namespace, help="of the arm in the bag; default: that with the most topics")
+    parser.add_argument(
+        "--namespace", type=namespace, help="namespace of the arm in the bag; default: that with the most topics"
+    )
 
 
 def take_stack(parser: argparse.ArgumentParser) -> None:
@@ -240,19 +242,19 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="a process for each node, or grouped: for the inner loop, the outer loop and the recorder; default: all "
-        "in one process; grouped in realtime",
+        help="each: one process per node; grouped: one each for inner loop, outer loop and recorder; default: all "
+        "nodes in one process, in realtime grouped",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="do not wait for commands, as a real driver; default: timing.mode, lockstep",
+        help="run with the clock, as a real arm does, without waiting for commands; default: lockstep (timing.mode)",
     )
     parser.add_argument(
         "--real-time-factor",
         type=bounded(float),
         metavar="FACTOR",
-        help="speed of lockstep: 1 as the wall clock, 0 as fast as it can; default: timing.real_time_factor",
+        help="pace of lockstep: 1 is that of the wall clock, 0 as fast as possible; default: timing.real_time_factor",
     )
 
 
@@ -274,7 +276,7 @@ def processes_of(configuration: Configuration, given: argparse.Namespace) -> str
 def take_port(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --port."""
     parser.add_argument(
-        "--port", type=_PORT, help=f"of the page on this machine; default: {LIVE.port}, or the next one that is free"
+        "--port", type=_PORT, help=f"port of the page on this machine; default: {LIVE.port}, or the next free one"
     )
 
 
@@ -284,7 +286,7 @@ def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
         "--live",
         action=argparse.BooleanOptionalAction,
         default=default,
-        help="show the arm in the browser; default: " + ("no" if default is False else "where that is possible"),
+        help="show the arm in the browser; default: " + ("no" if default is False else "yes, if that is possible"),
     )
     take_port(parser)
 
@@ -309,9 +311,9 @@ def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
         type=Path,
         default=default_file(name),
         metavar="FILE",
-        help="what is finished is kept and looked for here, a line of JSON each; default: %(default)s",
+        help="keep finished runs in this file, and take them from it; default: %(default)s",
     )
-    kept.add_argument("--fresh", action="store_true", help="compute everything, keep nothing")
+    kept.add_argument("--fresh", action="store_true", help="compute every run, keep none")
 
 
 @contextmanager
@@ -325,15 +327,15 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
 
 
 OTHER_ROBOT = (
-    ("--topic", "TOPIC", "analyse this topic only; of any type, with --map"),
-    ("--joint", "JOINT", "analyse this joint only; or the names of joints that have none in the messages"),
-    ("--command", "TOPIC", "what was commanded; else the reference in the state of a controller"),
+    ("--topic", "TOPIC", "analyse this topic only; with --map it may have any type"),
+    ("--joint", "JOINT", "analyse this joint only; or give names to the joints of messages without names"),
+    ("--command", "TOPIC", "topic of the commands; default: the reference in the state of a controller"),
     (
         "--map",
         "QUANTITY=FIELD",
         f"field of the messages, as effort=current or stamp=sec,nanosec; {', '.join(MAPPED)}",
     ),
-    ("--unit", "QUANTITY=UNIT", "of what was recorded, as position=deg or effort=mA, or a factor as effort=0.12"),
+    ("--unit", "QUANTITY=UNIT", "unit of a quantity, as position=deg or effort=mA, or a factor as effort=0.12"),
 )
 
 

@@ -261,9 +261,7 @@ def differences(path: str | Path) -> list[str]:
     more = [f"  and {len(rows) - MOST_DIFFERENCES} more"] if len(rows) > MOST_DIFFERENCES else []
     lengths = [name for name in LENGTHS if name in changed]
     is_asked = lengths and not any(name in changed for name in MASSES)
-    question = (
-        f"{', '.join(lengths)} changed: does the link weigh as much as before? If not, change {', '.join(MASSES)}"
-    )
+    question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
     return [f"{first} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_asked else [])]
 
 

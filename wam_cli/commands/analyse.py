@@ -28,8 +28,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steps",
         action="store_true",
-        help="instead: the report of 'wam demo', whether each step of the scenario did what was commanded; exit code 1 "
-        "if a result is NO or the run failed",
+        help="print the report of 'wam demo': was each command carried out; exit code 1 if a result is NO or the run "
+        "failed",
     )
     take_arm(parser)
     take_topic_map(parser)

@@ -31,12 +31,12 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "enable": ("release the brakes", (Call("driver", "enable", True),)),
     "disable": ("put on the brakes", (Call("driver", "enable", False),)),
     "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
-    "reset_fault": ("forget the latched fault", (Call("driver", "reset_fault"),)),
-    "confirm_home": ("state that a real arm is at its home pose", (Call("driver", "confirm_home"),)),
+    "reset_fault": ("clear the latched fault", (Call("driver", "reset_fault"),)),
+    "confirm_home": ("confirm that a real arm is at its home pose", (Call("driver", "confirm_home"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("let the force loop count the present external torques as zero", (Call("force_loop", "tare"),)),
+    "tare": ("take the present external torques as zero force", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
-    "step": ("pause, and let one period pass", (Call("driver", "pause", True), Call("driver", "step"))),
+    "step": ("pause, then advance by one period", (Call("driver", "pause", True), Call("driver", "step"))),
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
@@ -56,17 +56,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         requests.add_parser(name, parents=[where], help=text, description=f"{text[0].upper()}{text[1:]}.")
     found = requests.add_parser("get", parents=[where], help="print parameters of a node")
     found.add_argument("name", metavar="NODE[:PARAMETER]", help="force_loop, or force_loop:force_gain")
-    found.add_argument("--all", action="store_true", help="of a node also those that all nodes share")
-    new = requests.add_parser("set", parents=[where], help="change a live parameter, or be refused with the reason")
+    found.add_argument("--all", action="store_true", help="also print the parameters that all nodes share")
+    new = requests.add_parser("set", parents=[where], help="change a live parameter")
     new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help=f"for example {EXAMPLE}")
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
-    heard.add_argument("--count", type=COUNT, metavar="N", help="end after so many; default: Ctrl-C")
+    heard.add_argument("--count", type=COUNT, metavar="N", help="end after N messages; default: at Ctrl-C")
     heard.add_argument(
         "--timeout",
         type=bounded(float, unit="s"),
         metavar="S",
-        help="end with exit code 1 after S seconds without a message, the search for the topic included; default: wait",
+        help="end with exit code 1 if no message comes for S seconds; default: wait",
     )
     pushed = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     pushed._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
@@ -80,7 +80,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     pushed.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
     pushed.add_argument(
-        "--seconds", type=bounded(float, unit="s"), default=1.0, help="of the arm's time; default: %(default)g"
+        "--seconds", type=bounded(float, unit="s"), default=1.0, help="in the arm's time; default: %(default)g"
     )
 
 

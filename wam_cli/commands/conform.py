@@ -30,8 +30,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--bus",
         default="",
         metavar="CHANNEL",
-        help="bus of a configuration for a real arm: can0, or INTERFACE:CHANNEL of python-can; simulated:200 is a "
-        "simulated one with firmware 200",
+        help="bus of a real arm: can0, or INTERFACE:CHANNEL of python-can; simulated:200 simulates a bus with firmware "
+        "200",
     )
     parser.add_argument(
         "--arm",
@@ -44,7 +44,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--dry-run",
         type=bounded(float, 0.1, 3600.0, "s"),
         metavar="SECONDS",
-        help="instead: listen to the bus for so long without sending a frame, then print what the driver would send",
+        help="no test: listen to the bus for SECONDS, send nothing, then print what the driver would send",
     )
     parser.add_argument(
         "--running",
@@ -56,25 +56,25 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded(float, unit="A"),
         default=0.4,
         metavar="A",
-        help="current on the first motor beyond what carries the links, with a changing sign; default: %(default)s",
+        help="current of the first motor in addition to what carries the links, of either sign; default: %(default)s",
     )
     parser.add_argument(
         "--share",
         type=bounded(float, 0.0, 1.0),
         default=0.9,
         metavar="FRACTION",
-        help="of the periods in which a state has to come; default: %(default)s",
+        help="fraction of the periods that need a state; default: %(default)s",
     )
     parser.add_argument(
         "--attempts",
         type=COUNT,
         default=5,
         metavar="N",
-        help="at each row, as a busy machine delays a driver that is right; default: %(default)s",
+        help="attempts at each row, as a busy machine delays a correct driver; default: %(default)s",
     )
     parser.epilog = (
-        "The brakes are released several times and small currents flow: on a real arm keep its range clear and the "
-        "emergency stop in your hand."
+        "The test releases the brakes several times, and small currents flow. On a real arm, keep its range clear and a "
+        "hand on the emergency stop."
     )
 
 

@@ -33,8 +33,8 @@ from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
-    "Exit code: 0 if it was played to its end and no result is wrong; 1 if a result is NO, as for a force that was "
-    "refused, a quantity of a task is MISSED, or it failed; 130 if it was stopped."
+    "Exit code: 0 if it was played to its end and every result is right; 1 if it failed, or a result is NO or MISSED; "
+    "130 if you stopped it."
 )
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
 LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
@@ -122,7 +122,7 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     count = f"{len(steps)} step{'s' * (len(steps) != 1)}"
     print(f"Task {task or script_file(script).stem}: {count}, up to {seconds:g} s of the arm's time")
     if pushes:
-        print(f"  the simulator pushes the arm: {pushed}; the contact estimator has to find where, from the torques")
+        print(f"  the simulator pushes the arm: {pushed}; the estimator finds link and position from the torques")
     if presses:
         who = "the force loop presses with" if "force_loop" in configuration.shared.nodes else "commanded forces:"
         print(f"  {who} {', '.join(f'{newtons:g}' for newtons in presses)} N")

@@ -49,15 +49,15 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
     """Options of a study: those of all, and its own."""
     seeds = " ".join(map(str, kind.seeds))
     parser.add_argument(
-        "--seeds", type=SEED, nargs="+", default=list(kind.seeds), help=f"of the cases, default {seeds}"
+        "--seeds", type=SEED, nargs="+", default=list(kind.seeds), help=f"seeds of the cases, default {seeds}"
     )
     parser.add_argument(
-        "--cases", type=COUNT, metavar="N", help=f"the first of each seed, default {kind.count or 'all'}"
+        "--cases", type=COUNT, metavar="N", help=f"number of cases of each seed, default {kind.count or 'all'}"
     )
     parser.add_argument(
-        "--only", type=bounded(int), nargs="+", metavar="NUMBER", help="cases of these numbers, each in full"
+        "--only", type=bounded(int), nargs="+", metavar="NUMBER", help="only these cases, each printed in full"
     )
-    parser.add_argument("--write", type=PAGE, help=f"page whose section is written, for example {kind.page}")
+    parser.add_argument("--write", type=PAGE, help=f"write the result into a page, for example {kind.page}")
     for one in _options(kind):
         _add(parser, one)
     take_configuration(parser)

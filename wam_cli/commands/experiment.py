@@ -37,8 +37,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         choices=("check", "make"),
-        help="instead: check the sample bags that the index in --directory lists, or record and cut them again; of "
-        "experiments and tasks, default all",
+        help="check the sample bags in the index of --directory, or record and cut them again; default: of all "
+        "experiments and tasks",
     )
     parser.add_argument(
         "--directory", type=Path, default=Path("bags"), help="directory for bags and pictures; default: bags"

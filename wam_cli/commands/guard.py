@@ -23,8 +23,8 @@ from wam_studies.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 PLANT = {  # option: what it is
-    "inertia": "of the driven link, kg m^2 or kg",
-    "damping": "viscous, N m s/rad or N s/m",
+    "inertia": "inertia of the driven link, kg m^2 or kg",
+    "damping": "viscous damping, N m s/rad or N s/m",
     "transmission": "stiffness k_tr, N m/rad or N/m",
     "contact": "stiffness k_c of the stiffest surface, N m/rad or N/m",
     "friction": "dynamic (Coulomb) friction, N m or N",
@@ -32,9 +32,9 @@ PLANT = {  # option: what it is
 }
 LOOP = {  # option: default, what it is
     "limit": (math.inf, "saturation of the error; default: none"),
-    "deadband": (0.0, "of the error; default: 0"),
-    "rate": (0.0, "of the samples, Hz; default: 0, a continuous loop"),
-    "delay": (0.0, "from sample to command, s; default: 0"),
+    "deadband": (0.0, "deadband of the error; default: 0"),
+    "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
+    "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
 WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor")  # facts of a running arm
 NUMBERS = (*PLANT, "stiction", *LOOP)
@@ -43,16 +43,16 @@ NUMBERS = (*PLANT, "stiction", *LOOP)
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_configuration(parser, default=None)
-    own = parser.add_argument_group("a force loop of your own", "the first six are needed; consistent units")
+    own = parser.add_argument_group("a force loop of your own", "give the first six, in consistent units")
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
     own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
     for name, (_, text) in LOOP.items():
         own.add_argument(f"--{name}", type=float, help=text)
+    own.add_argument("--bag", type=Path, help="take numbers that are not given from this recording")
     own.add_argument(
-        "--bag", type=Path, help="take from this recording what is not given: wam identify for a force loop"
+        "--picture", type=PICTURE, help="draw the loop and the bound of stability into this PNG, PDF or SVG"
     )
-    own.add_argument("--picture", type=PICTURE, help="write the stability bound with the loop on it, PNG, PDF or SVG")
     take_topic_map(parser)
 
 

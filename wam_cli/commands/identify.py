@@ -51,16 +51,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--excite",
         metavar="SCENARIO",
         type=MOVES,
-        help="write a scenario of moves that show the parameters, play it in the simulation and identify from its bag",
+        help="write a scenario with informative moves, play it in the simulation and identify from its bag",
     )
     length = bounded(float, 10.0, 3600.0, "s")  # the choice of its moves takes minutes
     parser.add_argument("--seconds", type=length, help="with --excite: length of the motion, default 60")
     parser.add_argument("--seed", type=SEED, help="with --excite: seed of the moves, default 1")
     parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
-    parser.add_argument("--directory", type=writable_directory, help="with --excite: of the bag, default bags")
-    parser.add_argument("--write", type=MODEL, metavar="YAML", help="configuration to write, for --config or base:")
     parser.add_argument(
-        "--force", action="store_true", help="with --write: write also a model that contradicts the configured arm"
+        "--directory", type=writable_directory, help="with --excite: where the bag is made, default bags"
+    )
+    parser.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
+    parser.add_argument(
+        "--force", action="store_true", help="with --write: also write a model that contradicts the configured arm"
     )
     take_arm(parser)
     take_configuration(parser)

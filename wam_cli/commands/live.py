@@ -19,24 +19,24 @@ PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 20.0  # s, for which a stack waits for its page
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
-    "The page needs viser, pip install 'wam_stack[live]', and is reachable from this machine alone; --tf needs "
-    "tf2_msgs and --trajectories control_msgs, of a ROS installation."
+    "The page needs viser: pip install 'wam_stack[live]'. Only this machine reaches it. --tf needs tf2_msgs, "
+    "--trajectories control_msgs, from a ROS installation."
 )
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
-    where = "of the stack, default wam; or of the arm in the bag, default that with the most topics"
+    where = "namespace of the stack, default wam; or of the arm in the bag, default that with the most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
-    parser.add_argument("--at", type=float, metavar="SECONDS", help="of a bag: show this time and do not play")
+    parser.add_argument("--at", type=float, metavar="SECONDS", help="with a bag: show this time, do not play")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
     way.add_argument(
         "--trajectories", action="store_true", help="no page: serve the action FollowJointTrajectory, as for MoveIt"
     )
-    parser.add_argument("--frame-prefix", help="of --tf: put before every frame, for example left/")
+    parser.add_argument("--frame-prefix", help="with --tf: prefix of every frame, for example left/")
     parser.epilog = NEEDS
 
 

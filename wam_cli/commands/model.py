@@ -16,7 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "format",
         choices=("urdf", "mjcf", "scorecard"),
-        help="model as URDF or MJCF, or a table: the arm compared with the requisites of chapter 3",
+        help="the arm as URDF or MJCF, or the table of chapter 3: requisites for force control",
     )
     parser.add_argument(
         "--ros2-control",

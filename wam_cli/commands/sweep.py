@@ -56,7 +56,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--experiment",
         type=filled,
         metavar="NAME",
-        help="of the thesis, or a whole-arm task, with its own configuration",
+        help="an experiment of the thesis or a whole-arm task, with its own configuration",
     )
     parser.add_argument(
         "--vary",
@@ -64,23 +64,23 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         type=_axis,
         metavar="NAME=VALUES",
-        help="parameter and its values, for example 'force_loop:force_gain=0.005,0.01'; LOW:HIGH:N for N values that "
-        "rise by a constant factor; may be repeated",
+        help="parameter and its values, for example 'force_loop:force_gain=0.005,0.01'; LOW:HIGH:N gives N values with "
+        "a constant ratio; may be repeated",
     )
     kind = parser.add_mutually_exclusive_group()
-    kind.add_argument("--list", action="store_true", help="first values together, then the second ones and so on")
+    kind.add_argument("--list", action="store_true", help="no grid: run k has the value k of each --vary")
     kind.add_argument(
         "--random",
         type=bounded(int, 1, MOST_SETS),
         metavar="RUNS",
-        help="draw so many sets of numbers between the two values of each parameter, evenly, or by a factor where both "
-        "are above 0; not for whole numbers",
+        help="draw this many sets at random, between the two values of each parameter; evenly, or in the logarithm if "
+        "both are above 0; not for whole numbers",
     )
-    parser.add_argument("--seed", type=SEED, help="of --random; default: 1")
+    parser.add_argument("--seed", type=SEED, help="seed of --random; default: 1")
     parser.add_argument(
         "--picture",
         type=PICTURE,
-        help="plot over each parameter of the force error, or of what an experiment measures, PNG, PDF or SVG",
+        help="plot the force error, or what an experiment measures, over each parameter: PNG, PDF or SVG",
     )
     take_batch(parser, "sweep")
 
