@@ -245,26 +245,25 @@ class Timing:
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "niceness of the nodes but the recorder, and of their sessions, in realtime, where the system grants this and "
-        "not timing.fifo_priority; 0: as other programs",
+        "niceness in realtime of all nodes but the recorder, if the system does not grant "
+        "timing.fifo_priority; 0: as other programs",
         low=-20,
         high=0,
     )
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     real_time_factor: float = parameter(
-        "simulated time per time of the wall clock in lockstep, which is slower where the machine is; 0.001 at "
-        "least, or 0: as fast as it can",
+        "largest pace of lockstep, simulated time over wall clock; at least 0.001, or 0: as fast as possible",
         low=0.0,
         high=100.0,
     )
     dither_cycle: int = parameter(
-        "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
+        "inner periods in one cycle of the dither, which shows contact at rest; 0: no dither",
         low=0,
         high=1000,
     )
     fifo_priority: int = parameter(
-        "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; that of the other nodes "
-        "but the recorder is one less; 0: not requested; interrupts have 50",
+        "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; the other "
+        "nodes but the recorder have one less; 0: none requested",
         low=0,
         high=49,
     )
@@ -323,7 +322,7 @@ class InputAges:
     """Ages from which an input counts as absent; also how far its stamp may be ahead of the newest state."""
 
     feedback: float = parameter(
-        "age from which what another node sends is absent; where the arm cannot do without, the driver brakes",
+        "age from which a message of another node counts as absent; the driver brakes if the arm needs it",
         "s",
         low=0.002,
         high=1.0,

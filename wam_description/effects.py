@@ -35,16 +35,15 @@ class Effects:
     ripples: Ripples
     creep: bool = parameter("true if cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
     backlash: tuple[float, ...] = parameter(
-        "play of each circuit at its motor, one for all or one each; above 0 it is a gear or shaft without pretension "
-        "(2.2), which slack does not concern",
+        "play of each circuit at its motor, one for all or one each; above 0 the circuit is a gear or "
+        "shaft without pretension (2.2)",
         "rad",
         low=0.0,
         high=10.0,
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     pretension_share: tuple[float, ...] = tunable(
-        "active pretension (6.5): part of arm.cables.pretension to which cables are tightened, one for all or one "
-        "each; it changes at once",
+        "active pretension (6.5): fraction of arm.cables.pretension, one for all or one each; it changes at once",
         high=10.0,
     )
     tension_friction: tuple[float, ...] = parameter(
@@ -54,8 +53,8 @@ class Effects:
         high=1.0,
     )
     included_in_friction: bool = parameter(
-        "true if the friction of arm.motors is a measured breakaway torque, of which friction by tension and ripples "
-        "of the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
+        "true: the friction of arm.motors is measured and includes friction by tension and ripples "
+        "(7.2.2), so the plant's dry friction is the rest; false: they are added",
     )
     added_coulomb_friction: tuple[float, ...] = tunable(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0

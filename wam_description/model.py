@@ -62,7 +62,7 @@ class JointModel:
     coulomb: tuple[float, ...] = like(
         Joints,
         "arm.joints.dynamic_friction",
-        "dynamic friction F_c; identified: 0 at a joint with a motor of its own, where it is part of the motor's",
+        "dynamic friction F_c; if identified, 0 at a joint with its own motor, whose friction includes it",
     )
     static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")

@@ -201,7 +201,7 @@ TOPICS: Final = (
     _joints(
         "joint_sensors",
         "inner",
-        "joint1..N: joint-side encoder in rad and rad/s, strain torque on the link side of the friction in N m",
+        "joint1..N: joint-side encoder in rad and rad/s; strain torque in N m, on the link side of the friction",
         needs_joint_sensors=True,
     ),
     _joints("joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m"),
@@ -227,8 +227,7 @@ TOPICS: Final = (
         "joint_trajectory",
         TRAJECTORY,
         "outer",
-        "postures to go through, by your program, in place of `joint_posture_command`, rad; streamed, the same one "
-        "goes on",
+        "postures to go through, rad, from your program, in place of `joint_posture_command`; stream it",
         "joints",
     ),
     _joints("joint_torque_command", "outer", "joint torques commanded in the joint_torque mode, by your program, N m"),
@@ -237,8 +236,8 @@ TOPICS: Final = (
         "task_command",
         TABLE,
         "outer",
-        "forces, velocities, positions and impedances along chosen axes, the first with priority, one row each; no row: "
-        "no task; float64 columns: see docs/tasks.md",
+        "forces, velocities, positions and impedances along chosen axes, one row each; no row: no task; "
+        "float64 columns: see docs/tasks.md",
         columns=TASK_COLUMNS,
     ),
     Topic(
@@ -258,15 +257,15 @@ TOPICS: Final = (
         "force_axis",
         TABLE,
         "display",
-        "how well the commanded force can be measured and applied here, and what the force loop does; frame = the cover, "
-        "no row without a command; at once where the event changes; float64 columns: see docs/force.md",
+        "how well the commanded force is measured and held; frame = the cover; no row without a command; "
+        "also at each new event; float64 columns: see docs/force.md",
         columns=FORCE_AXIS_COLUMNS,
     ),
     _joints(
         "external_torque_zero",
         "outer",
-        "effort = torque of the joint sensors that the force loop takes as that of a free arm, N m: of `~/tare`, and of "
-        "the start of a force; as it changes, the estimator knows the weight of the arm better",
+        "effort = torques of the joint sensors that count as zero force, N m, by `~/tare` or at the "
+        "start of a force; the estimator corrects the arm's weight by them",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
@@ -286,16 +285,16 @@ TOPICS: Final = (
         "contact/hypotheses",
         TABLE,
         "outer",
-        "one row per hypothesis, the most probable first, none without contact; float64 columns: "
-        "link, probability, position (m) and so on, see docs/estimator.md",
+        "one row per hypothesis, the most probable first; no row without contact; float64 columns: see "
+        "docs/estimator.md",
         columns=HYPOTHESIS_COLUMNS,
     ),
     Topic(
         "contact/tracked_friction",
         TABLE,
         "1 Hz",
-        "friction that the estimator takes, followed between contacts, one row per shaft: the motors, then the joints; "
-        "only where motors are observed; float64 columns: see docs/estimator.md",
+        "tracked friction, one row per shaft, motors first; only if motors are observed; float64 "
+        "columns: see docs/estimator.md",
         columns=FRICTION_COLUMNS,
     ),
     Topic("contact/in_contact", BOOL, "latched", "whether something touches the arm"),
@@ -303,21 +302,21 @@ TOPICS: Final = (
         "contact/markers",
         "visualization_msgs/msg/MarkerArray",
         "display",
-        "the contact as an arrow and a sphere, and the likely positions, 90 % in all, as a band along the links",
+        "the contact as an arrow and a sphere; the positions with 90 % probability as a band along the links",
     ),
     _joints("sim/joint_states", "outer", "truth: joint angles, velocities, torques through the cables"),
     Topic(
         "sim/contact/wrench",
         WRENCH,
         "outer",
-        "truth: force of the world on the link with the largest load, moment about the origin of its cover, the frame",
+        "truth: force of the world on the link with the largest load; frame = its cover, moment about its origin",
     ),
     Topic("sim/contact/point", POINT, "outer", "truth: x = position along that link, NaN without contact"),
     Topic(
         "sim/objects",
         TABLE,
         "outer",
-        "truth: one row per free body, door and moving obstacle, none published without any; frame base; float64 "
+        "truth: one row per free body, door and moving obstacle, if there are any; frame base; float64 "
         "columns: see docs/tasks.md",
         columns=ObjectState._fields,
     ),
@@ -325,8 +324,8 @@ TOPICS: Final = (
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force at and torque about the origin of the cover named by frame_id; it ends with one on another cover, and "
-        "`ages.command` after the last one",
+        "a push: force and torque at the origin of the cover frame_id, N and N m; it ends `ages.command` after the last "
+        "message, or with a push on another cover",
     ),
     Topic("robot_description", STRING, "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),

@@ -85,7 +85,8 @@ class Pushers:
     names: tuple[str, ...] = parameter("names of the pushers")
     shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=PUSHER_SHAPES)
     sizes: tuple[float, ...] = parameter(
-        "three numbers each: sphere radius, 0, 0; box half lengths along the link, across it and along the force",
+        "three numbers each: radius of a sphere, 0, 0; or half lengths of a box along the link, across "
+        "it, along the force",
         "m",
         low=0.0,
         high=10.0,

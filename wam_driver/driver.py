@@ -44,18 +44,18 @@ class DriverParameters:
         high=1.0,
     )
     brake_torque: float = parameter(
-        "torque at which the brake of a rotor slips, so that it stops a moving arm without breaking a cable",
+        "torque at which the brake of a rotor slips, so that braking breaks no cable",
         "N m",
         low=0.1,
         high=1e3,
     )
     cover_speed_limit: float = parameter(
-        "speed of the start of a cover, where it meets the link before, above which there is a fault",
+        "limit of the speed of the start of a cover, where it meets the link before",
         "m/s",
         low=0.0,
         high=100.0,
     )
-    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
+    tip_speed_limit: float = parameter("limit of the speed of the tool", "m/s", low=0.0, high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 

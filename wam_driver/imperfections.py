@@ -17,7 +17,7 @@ class AmplifierParameters:
         "standard deviation of the actual current, while it is not zero", "A", low=0.0, high=100.0
     )
     torque_offset: tuple[float, ...] = parameter(
-        "torque of each motor at a commanded and reported current of zero, from the zero of its current sensor",
+        "torque of each motor at a reported current of zero, by the offset of its current sensor",
         "N m",
         low=-100.0,
         high=100.0,

@@ -73,8 +73,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="attempts at each row, as a busy machine delays a correct driver; default: %(default)s",
     )
     parser.epilog = (
-        "The test releases the brakes several times, and small currents flow. On a real arm, keep its range clear and a "
-        "hand on the emergency stop."
+        "The test releases the brakes several times, and small currents flow. On a real arm, keep its range clear and "
+        "a hand on the emergency stop."
     )
 
 

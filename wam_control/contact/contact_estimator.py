@@ -35,7 +35,8 @@ class ContactEstimatorParameters:
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter(
-        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice it in one",
+        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice "
+        "this value in one",
         low=0.0,
         high=1e6,
     )

@@ -24,13 +24,13 @@ class InferenceParameters:
         high=1e3,
     )
     payload_weight: float = parameter(
-        "relative frequency of a mass that is picked up at the tool; 0.1 next to weights of links of 2.65 in all: one "
-        "contact of 28, fewer than of any link",
+        "relative frequency of a mass that is picked up at the tool; the weights of all links are 2.65, "
+        "so 0.1 is one contact of 28",
         low=0.0,
         high=1e3,
     )
     fusion_time: float = parameter(
-        "for how long the torques of a contact explain it together; 0: those of the present moment alone",
+        "time over which the torques of a contact are combined; 0: the present moment alone",
         "s",
         low=0.0,
         high=10.0,

@@ -37,19 +37,19 @@ class SensingParameters:
     )
     friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0)
     zero_limit: float = tunable(
-        "largest external torque of a joint that is taken as zero when a force is commanded, where the arm is at rest "
-        "and the contact estimator finds no contact; 0: never",
+        "largest external torque of a joint that counts as zero when a force begins at rest without an "
+        "estimated contact; 0: none",
         "N m",
         high=1e3,
     )
     least_apparent_mass: float = tunable(
-        "least mass of the arm that the loop sees in the measured force; 0: any, also less than none, with which the "
-        "stable gain is smaller, and the error of the force, too",
+        "least apparent mass of the arm in the measured force; 0: no bound, which gives a smaller stable "
+        "gain and a smaller error of oblique forces",
         "kg",
         high=100.0,
     )
     apparent_mass_limit: float = tunable(
-        "largest such mass; the motion along directions in which it is larger is slowed down; 0: no limit",
+        "largest apparent mass; along directions with a larger one the motion is slower; 0: no limit",
         "kg",
         high=1e6,
     )

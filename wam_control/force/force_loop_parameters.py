@@ -19,40 +19,37 @@ class LimitParameters:
     """Where the force loop stops the arm."""
 
     joint_gain: float = tunable(
-        "largest speed of a joint per distance from where it has to stop; 0: the ends of the joints are not watched",
+        "largest speed of a joint over its distance from the end; 0: the ends are not watched",
         "1/s",
         high=100.0,
     )
     joint_acceleration: float = tunable(
-        "largest change of the commanded velocity of a joint, but away from a push: a law that begins, ends or is "
-        "retuned does not jump; 0: no limit",
+        "largest acceleration of a joint by commands, except away from a push; 0: no limit",
         "rad/s^2",
         high=1e4,
     )
     joint_margin: float = tunable("distance from the end of a joint at which it has to stop", "rad", high=1.0)
     contact_force: float = tunable(
-        "largest force on the arm, as far as the joints measure it; above it the arm gives way", "N"
+        "largest force on the arm, as the joints measure it; above it the arm moves away", "N"
     )
     whole_force: float = tunable(
-        "largest force in all, per commanded force, at its position or, where that is not known, wherever it acts; "
-        "above it the arm gives way",
+        "largest whole force at the contact over the commanded one; above it the arm moves away",
     )
     impact: float = tunable(
-        "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
-        "the speed along the force until something is touched; 0: no limit",
+        "largest predicted impact (3.1) on a surface of guard.contact_stiffness, over the commanded "
+        "force; it limits the speed before the touch; 0: no limit",
         high=1e3,
     )
     settling_time: float = tunable("time after which a force that is still not reached is reported", "s", low=1e-3)
     free_travel: float = tunable(
-        "largest way along a commanded force that is not right, or back against it with what pushes; then the arm "
-        "holds its position",
+        "largest travel along a commanded force that is not reached, or against it under a push; then "
+        "the arm holds its position",
         "m",
     )
-    tolerance: float = tunable(
-        "error up to which a force counts as reached, per commanded force; one that will be off by more is refused"
-    )
+    tolerance: float = tunable("tolerated error of a force, over the commanded one; up to it a force counts as reached")
     doubt: float = tunable(
-        "predicted error per tolerated error up to which a force is tried: more is obeyed more often and holds less",
+        "largest doubt, predicted over tolerated error, with which a force is applied; with a larger "
+        "limit fewer forces are refused and more are wrong",
         low=0.01,
     )
     least_tolerance: float = tunable(
@@ -62,18 +59,17 @@ class LimitParameters:
         "swing of the measured force, per commanded force, from which it is reported as a limit cycle"
     )
     shake_force: float = tunable(
-        "swing of the force, per commanded force, that a shaking arm (dither) may make on a surface of "
-        "guard.contact_stiffness; above it the arm holds its position; with feedback contact_estimate",
+        "largest swing of the force by the dither on a surface of guard.contact_stiffness, over the "
+        "commanded force; above it the arm holds its position; with feedback contact_estimate",
     )
     surface_speed: float = tunable(
-        "largest speed along the force of the surface that will be touched; what the force lags behind it counts as an "
-        "error",
+        "largest speed of the surface along the force; the lag of the force behind it counts as an error",
         "m/s",
         high=10.0,
     )
     slide_speed: float = tunable(
-        "largest speed across the force of the surface that will be touched; what it comes nearer while the friction "
-        "of the arm turns round counts as an error",
+        "largest speed of the surface across the force; its approach while the arm's friction reverses "
+        "counts as an error",
         "m/s",
         high=10.0,
     )
@@ -88,7 +84,7 @@ class ForceLoopParameters:
     limits: LimitParameters
     task: TaskParameters
     mode: str = parameter(
-        "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
+        "hybrid: force along its direction, posture in all others; joint_torque: torque of each joint; "
         "open_loop: J^T F fed forward, no feedback",
         choices=("hybrid", "joint_torque", "open_loop"),
         live=True,
@@ -124,13 +120,13 @@ class ForceLoopParameters:
     torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
     force_feedforward: float = tunable(
-        "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
-        "arm at the surface",
+        "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it "
+        "accelerates a free arm towards the surface",
         high=1.0,
     )
     friction_feedforward: float = tunable(
-        "fraction of the dry friction of the model that is fed forward along the commanded motion while a force is "
-        "controlled; with feedback contact_estimate none, as a dither does the same",
+        "fraction of the model's dry friction that is fed forward along the commanded motion during a "
+        "force; none with feedback contact_estimate",
         high=1.0,
     )
     posture_gain: float = tunable("joint velocity per posture error", "1/s", high=1e3)
@@ -141,8 +137,8 @@ class ForceLoopParameters:
     )
     spring_rest: tuple[float, ...] = tunable("joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0)
     contact_source: str = parameter(
-        "where the force acts: estimated: at the estimated contact if it is certain enough, else as pinned; pinned: at "
-        "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
+        "where the force acts. pinned: at contact_position; estimated: at the estimated contact, if that is certain "
+        "enough. The torque of a force command in a cover's frame pins the position in both cases",
         choices=("estimated", "pinned"),
         live=True,
     )
@@ -154,8 +150,8 @@ class ForceLoopParameters:
         high=1.0,
     )
     schedule: str = parameter(
-        "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "
-        "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",
+        "off: the gains stay; position: the gains follow the estimated contact position and keep the "
+        "margin of contact_position; the worst position counts if the estimate is uncertain",
         choices=("off", "position"),
         live=True,
     )

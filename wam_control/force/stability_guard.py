@@ -37,8 +37,8 @@ class GuardParameters:
     """Assumptions of the guard, and what it does about parameters that are not stable."""
 
     mode: str = parameter(
-        "off: no guard; warn: reports what it finds; refuse: refuses parameters that are not stable; "
-        "limit: lowers the saturation to the stable error in domain II, refuses the rest",
+        "off: no guard; warn: report; refuse: refuse unstable parameters; limit: in domain II lower the "
+        "saturation to the stable error, refuse others",
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )

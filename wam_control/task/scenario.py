@@ -24,19 +24,20 @@ from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; needed",
-    "seconds": "s of the arm's time, at most where the step waits for a contact; needed",
+    "seconds": "s of the arm's time; with `until_force` at most; needed",
     "posture": "rad, an angle for each joint at the end of the step; the arm arrives a little later",
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` may be left out",
-    "tip": "`[x, y, z]`, m in the base frame, to which the tool goes along a straight line",
-    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: N on the world in `base` or in the frame of a "
-    "link; `contact_position`, m along the link, pins it; in `rise`, s, it goes there from the force before; both may "
-    "be left out",
+    "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
+    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: N on the world, in `base` or in the "
+    "frame of a link. Optional: `contact_position`, m along the link, pins the force; `rise`, s, is "
+    "its time to rise",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "N m, a torque for each joint",
-    "until_force": "N; the step ends when a contact of this force is detected; none is a failure",
-    "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
-    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
-    " in its frame, s from the start of the step; without `begin` and `end` for the whole step",
+    "until_force": "N; the step ends when a contact of this force is detected, and fails without one",
+    "chirp": "`{newtons, from, to}`: a sine along the force, N; its frequency goes from one value to another, Hz",
+    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm. The "
+    "position is in m along the link, the force in its frame. `begin` and `end` are optional, s from "
+    "the start of the step",
     "request": "`enable` or `disable` at the start of the step",
     "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
 }
@@ -52,9 +53,7 @@ Motion = GoalMotion | PostureMotion | LineMotion
 class ScenarioParameters:
     """The task to play."""
 
-    script: str = parameter(
-        "YAML file with the steps; a name without a path is looked up in the folder of the configurations"
-    )
+    script: str = parameter("YAML file with the steps, or the name of a packaged scenario")
 
 
 class Push(NamedTuple):

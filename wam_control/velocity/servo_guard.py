@@ -29,7 +29,7 @@ class ServoGuardParameters:
     """Assumptions about the velocity loop, and what is done about gains that are not stable."""
 
     mode: str = parameter(
-        "off: any gains are taken; refuse: gains that are not stable or do not hold the arm are refused",
+        "off: accept any gains; refuse: refuse gains that are not stable or do not hold the arm",
         choices=("off", "refuse"),
     )
     stability_fraction: float = parameter(
@@ -38,7 +38,7 @@ class ServoGuardParameters:
         high=1.0,
     )
     extra_delay: int = parameter(
-        "inner periods by which a current may be delayed in realtime; the gains have to be stable then, too",
+        "inner periods of extra delay of a current in realtime, with which the gains have to be stable",
         low=0,
         high=10,
     )

@@ -14,7 +14,7 @@ class TransformParameters:
     """What the transform knows of the cables."""
 
     creep_correction: bool = parameter(
-        "true if joint angles are corrected by the creep of the cables, (6.19), of the torques that the motors report",
+        "true: joint angles are corrected by the creep of the cables (6.19), from the motor torques",
     )
 
 
