@@ -16,7 +16,7 @@ from wam_ros.priority import set_priority
 from wam_ros.process_signals import Stop, end_at_once_on_signals
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
-LATE: Final = 20.0  # s, for which a stack waits for its page
+LATE: Final = 30.0  # s, for which a stack waits for its page
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
     "The page needs viser: pip install 'wam_stack[live]'. Only this machine reaches it. --tf needs tf2_msgs, "
