@@ -260,9 +260,9 @@ def differences(path: str | Path) -> list[str]:
     rows = [row for name, (old, new) in changed.items() for row in _changes(name, old, new)]
     more = [f"  and {len(rows) - MOST_DIFFERENCES} more"] if len(rows) > MOST_DIFFERENCES else []
     lengths = [name for name in LENGTHS if name in changed]
-    is_asked = lengths and not any(name in changed for name in MASSES)
+    is_open = lengths and not any(name in changed for name in MASSES)
     question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
-    return [f"{first} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_asked else [])]
+    return [f"{first} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_open else [])]
 
 
 def _changes(name: str, old: Any, new: Any) -> list[str]:

@@ -427,15 +427,15 @@ LONGER = "covers: {length: [0.5588, 0.5]}, tool: [0.5, 0.0, 0.0]"
 
 
 @pytest.mark.parametrize(
-    ("arm", "is_asked"), [(LONGER, True), (f"{LONGER}, links: {{mass: [7.68, 3.59, 1.95, 1.2]}}", False)]
+    ("arm", "is_open"), [(LONGER, True), (f"{LONGER}, links: {{mass: [7.68, 3.59, 1.95, 1.2]}}", False)]
 )
 def test_a_file_shows_what_it_changes_and_asks_about_the_mass_of_a_longer_link(
-    arm: str, is_asked: bool, tmp_path: Path
+    arm: str, is_open: bool, tmp_path: Path
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(f"base: wam\n/**: {{ros__parameters: {{arm: {{{arm}}}}}}}\n")
     lines = differences(file)
     assert lines[0] == f"{file} differs from wam:"
     assert {"  arm.covers.length[1]: 0.4064, now 0.5", "  arm.tool[0]: 0.4064, now 0.5"} <= set(lines)
-    assert ("as heavy as before?" in lines[-1]) == is_asked
+    assert ("as heavy as before?" in lines[-1]) == is_open
     assert differences(packaged("wam")) == differences(packaged("barrett-wam7")) == []
