@@ -228,6 +228,15 @@ def test_a_swing_below_the_reported_one_slows_the_arm_down(size: float, share: f
     assert any(found) is is_reported
 
 
+def test_a_force_that_follows_a_sine_of_its_set_point_is_no_oscillation() -> None:
+    pressed = Pressed()
+    for k in range(600):
+        desired = swing(1.0)(k * DT)
+        pressed.axis = AXIS._replace(desired=desired)
+        assert pressed.go(DT, desired) == [[]]
+    assert pressed.watch.oscillation.share == 1.0
+
+
 @pytest.mark.parametrize(("lasting", "is_reported"), [(0.085, False), (1.0, True)])
 def test_an_impact_that_bounces_is_no_oscillation(lasting: float, is_reported: bool) -> None:
     """At a touch the force turned back five times in 75 ms."""

@@ -152,7 +152,7 @@ class ForceLoopNode:
         refusals = self.refusals
         refusals.pop("contact/hypotheses", None)
         commanded: tuple[str, ...] = ()
-        if events or refusals:  # which is that of the command for which it was given
+        if refusals or any(event.holds for event in events):  # of the command for which it was given
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             commanded = tuple(map(brief, values))

@@ -169,9 +169,9 @@ class ForceWatch:
         """
         known, desired, limits = seen.known, axis.desired, own.limits
         error = desired - known.force
-        if not abs(desired - self._desired) <= known.tolerance:
-            self._has_settled, self._pattern = False, None
-        self._desired = desired
+        if not abs(desired - self._desired) <= FORCE.faint_swing * known.tolerance:  # the force turns with its command
+            self._has_settled, self._pattern, self._desired = False, None, desired
+            self.oscillation.rest()
         events = self._decide(axis, known, error, own, dt)
         if self._is_refused:
             return events

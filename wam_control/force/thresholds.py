@@ -33,7 +33,7 @@ class ForceThresholds:
     # speed along a force
     settled: float = 3.0  # time constants within the settling time
     creep: float = 3e-3  # m, least way within the settling time: slower, friction moves the arm in jerks
-    rise: float = 7.0  # latencies of the measured force, in which it may rise to the commanded one
+    rise: float = 6.0  # latencies of the measured force, in which it may rise to the commanded one
     detected: float = 2.0  # latencies of joint sensors, in which a touch is detected at a place that is not known
     identified_rise: float = 0.3  # s, in which the force may rise at a place that is not known
     finest_motion: float = 1.2e-5  # m, of the arm against its friction: a force is not set more finely

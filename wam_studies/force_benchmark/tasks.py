@@ -50,6 +50,7 @@ class TaskRanges:
 
     forces: Range = (1.0, 40.0)  # N
     stiffnesses: Range = (400.0, 4e5)  # N/m: a hundred times the foam that the defaults are for
+    deepest: float = 0.025  # m, to which the force presses a surface: less than half of what the simulator has of it
     frictions: Range = (0.0, 0.8)  # of the surface
     steepest: float = math.radians(75.0)  # lean of a plane from the side of the link
     on_outer: float = 0.85  # share of contacts on the covers after the first
@@ -206,6 +207,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     while not is_clear(body, q, surface):
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
+    surface = surface._replace(stiffness=max(surface.stiffness, force / RANGES.deepest))
     task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
     if random.random() < RANGES.doubled:
         return _doubled(body, task, random)
@@ -221,7 +223,8 @@ def _in_time(task: Task, random: np.random.Generator) -> Task:
     if share < RANGES.stepped:
         change = _log_uniform(random, *RANGES.changes)
         first = task.force * (change if random.random() < RANGES.down else 1.0 / change)
-        return task._replace(before=min(max(first, RANGES.forces[0]), RANGES.forces[1]))
+        most = min(RANGES.forces[1], RANGES.deepest * task.surface.stiffness)
+        return task._replace(before=min(max(first, RANGES.forces[0]), most))
     if share < RANGES.stepped + RANGES.long:
         surface = task.surface._replace(stiffness=_log_uniform(random, RANGES.stiffnesses[0], RANGES.soft))
         conditions = task.conditions._replace(is_pinned=True)
