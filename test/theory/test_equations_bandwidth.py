@@ -44,19 +44,6 @@ def test_hard_contact_leaves_the_rotor_on_its_cable() -> None:
     assert float(lower) / (2 * np.pi) == pytest.approx(72.0, abs=0.5)
 
 
-def test_arguments_broadcast() -> None:
-    found = force_resonances(**TESTBED, contact_stiffness=np.array([100.0, 1000.0]))
-    assert found.lower.shape == (2,)
-    assert float(found.upper[1]) == float(force_resonances(**TESTBED, contact_stiffness=1000.0).upper)
-
-
-@pytest.mark.parametrize("name", [*TESTBED, "contact_stiffness"])
-def test_argument_that_is_not_above_zero_is_refused_by_name(name: str) -> None:
-    for bad in (0.0, -1.0, float("nan")):
-        with pytest.raises(ValueError, match=name):
-            force_resonances(**(TESTBED | {"contact_stiffness": 1000.0} | {name: bad}))
-
-
 # ------------------------------------------------------------------------------------- transfers
 JM, JL, KTR, KC, N = 0.002, 0.7, 9.0, 400.0, 6.0
 

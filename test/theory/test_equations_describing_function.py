@@ -60,10 +60,3 @@ def test_no_cycle_is_predicted_in_domain_one() -> None:
     cycle = describing_function.predicted_unstable_cycle([0.5, 1.0], *QUARTER, 1.0)
     assert np.all(cycle.force == math.inf)
     assert np.all(np.isnan(cycle.frequency))
-
-
-def test_cycle_grows_with_the_friction_and_arguments_broadcast() -> None:
-    gains, friction = np.array([[1.2], [1.8]]), np.array([1.0, 2.0, 4.0])
-    force = describing_function.predicted_unstable_cycle(gains, *QUARTER, friction).force
-    assert force.shape == (2, 3)
-    np.testing.assert_allclose(force / force[:, :1], [[1.0, 2.0, 4.0]] * 2)

@@ -200,13 +200,3 @@ def test_actuator_power_is_its_work_over_the_time_of_the_exact_half_cycle() -> N
     # the spring's energy at breakaway, which its unloading by the motor gives away
     stretch = friction / 2.0
     assert regimes.actuator_cycle_work(friction, 2.0) == pytest.approx(0.5 * 2.0 * stretch**2)
-
-
-def test_arguments_broadcast() -> None:
-    column, row = np.array([[0.1], [0.3]]), np.array([0.5, 1.0, 2.0])
-    assert regimes.psi(row, column).shape == (2, 3)
-    assert regimes.psi(row, column)[1, 2] == regimes.psi(2.0, 0.3)
-    assert regimes.gamma_b([0.2, 0.4]).shape == (2,)
-    assert regimes.point_b(0.25, row, column).shape == (2, 3)
-    assert regimes.actuator_cycle(row, 2.0, 0.9, column).shape == (2, 3)
-    assert regimes.spin_up_time(1.0, 2.0, 2.0, row, column, 0.9, 0.25).shape == (2, 3)

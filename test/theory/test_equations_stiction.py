@@ -132,13 +132,3 @@ def test_drop_is_the_difference_of_the_frictions_and_half_the_cycle_is_its_deadb
         loop = IntegralLoop(0.02, deadband=share * deadband)
         verdicts = {assess(node, loop, 1.5 + 0.03 * n).verdict for n in range(12)}
         assert (Verdict.LIMIT_CYCLE in verdicts) is cycles
-
-
-def test_arguments_broadcast() -> None:
-    column, row = np.array([[0.1], [0.3]]), np.array([0.5, 1.0, 2.0])
-    assert stiction.breakaway_delay(1.0, 2.0, row, column).shape == (2, 3)
-    assert stiction.stiction_cycle_period(row, 2.0, 2.0, 1.3, 1.0, column).shape == (2, 3)
-    assert stiction.slip_force(row, 1.0, column, 2.0, 2.0, 0.3).shape == (2, 3)
-    assert stiction.staircase_number(row, column, 1.0, 0.1, 2.0, 2.0, 0.3).shape == (2, 3)
-    assert linear_loop.closed_loop(1j * row, column, 1.0, 1.0, 1.0, 1.0).shape == (2, 3)
-    assert linear_loop.characteristic_polynomial(row, column, 1.0, 1.0, 1.0).shape == (2, 3, 4)

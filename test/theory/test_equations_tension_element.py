@@ -155,15 +155,6 @@ def test_coulomb_like_torque_of_both_pulleys_is_the_power_that_creep_takes() -> 
     assert te.coulomb_like_torque(-torque, radius, EA) == friction
 
 
-def test_arguments_broadcast() -> None:
-    column, row = np.array([[1.0], [2.0]]), np.array([10.0, 20.0, 30.0])
-    assert te.speed_ratio(column, row, 9500.0).shape == (2, 3)
-    assert te.loss_by_sticking_point(1.0, column, row, 9500.0, True).shape == (2, 3)
-    assert te.equal_stages_efficiency(row, 9500.0, column).shape == (2, 3)
-    assert te.slip_arc(column, row, 0.2).shape == (2, 3)
-    assert te.gravity_number(column, 9.8, 1e4, 0.1, row).shape == (2, 3)
-
-
 @pytest.mark.parametrize("viscosity", [30.0, 300.0])
 def test_viscous_cable_loses_on_each_pulley_what_a_slipping_one_loses(viscosity: float) -> None:
     """6.2.5: an element that enters with T1 stretches under T2 after it has left; stepped in time, any viscosity."""

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import solve_ivp
 
-from wam_theory.many_slips import modes, slip
 from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
@@ -57,21 +56,6 @@ def test_boundaries_are_those_of_solve_ivp() -> None:
         assert solve_ivp.grows(node, (1.0 + CLOSE) * step, fine), point
 
 
-def test_no_step_below_the_boundary_diverges_and_every_step_above_it_does() -> None:
-    rng = np.random.default_rng(8)
-    points = random_points(25, 9)
-    for point, step in zip(points.T.tolist(), largest_stable_steps(*points).tolist(), strict=True):
-        node, loop = loop_of(*point)
-        for share in rng.uniform(0.05, 0.98, 4) if step else ():
-            assert assess(node, loop, share * step * 0.7).verdict is not Verdict.DIVERGED, (point, share)
-        for more in 1.02 + rng.exponential(2.0, 4):
-            assert assess(node, loop, more * max(step, 0.1) * 0.7).verdict is Verdict.DIVERGED, (point, more)
-
-
-def test_largest_steps_of_the_errata() -> None:
-    np.testing.assert_allclose(largest_stable_steps([1.1, 1.5, 2.0], 0.25), [25.3, 3.45, 1.17], rtol=5e-3)
-
-
 def test_domain_one_has_no_largest_step_and_domain_three_none_at_all() -> None:
     steps = largest_stable_steps([[0.4, 0.97, 1.0], [2.19, 2.5, 40.0]], 0.25)
     np.testing.assert_array_equal(steps, [[math.inf] * 3, [0.0] * 3])
@@ -84,33 +68,6 @@ def test_boundary_ends_in_point_b() -> None:
         below = largest_stable_steps(gamma_3(zeta) * (1.0 - 1e-9), zeta, ratio)
         np.testing.assert_allclose(below, 1.0 / point_b(zeta, ratio, 1.0), rtol=CLOSE)
         assert not largest_stable_steps(gamma_3(zeta) * (1.0 + 1e-9), zeta, ratio).any()
-
-
-def test_many_slips_solve_their_equation() -> None:
-    """Backwards by the matrix exponential: from the standstill to the state that they began with."""
-    rng = np.random.default_rng(7)
-    gamma, zeta = rng.uniform(1.01, 4.0, 50), 10.0 ** rng.uniform(-1.5, 0.5, 50)
-    error, acceleration = rng.uniform(-3.0, 1.0, 50), rng.uniform(0.2, 2.0, 50)
-    end = slip(modes(gamma, zeta), error, acceleration)
-    for i in range(50):
-        flow = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-2 * zeta[i] * gamma[i], -1.0, -2 * zeta[i]]])
-        values, vectors = np.linalg.eig(flow)
-        start = np.linalg.solve(vectors, np.array([error[i], 0.0, acceleration[i]]))
-        times = np.linspace(0.0, 40.0, 40_001)
-        speed = ((vectors[1] * start) @ np.exp(np.outer(values, times))).real
-        first = int(np.flatnonzero(speed[1:] <= 0.0)[0])  # the slip ends between this time and the next
-        low, high = times[first], times[first + 1]
-        assert low > 0.0
-        low, high = _halved(lambda t, v=values, m=vectors[1] * start: (m @ np.exp(v * t)).real, low, high)
-        state = (vectors @ (np.exp(values * low) * start)).real
-        np.testing.assert_allclose([end.error[i], 0.0, end.acceleration[i]], state, rtol=1e-7, atol=1e-7)
-
-
-def _halved(value, low: float, high: float) -> tuple[float, float]:
-    for _ in range(60):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if value(middle) > 0.0 else (low, middle)
-    return low, high
 
 
 def test_the_map_takes_any_shape_and_each_point_stands_for_itself() -> None:
