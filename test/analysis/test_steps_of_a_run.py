@@ -283,7 +283,7 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     assert math.isnan(forces_of(recording).get("press 4 N: error of the true force", math.nan))
     shown = told(recording.bag())
     assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
-    assert "Forces: 1 of 1, worst +5.0 %." in shown
+    assert "Forces: 1 of 1 applied, largest error +5.0 %." in shown
     is_hold = "press 4 N: 4 N commanded on outer_link for less than 1 s, so" in shown
     assert is_hold == (seconds > 0.3)  # else it may be part of a ramp
 

@@ -66,18 +66,18 @@ def contact_section(recording: AnalysedRun) -> Section:
                 note="of the vector: the norm of its three components; where the force is not the least one",
             ),
         ]
-        shows.append(f"Contact: right link {right:.0f} %{_errors(away, off)}.")
+        shows.append(f"Contacts: right link for {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
         false = known & sensed.acts & ~true.acts
         count = len(runs(false))
         seconds = float(np.sum(false)) * summary.traces.period
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
-            sentences.append(f"False detections: {count}, {shown(seconds, 's')}.")
+            sentences.append(f"False detections: {count}, together {shown(seconds, 's')}.")
             wrong.insert(0, sentences[-1])
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
-        shows.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
+        shows.append(f"Contacts: {len(summary.contacts)} estimated; the true ones are not in this bag.")
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
@@ -150,5 +150,5 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
 
 
 def _errors(away: float, off: float) -> str:
-    known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
-    return f", {', '.join(known)} off" if known else ""
+    errors = {"position": shown(away, "cm") * math.isfinite(away), "force": shown(off, "N") * math.isfinite(off)}
+    return "".join(f", median error of the {name} {error}" for name, error in errors.items() if error)

@@ -96,9 +96,8 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
         return ()
     worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
     whose = "" if len(worst.true) else "measured "
-    what = " controlled" if any(one.hold.is_refused for one in held) else ""
     error = 100.0 * bias / worst.hold.commanded
-    return (f"Forces: {len(known)} of {len(held)}{what}, worst {whose}{error:+.1f} %.",)
+    return (f"Forces: {len(known)} of {len(held)} applied, largest {whose}error {error:+.1f} %.",)
 
 
 def _dynamic_range(recording: AnalysedRun) -> tuple[list[str], list[Finding]]:

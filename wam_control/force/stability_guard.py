@@ -299,10 +299,9 @@ class StabilityGuard:
         if error:
             allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
         reason = (
-            f"at most {share:g} of the largest linearly stable gain is accepted (guard.stability_fraction); "
             f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
-            f"one ({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m): domain {domain}; "
-            f"allowed: {allowed}; lower one of them or guard.contact_stiffness"
+            f"one: domain {domain}; allowed: {allowed}; guard.stability_fraction is {share:g}; worst case: "
+            f"{found.where}, contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         )
         if not found.scale:
             reason = (
