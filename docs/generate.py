@@ -27,7 +27,7 @@ from wam_description.configuration import Configuration
 from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, fields
+from wam_description.parameters import Field, ParameterError, fields
 from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
@@ -130,9 +130,17 @@ def steps(configuration: Configuration) -> str:
 def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
     """One row for each parameter of a class; a star marks one that can be set while the node runs."""
     for field in fields(cls):
-        value = "as in arm" if field.derived and field.name not in given else short(given[field.name])
+        value = short(given[field.name]) if field.name in given else off_value(field)
         allowed = f"{field.allowed} {field.unit}".strip() or field.kind.__name__
         yield [f"`{field.name}`{'*' * field.live}", f"`{value}`" if value else "empty", allowed, field.doc]
+
+
+def off_value(field: Field) -> str:
+    """Value of a parameter that no configuration gives: that of an option which is off, or of the same in `arm`."""
+    try:
+        return short(field.derived({})) if field.derived else ""
+    except LookupError:
+        return "as in arm"
 
 
 def short(value: Any) -> str:

@@ -44,14 +44,14 @@ def contact_pairs(arm: Arm, world: World) -> Iterator[ContactPair]:
     for cover in arm.covers.names:
         for i, name in enumerate(obstacles.names):
             law = obstacles.stiffness[i], obstacles.damping[i], obstacles.hardening[i], obstacles.friction[i]
-            yield ContactPair(cover, name, f"obstacle '{name}'", *law)
+            yield _through_cover(ContactPair(cover, name, f"obstacle '{name}'", *law), world.cover_stiffness)
     for i, name in enumerate(pushers.names):
         if pushers.force[i] > 0.0:
             law = pushers.stiffness[i], pushers.damping[i], 0.0, pushers.friction[i]
             yield ContactPair(pushers.covers[i], name, f"pusher '{name}'", *law)
     for cover in arm.covers.names:
-        yield from _on_cover(cover, "body", world.bodies)
-        yield from _on_cover(cover, "door", world.doors)
+        for pair in (*_on_cover(cover, "body", world.bodies), *_on_cover(cover, "door", world.doors)):
+            yield _through_cover(pair, world.cover_stiffness)
     yield from _of_bodies(world)
     folding = world.folding
     for one, other in pairwise(arm.covers.names):
@@ -63,6 +63,20 @@ def contact_pairs(arm: Arm, world: World) -> Iterator[ContactPair]:
 def folded(cover: str) -> str:
     """Name of the geom of a cover that touches the cover before it: its tube away from the joint between them."""
     return f"{cover}_folded"
+
+
+def _through_cover(pair: ContactPair, stiffness: float) -> ContactPair:
+    """A contact with a cover of this stiffness in series, N/m; 0 for a rigid one.
+
+    Of the depth the share k/(k_c + k) is that of the surface; hardening counts to first order of the depth.
+    """
+    if not stiffness:
+        return pair
+    share = stiffness / (pair.stiffness + stiffness)
+    squared = share * share
+    return pair._replace(
+        stiffness=share * pair.stiffness, damping=squared * pair.damping, hardening=squared * pair.hardening
+    )
 
 
 def _on_cover(cover: str, what: str, group: FreeBodies | Doors) -> Iterator[ContactPair]:

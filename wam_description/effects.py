@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter, require, tunable
+from wam_description.parameters import lengths, option, parameter, require, tunable
 from wam_description.parts import Motors
 
 
@@ -59,6 +59,16 @@ class Effects:
     added_coulomb_friction: tuple[float, ...] = tunable(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0
     )
+    terminated: bool = option(
+        "true if the cables end on both pulleys, which bounds their creep (6.4.3): each part creeps by half of (6.19), "
+        "once for each load under which it is wound",
+        off=False,
+    )
+    capstan: float = option(
+        "friction coefficient times angle of wrap on the pinion: at tensions beyond (6.16) the whole cable slips; "
+        "0: never",
+        high=50.0,
+    )
 
     def tightened(self, motor: int) -> float:
         """Part of the pretension of this motor's circuit that is set."""
@@ -75,6 +85,11 @@ class Effects:
             naming motor, value and what is allowed.
         """
         motors, cables = arm.motors.names, arm.cables
+        require(
+            not (self.terminated and self.capstan),
+            f"effects.capstan is {self.capstan:g}, and effects.terminated is true; a cable that ends on its pulleys "
+            "does not slip as a whole: set one of them to 0 or false",
+        )
         lengths("effects", arm.joints.names, {"added_coulomb_friction": self.added_coulomb_friction})
         if len(self.pretension_share) != 1:
             lengths("effects", motors, {"pretension_share": self.pretension_share})

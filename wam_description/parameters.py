@@ -87,6 +87,11 @@ def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9) -> An
     return parameter(doc, unit, low, high, live=True)
 
 
+def option(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9, off: Value = 0.0) -> Any:
+    """Declare a parameter whose value is `off` where a configuration does not give one; as `parameter` else."""
+    return dataclasses.field(default=off, metadata=parameter(doc, unit, low, high, derived=lambda _: off).metadata)
+
+
 def like(cls: type, name: str, doc: str = "") -> Any:
     """Declare a field that has unit, range and, without a configured value, the value of another parameter.
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from wam_description.movable import NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import lengths, option, parameter, require
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
 
@@ -171,6 +171,9 @@ class World:
     doors: Doors = NO_DOORS
     motions: Motions = NO_MOTIONS
     folding: Folding = NO_FOLDING
+    cover_stiffness: float = option(
+        "stiffness of the covers, in series with what they touch (1.1.1), except pushers and springs; 0: rigid", "N/m"
+    )
 
     def __post_init__(self) -> None:
         known = self.obstacles.names

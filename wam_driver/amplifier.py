@@ -1,7 +1,8 @@
 """Motor amplifier: from the commanded to the actual current and the torque of the motor."""
 
+from collections import deque
 from collections.abc import Sequence
-from math import sin
+from math import exp, pi, sin
 from operator import add, mul
 
 import numpy as np
@@ -15,7 +16,8 @@ class Amplifier:
     """Clips each current to the motor's peak and, over time, to its thermal limit.
 
     The winding's heat follows w' = ((i/i_continuous)^2 - w)/T.  While w is 1 or more, the current is clipped
-    to the continuous current (I2t).
+    to the continuous current (I2t).  The current follows its command after `delay` periods, with a lag of first order
+    where the current loop has a bandwidth.
 
     Parameters
     ----------
@@ -42,17 +44,20 @@ class Amplifier:
         self._true_constant = list(true_constant or motors.torque_constant)
         self.peak = [t / k for t, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]
         self.continuous = [t / k for t, k in zip(motors.continuous_torque, motors.torque_constant, strict=True)]
-        self.heat = [0.0] * len(self.peak)
         self._parameters = parameters
         self._is_noisy = any(parameters.current_noise)
         ripples = zip(parameters.torque_ripple, parameters.ripple_cycles, strict=True)
         self._ripples = [(i, ripple, cycles) for i, (ripple, cycles) in enumerate(ripples) if ripple]
         self._offset = list(parameters.torque_offset) if any(parameters.torque_offset) else []
         self._random = random
+        self._is_slow = parameters.bandwidth > 0.0 or parameters.delay > 0
+        self.reset()
 
     def reset(self) -> None:
-        """Let the motors be cold."""
-        self.heat = [0.0] * len(self.peak)
+        """Let the motors be cold and without a current."""
+        zero = [0.0] * len(self.peak)
+        self.heat, self._flowing = zero.copy(), zero
+        self._waiting = deque([zero] * self._parameters.delay)
 
     def step(self, currents: Sequence[float], dt: float) -> list[float]:
         """Actual currents over `dt` seconds, A, (n,), for the commanded currents, A, (n,)."""
@@ -60,6 +65,8 @@ class Amplifier:
         time, deadband = parameters.thermal_time, parameters.deadband
         noise = self._random.standard_normal(len(self.peak)).tolist() if self._is_noisy else None
         actual = []
+        if self._is_slow:
+            currents = self._followed(currents, dt)
         for i, current in enumerate(currents):
             limit = continuous[i] if heat[i] >= 1.0 else self.peak[i]
             if -deadband[i] < current < deadband[i]:
@@ -71,6 +78,14 @@ class Amplifier:
             ratio = limited / continuous[i]
             heat[i] += (ratio * ratio - heat[i]) * dt / time
         return actual
+
+    def _followed(self, currents: Sequence[float], dt: float) -> list[float]:
+        """Currents of a loop with a delay and a lag, A, (n,), at the end of `dt`."""
+        self._waiting.append(list(currents))
+        wanted, bandwidth = self._waiting.popleft(), self._parameters.bandwidth
+        left = exp(-2.0 * pi * bandwidth * dt) if bandwidth else 0.0
+        self._flowing = [to + left * (now - to) for to, now in zip(wanted, self._flowing, strict=True)]
+        return self._flowing
 
     def nominal_torque(self, currents: Sequence[float]) -> list[float]:
         """Torque of the motors from their torque constants, N m, (n,): the reported torque."""

@@ -10,6 +10,32 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
+from wam_driver.thresholds import CIRCUITS
+
+
+class WoundCable:
+    """Creep of a cable that ends on both pulleys (6.4.3).
+
+    What is wound keeps the strain under which it was wound.  Whenever a part passes between the pulleys it takes
+    that of the present load, on two strands instead of four, so that the creep is half of (6.19), and none once the
+    part has the load.  The free strand is short against what is wound.
+
+    Parameters
+    ----------
+    loss : of speed per torque, 1/(N m).
+    """
+
+    def __init__(self, loss: float) -> None:
+        self._loss = 0.5 * loss * CIRCUITS.wound_part
+        self._torque: dict[int, float] = {}
+
+    def creep(self, angle: float, travel: float, torque: float) -> float:
+        """Creep, rad, at a rotor angle, rad, over a travel, rad, 0 or more, under a torque, N m."""
+        part = math.floor(angle / CIRCUITS.wound_part)
+        before = self._torque.get(part, 0.0)
+        change = (torque - before) * -math.expm1(-CIRCUITS.passages * travel / CIRCUITS.wound_part)
+        self._torque[part] = before + change
+        return self._loss * change
 
 
 class CableCircuits:
@@ -21,6 +47,7 @@ class CableCircuits:
     Attributes
     ----------
     depends_on_torque : True if `follow` has anything to do.
+    is_bounded : True if cables end on their pulleys or slip as a whole.
     is_slack : True if a strand is slack and friction depends on the tension.
     each : of each circuit the two slack ends between its strands, creep in a step per speed and torque, and the
         torque, N m, above which friction depends on the tension; it remains the same list, which the steps in C read.
@@ -29,7 +56,9 @@ class CableCircuits:
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
         n = len(arm.motors.names)
         friction_counts = effects.slack and any(effects.tension_friction)
-        self.depends_on_torque = effects.creep or friction_counts
+        self._is_terminated, self._capstan = effects.creep and effects.terminated, effects.capstan
+        self.is_bounded = self._is_terminated or self._capstan > 0.0
+        self.depends_on_torque = effects.creep or friction_counts or self.is_bounded
         self.is_slack = False
         self._may_slacken = effects.slack
         self._friction_counts = friction_counts
@@ -37,7 +66,7 @@ class CableCircuits:
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         self._pull = data.qfrc_spring[:n]
         self._pulls = self._pull.tolist
-        self._stretch_rate = data.ten_velocity[: 2 * n : 2]
+        self._stretch_rate, self._theta, self._step = data.ten_velocity[: 2 * n : 2], data.qpos[:n], step
         # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
         # loose one beyond the first
         self._slack_ends: Any = memoryview(data.plastic)
@@ -64,7 +93,8 @@ class CableCircuits:
         self.is_slack = self._friction_counts
 
     def rest(self) -> None:
-        """Give cables as they are configured the pretension that is set."""
+        """Give cables as they are configured the pretension that is set, all wound without a load."""
+        self._wound = [WoundCable(circuit.loss_per_torque) for circuit in self._nominal]
         self._move_ends(self._nominal, self._circuits)
 
     def tighten(self, shares: Sequence[float]) -> tuple[Circuit, ...]:
@@ -101,7 +131,36 @@ class CableCircuits:
     @property
     def after_step(self) -> Callable[[Sequence[int], Sequence[float]], bool] | None:
         """What has to follow each step, `follow` or as much of it as there is to do; None for nothing."""
+        if self.is_bounded:
+            return self._follow_bounded
         return self.follow if self._friction_counts else self._creeping() if self.depends_on_torque else None
+
+    def _follow_bounded(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
+        """`follow` for cables that end on both pulleys, or slip as a whole at the capstan's limit (6.16)."""
+        if self._is_terminated:
+            ends, theta = self._slack_ends, self._theta.tolist()
+            for cable, (first, second, _, _), angle, speed, pull in zip(  # noqa: B905 - as `follow`
+                self._wound, self.each, theta, speeds, self._pulls()
+            ):
+                crept = cable.creep(angle, abs(speed) * self._step, pull)
+                ends[first] -= crept
+                ends[second] -= crept
+            return self.follow([0] * len(self.each), speeds)
+        self._slip()
+        return self.follow(direction, speeds)
+
+    def _slip(self) -> None:
+        """Move the ends of each cable whose torque would be beyond its limit after this step."""
+        rates = self._stretch_rate.tolist()
+        for (first, second, _, _), circuit, rate, pull in zip(
+            self.each, self._circuits, rates, self._pulls(), strict=True
+        ):
+            limit = 2.0 * circuit.pretension * circuit.radius * math.tanh(0.5 * self._capstan)
+            after = pull - circuit.stiffness * rate * self._step
+            if abs(after) > limit:
+                slipped = math.copysign(abs(after) - limit, after) / circuit.stiffness
+                self._slack_ends[first] -= slipped
+                self._slack_ends[second] -= slipped
 
     def _creeping(self) -> Callable[[Sequence[int], Sequence[float]], bool]:
         """`follow` where slack strands do not count; what each step would look up again costs 1 % of it."""

@@ -64,6 +64,7 @@ class DryFriction:
         self._added = effects.added_coulomb_friction
         self._step = step
         self._shafts = range(size)
+        self._warm_drop, self._warm = parameters.warm_drop, [1.0] * size
         # velocities between which a shaft remains as it is: stuck, in positive or in negative motion
         slowest = [
             math.nextafter(v, math.inf) for v in [PLANT.stuck_rotor] * (size // 2) + [PLANT.stuck_joint] * (size // 2)
@@ -96,10 +97,17 @@ class DryFriction:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._added = tuple(friction)
         self._extra = [*self._from_tension, *friction]
-        self._static = [law.level(0.0, 0, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]
-        self._dynamic = [law.level(1.0, 1, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]
+        each = list(zip(self._laws, self._warm, self._extra, strict=True))
+        self._static = [law.level(0.0, 0, 0.0) * warm + extra for law, warm, extra in each]
+        self._dynamic = [law.level(1.0, 1, 0.0) * warm + extra for law, warm, extra in each]
         by_shaft = zip(self.direction, self._static, self._dynamic, strict=True)
         self.levels = [moving if way else stuck for way, stuck, moving in by_shaft]
+
+    def heat(self, heat: Sequence[float]) -> None:
+        """Take the heat of each motor, (n,), 1 at its thermal limit, for friction that falls with temperature."""
+        left = [1.0 - self._warm_drop * min(w, 1.0) for w in heat]
+        self._warm[: len(left)] = left
+        self.set_added(self._added)
 
     def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
         """Bring `levels` and `elastic` up to date for the next step.
@@ -149,7 +157,7 @@ class DryFriction:
                 level = self._laws[i].level(velocity[i], self.direction[i], load[i])
             else:  # friction holds the torque that is opposite to its own
                 level = self._laws[i].level(0.0, (held[i] < 0.0) - (held[i] > 0.0), load[i])
-            level += self._extra[i]
+            level = level * self._warm[i] + self._extra[i]
             if i in self._presliding:
                 # the plant's integrator moves a shaft by step times its new velocity
                 self.elastic[i] = -self._presliding[i].advance(velocity[i] * self._step, level)

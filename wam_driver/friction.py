@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.parameters import parameter
+from wam_description.parameters import option, parameter
 
 
 class FrictionLaw(Protocol):
@@ -170,6 +170,11 @@ class FrictionParameters:
         high=1e9,
     )
     joint_presliding_stiffness: tuple[float, ...] = parameter("the same of each joint", "N m/rad", low=0.0, high=1e9)
+    warm_drop: float = option(
+        "part of the dry friction of a motor that is gone when its winding is at its thermal limit, in proportion to "
+        "the heat below; 0: friction does not depend on temperature",
+        high=0.9,
+    )
 
 
 COULOMB_STICTION = FrictionParameters(

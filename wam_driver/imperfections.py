@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter
+from wam_description.parameters import option, parameter
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class AmplifierParameters:
         low=-100.0,
         high=100.0,
     )
+    bandwidth: float = option("bandwidth of the current loop, of first order; 0: unlimited", "Hz", high=1e5)
+    delay: int = option("delay of the current loop, in periods", high=100, off=0)
 
 
 @dataclass(frozen=True)

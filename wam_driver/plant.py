@@ -124,7 +124,7 @@ class Plant:
         self._surfaces = Surfaces(self.model, self.data, arm, world, movers, step)
         self._view = _View(self.model, self.data, n)
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
-        is_plain = self._friction.is_steady and not movers  # what the steps in C do
+        is_plain = self._friction.is_steady and not movers and not self._circuits.is_bounded  # what the steps in C do
         shared = self._surfaces.laws, self._friction, self._circuits, self._loads.pushes
         self._advance = compiled_steps(self.model, self.data, *shared, step) if is_plain else None
         # to look them up in each step costs 3 % of it
@@ -240,6 +240,11 @@ class Plant:
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._friction.set_added(friction)
+        self._is_set = False
+
+    def heat(self, heat: Sequence[float]) -> None:
+        """Take the heat of each motor, (n,), 1 at its thermal limit, for friction that falls with temperature."""
+        self._friction.heat(heat)
         self._is_set = False
 
     def set_pretension(self, shares: Sequence[float]) -> None:

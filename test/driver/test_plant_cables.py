@@ -662,6 +662,7 @@ EVERYTHING = Effects(
     tension_friction=(1e-5,) * 4,
     included_in_friction=True,
     added_coulomb_friction=(0.05,) * 4,
+    terminated=True,
 )
 
 
@@ -714,7 +715,7 @@ def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_r
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", [field.name for field in dataclasses.fields(Effects)])
+@pytest.mark.parametrize("effect", [field.name for field in dataclasses.fields(Effects) if field.name != "capstan"])
 def test_each_effect_makes_a_difference(effect: str) -> None:
     arm = changed(WAM, cables={"pretension": (20.0,) * 4})
     whole = story(Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP))

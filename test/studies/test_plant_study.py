@@ -21,6 +21,11 @@ PROMISED = {
     "backlash in a torque loop": 2e-3,  # a step of the plant is a thousandth of a cycle
     "cycle by backlash in a torque loop, peak to peak": 2e-2,  # which is half a step of delay
     "sensor noise, 20 000 readings": 2e-2,  # 1/sqrt(2 n) is 0.5 %
+    "terminated cables": 2e-2,  # parts of 0.05 rad of 6 rad
+    "gross slip": 1e-6,
+    "cover in series": 2e-3,
+    "current loop": 1e-9,
+    "friction of a warm motor": 1e-3,
 }
 
 

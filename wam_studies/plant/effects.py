@@ -84,7 +84,9 @@ def _stretched(stretch: Numbers, **effects: Any) -> Numbers:
     return np.array(torques)
 
 
-def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> PlantCurve:
+def creep_out_and_back(
+    torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0, rounds: int = 1, terminated: bool = False
+) -> PlantCurve:
     """Creep of the link while the motor turns out and back under a constant load.
 
     Parameters
@@ -92,18 +94,20 @@ def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float 
     torque : load at the joint, N m.
     speed : of the motor, rad/s.
     seconds : in each direction.
+    rounds : out and back.
+    terminated : whether the cables end on both pulleys; the theory is that of endless ones.
 
     Returns
     -------
     PlantCurve
         over the motor's absolute travel, rad; angles at the joint, rad.
     """
-    plant = _loaded(torque)
+    plant = _loaded(torque, terminated)
     arm = ideal_testbed()
     rest = plant.q[0] - plant.theta[0] / 14.0
     travel, crept = [], []
     done = 0.0
-    for direction in (1.0, -1.0):
+    for direction in (1.0, -1.0) * rounds:
         plant.data.qvel[:] = (direction * speed, direction * speed / 14.0)
         for _ in range(round(seconds / STEP / 40)):
             before = plant.theta[0]
@@ -117,10 +121,10 @@ def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float 
     return PlantCurve(np.array(travel), np.array(crept), np.asarray(expected) / 14.0)
 
 
-def _loaded(torque: float) -> Plant:
+def _loaded(torque: float, terminated: bool = False) -> Plant:
     """The testbed at rest under a load at the joint, N m, with creep, its rotor immovable."""
     arm = ideal_testbed(rotor=IMMOVABLE, damping=0.02)
-    plant = released_plant(arm, creep=True)
+    plant = released_plant(arm, creep=True, terminated=terminated)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
     plant.data.qpos[0] = -torque / 14.0 / arm.circuits[0].stiffness
     _run(plant, 0.1)
@@ -207,15 +211,21 @@ def resonances(ratio: float, stiffness: Numbers) -> Numbers:
     return np.array(found).T
 
 
-def surface(hardening: float) -> PlantCurve:
-    """Force of a surface of 4000 N/m over the depth of the tip in it, m, force in N."""
+def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
+    """Force of a surface of 4000 N/m over the depth of the tip in it, m, force in N.
+
+    Parameters
+    ----------
+    hardening : of the surface, 1/m.
+    cover : stiffness of the link's cover, N/m; 0 for a rigid one, which the theory has.
+    """
     depths = np.linspace(1e-4, 0.01, 25)
     below = 0.01  # m below the link, which then touches with its tip only
     position = (0.0, 0.0, -0.0254 - below)
     floor = Obstacles(
         ("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,)
     )
-    plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS))
+    plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS, cover_stiffness=cover))
     forces = []
     for depth in depths:
         q = -np.arcsin((depth + below) / LEVER)

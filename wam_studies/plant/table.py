@@ -7,7 +7,7 @@ import numpy as np
 from wam_analysis.measures.limit_cycle import mean_cycle
 from wam_analysis.table import markdown
 from wam_driver.sensors import Encoders
-from wam_studies.plant import effects
+from wam_studies.plant import effects, options
 from wam_studies.plant.effects import PlantCurve, level, torque_loop, torque_loop_response
 from wam_theory.backlash_cycle import exact_cycle
 
@@ -39,6 +39,11 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "backlash in a torque loop": effects.backlash_in_a_torque_loop,
     "cycle by backlash in a torque loop, peak to peak": torque_cycle,
     "sensor noise, 20 000 readings": noise,
+    "terminated cables": options.terminated_creep,
+    "gross slip": options.gross_slip,
+    "cover in series": options.soft_cover,
+    "current loop": options.current_loop,
+    "friction of a warm motor": options.warm_friction,
 }
 
 
