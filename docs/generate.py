@@ -35,9 +35,9 @@ from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies import design_choices
 from wam_studies.figures import backdrivability, open_loop, transmissions
-from wam_studies.figures.catalogue import FIGURES, file_of, numbers
+from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
-from wam_studies.figures.panels import Panels, draw_panels
+from wam_studies.figures.panels import Panels, distances, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant import table as plant_table
@@ -282,13 +282,22 @@ def blocks() -> dict[str, Callable[[], str]]:
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         **{f"task {name}": partial(task_of, name) for name in tasks()},
         "claims, count": lambda: claims.count(claims.load(CLAIMS)),
-        "claims, not shown": lambda: claims.not_shown(itertools.chain(*claims.load(CLAIMS).values())),
+        **{f"claims, {title}": partial(claims_of, title) for title in claims.load(CLAIMS)},
         "verdict of the demonstration": partial(verdict, "demo.txt"),
         "verdict of barrett-wam7": partial(verdict, "barrett-demo.txt"),
         "joints of barrett-wam7": joints_of_today,
         "motors of barrett-wam7": motors_of_today,
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def claims_of(chapter: str) -> str:
+    """The claims of a chapter, with the distances that were measured."""
+    named = {
+        f"figure {name}": max(distances(found).values(), default=math.nan) for name, found in found_figures().items()
+    }
+    named |= {f"effect {name}": distance for name, distance in plant_study().items()}
+    return claims.table(claims.load(CLAIMS)[chapter], {name: percent(value) for name, value in named.items()})
 
 
 def verdict(file: str) -> str:

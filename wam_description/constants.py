@@ -206,7 +206,8 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         "not printed; under a quarter of Coulomb friction at 1 rad/s",
         parameter="arm.joints.viscous_friction"),
     _assumed("", "lower stops", (-350.0 / 2.0, -270.0 / 2.0, -300.0 / 2.0, -90.0), "deg",
-        "ranges of 7.2.1 with their middle at zero; joint 4 as far as the links fold flat",
+        "ranges of 7.2.1 with their middle at zero; joint 4 to a right angle, where the tubes overlap "
+        "by 23 to 52 mm; world.folding stops them before",
         parameter="arm.joints.lower"),
     _assumed("", "upper stops", (350.0 / 2.0, 270.0 / 2.0, 300.0 / 2.0, 140.0), "deg",
         "ranges of 7.2.1 with their middle at zero; joint 4 is read off no drawing: 50 deg beyond straight",
@@ -231,7 +232,7 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         "convention: positions count from the shoulder and from the elbow, as x in (2.2)",
         parameter="arm.covers.origin"),
     _assumed("", "rotation of the covers' frames", (0.0, -90.0, 0.0, 0.0, 0.0, 0.0), "deg",
-        "convention: x along the kinematic link; z of the inner cover away from the folded outer link",
+        "convention: x along the kinematic link; z of the inner cover away from the outer link",
         parameter="arm.covers.rotation"),
     _assumed("", "near ends of the tubes", 0.0, "in",
         "1.6 in at 22 in is 0.0726 rad, so that the inner tube starts on the axis; the outer is drawn on it",

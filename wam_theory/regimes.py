@@ -112,22 +112,35 @@ def _root(ratio: float, start: float, zeta: float) -> float:
     return (low + high) / 2.0
 
 
-def point_b(zeta: ArrayLike, transmission_stiffness: ArrayLike = 1.0, contact_stiffness: ArrayLike = 1.0) -> Array:
-    """F_friction/F_error of point B of figure 5.8: above it a step is friction-dominated up to gamma_III.
+def friction_dominated(
+    gamma: ArrayLike, zeta: ArrayLike, transmission_stiffness: ArrayLike = 1.0, contact_stiffness: ArrayLike = 1.0
+) -> Array:
+    """F_friction/F_error above which the first slip of a step ends in stick: the dotted line of figure 5.8.
 
-    At gamma_III the first slip just ends in stick: J_l |x''| = 2 F_friction there.  Not in print;
-    1.356 for zeta = 0.25 and equal stiffnesses, proportional to (k_tr + k_c)/(2 k_c).
+    J_l |x''| = 2 F_friction at its end.  Not in print; proportional to (k_tr + k_c)/(2 k_c).
+
+    Parameters
+    ----------
+    gamma, zeta : of the loop, above zero.
+    transmission_stiffness, contact_stiffness : N m/rad, above zero; only their ratio matters.
+    """
+    ktr, kc = above_zero(transmission_stiffness=transmission_stiffness, contact_stiffness=contact_stiffness)
+    g, z, share = np.broadcast_arrays(np.asarray(gamma, dtype=float), zeta, (ktr + kc) / (2.0 * kc))
+    level = [abs(half_cycle(one, damped).acceleration) for one, damped in zip(g.ravel(), z.ravel(), strict=True)]
+    return np.array(level, dtype=float).reshape(g.shape) * share
+
+
+def point_b(zeta: ArrayLike, transmission_stiffness: ArrayLike = 1.0, contact_stiffness: ArrayLike = 1.0) -> Array:
+    """F_friction/F_error of point B of figure 5.8: where `friction_dominated` reaches gamma_III.
+
+    1.356 for zeta = 0.25 and equal stiffnesses.
 
     Parameters
     ----------
     zeta : (5.12), above zero.
     transmission_stiffness, contact_stiffness : N m/rad, above zero; only their ratio matters.
     """
-    ktr, kc = above_zero(transmission_stiffness=transmission_stiffness, contact_stiffness=contact_stiffness)
-    z, share = np.broadcast_arrays(np.asarray(zeta, dtype=float), (ktr + kc) / (2.0 * kc))
-    gammas = gamma_3(z)
-    flat = [abs(half_cycle(g, d).acceleration) for g, d in zip(gammas.ravel(), z.ravel(), strict=True)]
-    return np.array(flat, dtype=float).reshape(z.shape) * share
+    return friction_dominated(gamma_3(zeta), zeta, transmission_stiffness, contact_stiffness)
 
 
 def spin_up_time(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, not_shown, unresolved
+from wam_studies.thesis.claims import PLACE, Claim, Status, count, load, table, unresolved
 
 ROOT = Path(__file__).resolve().parents[2]
 CLAIMS = [claim for rows in load(ROOT / "docs" / "thesis.yaml").values() for claim in rows]
@@ -74,10 +74,12 @@ def test_every_distance_that_an_item_gives_is_that_of_something_it_shows() -> No
         assert claim.status is not Status.PLANT or of_plant, claim
 
 
-def test_the_tables_have_the_counts_of_each_chapter_and_what_is_not_shown() -> None:
-    shown = Claim("5.2", "text", Status.PLANT, "plant with law: {figure a}", ("figure a",))
+def test_the_tables_have_every_item_with_its_status_what_shows_it_and_what_is_open() -> None:
+    shown = Claim(
+        "5.2", "text", Status.PLANT, "plant with law: {figure a}", ("figure a", "wam_theory.cable.creep"), "b"
+    )
     missing = Claim("5.3", "other", Status.NOT_SHOWN, open="why")
     assert "| One | 1 | 0 | 0 | 1 |\n| all | 1 | 0 | 0 | 1 |" in count({"One": [shown, missing]})
-    text = not_shown([shown, missing])
-    assert "| 5.3 | other | why |" in text
-    assert "5.2" not in text
+    text = table([shown, missing], {"figure a": "3 %"})
+    assert "| 5.2 text | plant [a](figures/figure-a.png) | plant with law: 3 %. b |" in text
+    assert "| 5.3 other | not shown | why |" in text

@@ -101,12 +101,13 @@ def file_of(name: str, folder: Path) -> Path:
 def table(found: dict[str, Panels]) -> str:
     """Greatest distance of the plant's points from the lines, one row per panel (Markdown)."""
     rows = [
-        (name, part, _percent(distance))
+        (name, part, percent(distance))
         for name, values in found.items()
         for part, distance in distances(values).items()
     ]
     return markdown(("figure", "points", "greatest distance from the line"), rows)
 
 
-def _percent(distance: float) -> str:
+def percent(distance: float) -> str:
+    """A distance as text."""
     return "below 0.05 %" if distance < 5e-4 else f"{100.0 * distance:.1f} %"

@@ -112,16 +112,18 @@ def coulomb_response() -> Panels:
 
 
 def trajectory() -> Panels:
-    """Figure 5.11, which the thesis draws in space, as seen along two of its axes."""
+    """Figure 5.11, which the thesis draws in space, as seen along each of its axes."""
     found, exact, _, _, seconds = _coulomb()
     motion = exact.at(np.union1d(np.linspace(0.0, seconds, 2 * EVENLY), [event.time for event in exact.events]))
     shown = np.unique(np.geomspace(100.0, len(found.time) - 1.0, 110).astype(int))  # sticking times grow
     force = Series(motion.x_m, motion.contact_force, found.motor[shown], found.force[shown]).scaled(1e3, 1.0)
     speed = Series(motion.x_m, motion.v, found.motor[shown], found.velocity[shown]).scaled(1e3, 1.0)
-    motor = "motor x_m at the joint [mrad]"
+    both = Series(motion.contact_force, motion.v, found.force[shown], found.velocity[shown])
+    motor, velocity = "motor x_m at the joint [mrad]", "velocity of the link [rad/s]"
     return (
         Panel("a) along the velocity", motor, FORCE, (("exact", force),)),
-        Panel("b) along the force", motor, "velocity of the link [rad/s]", (("exact", speed),)),
+        Panel("b) along the force", motor, velocity, (("exact", speed),)),
+        Panel("c) along the motor", FORCE, velocity, (("exact", both),)),
     )
 
 

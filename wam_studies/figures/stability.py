@@ -13,7 +13,7 @@ from wam_studies.plant.ideal_testbed import RATIO
 from wam_theory.describing_function import friction_to_velocity
 from wam_theory.friction_model import FrictionNode
 from wam_theory.linear_loop import routh_gain
-from wam_theory.regimes import gamma_3, point_b
+from wam_theory.regimes import friction_dominated, gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 
 
@@ -78,6 +78,8 @@ def stability_bound() -> Panels:
         (f"ζ = {CASE.unity_zeta:g}, Coulomb friction", bound),
         (f"the same, F_static = {CASE.stiction:g} F_dynamic", stiction),
     ]
+    along = np.linspace(0.7, last, 60)
+    lines.append(("friction-dominated above it", line_only(along, friction_dominated(along, CASE.unity_zeta))))
     for zeta in (0.15, 0.5, 1.0):
         end = float(gamma_3(zeta))
         along = 1.0 + np.geomspace(1e-3, end * (1.0 - 1e-6) - 1.0, 200)

@@ -12,7 +12,6 @@ from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_studies.plant.effects import PlantCurve, breakaway, creep_out_and_back, surface
 from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, STEP, ideal_testbed, released_plant
-from wam_theory.pulley_slip import torque_of_full_slip
 
 
 def terminated_creep() -> PlantCurve:
@@ -33,7 +32,7 @@ def gross_slip(wrap: float = 3.0 * np.pi, friction: float = 0.2) -> PlantCurve:
     arm = ideal_testbed(rotor=IMMOVABLE, friction=(1e4, 1e4))
     (circuit,) = arm.circuits
     plant, speed = released_plant(arm, capstan=wrap * friction), 1.0
-    most = float(torque_of_full_slip(wrap, circuit.pretension, circuit.radius, friction))
+    most = 2.0 * circuit.pretension * circuit.radius * float(np.tanh(0.5 * wrap * friction))
     plant.data.qvel[0] = speed
     wanted, found = [], []
     for _ in range(round(1.5 * most / circuit.stiffness / speed / STEP)):

@@ -122,7 +122,29 @@ def count(chapters: Mapping[str, Sequence[Claim]]) -> str:
     return markdown(("chapter", *(status.value for status in Status)), rows)
 
 
-def not_shown(claims: Iterable[Claim]) -> str:
-    """The items that nothing shows, with the reason, as Markdown."""
-    rows = [(claim.section, claim.claim, claim.open) for claim in claims if claim.status is Status.NOT_SHOWN]
-    return markdown(("section", "claimed", "why it is not shown"), rows)
+def table(claims: Iterable[Claim], measured: Mapping[str, str]) -> str:
+    """The items of a chapter with what shows each, as Markdown; agreement of what the plant shows.
+
+    Parameters
+    ----------
+    measured : greatest distance of each figure and effect, by the name that an agreement has in braces.
+    """
+    rows = []
+    for claim in claims:
+        agreement = PLACE.sub(lambda found: measured[found[0][1:-1]], claim.agreement)
+        links = dict.fromkeys(filter(None, map(_link, claim.shown)))
+        remark = f"{agreement}. {claim.open}".strip(". ") if claim.status is Status.PLANT else claim.open
+        rows.append((f"{claim.section} {claim.claim}", " ".join([claim.status, *links]), remark))
+    return markdown(("claim", "status", "agreement; what is open"), rows)
+
+
+def _link(reference: str) -> str:
+    """Where the page leads for a reference; '' for a function or test."""
+    kind, _, name = reference.partition(" ")
+    links = {
+        "figure": f"[{name}](figures/figure-{name}.png)",
+        "experiment": f"[{name}](experiments/{name}.png)",
+        "task": f"[{name}](tasks/{name}.png)",
+        "effect": "[effects](plant.md)",
+    }
+    return links.get(kind, "")
