@@ -6,7 +6,6 @@ program fills.  `make docs` runs it; a test fails if a block is stale.
 
 import argparse
 import ast
-import itertools
 import math
 import re
 import subprocess
@@ -41,6 +40,7 @@ from wam_studies.figures.panels import Panels, distances, draw_panels
 from wam_studies.force_benchmark import usual_tasks
 from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant import table as plant_table
+from wam_studies.scorecard import measures
 from wam_studies.scorecard import report as scorecard
 from wam_studies.tasks.pictures import save as save_task
 from wam_studies.thesis import claims
@@ -276,6 +276,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
+        "recorded dynamic range": lambda: recorded_range(configuration),
         "transmissions": transmissions.table,
         "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
         "backdrivability": lambda: backdrivability.table(found_figures()["3.2.6"]),
@@ -298,6 +299,17 @@ def claims_of(chapter: str) -> str:
     }
     named |= {f"effect {name}": distance for name, distance in plant_study().items()}
     return claims.table(claims.load(CLAIMS)[chapter], {name: percent(value) for name, value in named.items()})
+
+
+def recorded_range(configuration: Configuration) -> str:
+    """Dynamic range of the presses in the sample of `wam-press`."""
+    rows = evaluate(load("wam-press"), SAMPLES / "wam-press").rows
+    force = measures(configuration).steady_force
+    errors = [
+        (row.quantity, abs(row.deviation * float(row.predicted))) for row in rows if row.quantity.endswith("true")
+    ]
+    shown = [(f"{name}, error", f"{error:.2g}", f"{force / error:.0f}") for name, error in errors]
+    return markdown(("recorded", "N", "steady force over it"), shown)
 
 
 def verdict(file: str) -> str:

@@ -74,6 +74,7 @@ def measures(configuration: Configuration) -> Measures:
         rotor_inertia=tuple(np.diag(rotor).tolist()),
         transmission_stiffness=tuple((np.square(gears.T) @ [c.stiffness for c in arm.circuits]).tolist()),
         joint_contact_stiffness=tuple((stiffness * np.square(levers).max(axis=0)).tolist()),
+        coupled_bandwidth=coupled_bandwidth(arm, links, levers, stiffness),
         aspect_ratio=aspect_ratios(arm),
         aspect_required=(*printed("aspect ratio of the inner link"), *printed("aspect ratio of the outer link")),
         cover_friction=min(driver.world.obstacles.friction),
@@ -132,6 +133,30 @@ def effective_mass(levers: Array, inertia: Array) -> float:
     """Greatest effective mass, kg, at the tip over directions with these levers, (directions, joints)."""
     mobility = np.einsum("di,ij,dj->d", levers, np.linalg.inv(inertia), levers)
     return float(1.0 / mobility.min())
+
+
+def coupled_bandwidth(arm: Arm, links: Array, levers: Array, stiffness: float) -> float:
+    """Least resonance, Hz, over directions of a contact at the tip, with all rotors, cables and links free to move.
+
+    Parameters
+    ----------
+    arm : its rotors and cables.
+    links : mass matrix of the links, (joints, joints), kg m^2.
+    levers : of directions at the tip, (directions, joints), m.
+    stiffness : of the contact, N/m.
+    """
+    n = len(arm.motors.names)
+    stretch = np.hstack([np.eye(n), -TransmissionMap.of(arm).motor_from_joint])
+    cables = stretch.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ stretch
+    inertia = np.block([[np.diag(arm.motors.inertia), np.zeros((n, n))], [np.zeros((n, n)), links]])
+    least = math.inf
+    for lever in levers:
+        contact = np.concatenate([np.zeros(n), lever])
+        squares = np.sort(
+            np.linalg.eigvals(np.linalg.solve(inertia, cables + stiffness * np.outer(contact, contact))).real
+        )
+        least = min(least, math.sqrt(squares[n - 1]) / (2.0 * math.pi))  # without the contact n motions are free
+    return least
 
 
 def aspect_ratios(arm: Arm) -> tuple[float, ...]:

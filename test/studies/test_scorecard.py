@@ -139,6 +139,27 @@ def test_stiction_cycle_at_the_tip_is_that_of_the_exact_force_loop(configuration
     assert without.value == math.inf
 
 
+def test_coupled_bandwidth_is_the_least_of_the_arm_whose_rotors_are_free(
+    configuration: Configuration, arm: Measures
+) -> None:
+    """Modes by a symmetric eigenvalue problem, whose contact removes one of four free motions."""
+    of = configuration.shared.arm
+    body, gears = RigidBody(of), np.linalg.inv(np.reshape(of.joint_from_motor, (4, 4)))
+    inertia = np.zeros((8, 8))
+    inertia[:4, :4], inertia[4:, 4:] = np.diag(of.motors.inertia), body.mass_matrix(POSE) + np.diag(of.joints.armature)
+    half = np.linalg.inv(np.linalg.cholesky(inertia))
+    rotation, jacobian, found = body.cover_pose(POSE, "outer_link").rotation, body.tool_jacobian(POSE), []
+    for angle in np.linspace(0.0, math.pi, 37):
+        lever = (math.cos(angle) * rotation[:, 1] + math.sin(angle) * rotation[:, 2]) @ jacobian
+        rows = np.vstack([np.hstack([np.eye(4), -gears]), [*np.zeros(4), *lever]])
+        stiffness = rows.T @ np.diag([*(circuit.stiffness for circuit in of.circuits), 4000.0]) @ rows
+        squares = np.linalg.eigvalsh(half @ stiffness @ half.T)
+        assert squares[2] < 1e-3 * squares[3]
+        found.append(math.sqrt(squares[3]) / (2.0 * math.pi))
+    assert arm.coupled_bandwidth == pytest.approx(min(found), rel=1e-3)
+    assert arm.coupled_bandwidth > 3.0 * row(scorecard(arm), "open-loop force bandwidth, joint 2 (4.4)").value
+
+
 @pytest.mark.parametrize(
     ("change", "measure"),
     [

@@ -29,10 +29,13 @@ from wam_studies.plant.ideal_testbed import (
 )
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
+from wam_theory.friction_model import IntegralLoop
+from wam_theory.stick_slip import simulate
 from wam_theory.tension_element import coulomb_like_torque
 
 Numbers = NDArray[np.float64]
 CRITICAL = 0.8  # part of the stiffness at which the torque loop is marginal
+RUN_STEP = 5e-4  # s, that users run
 TURNS, FINE = 40, 1000  # cycles of the torque loop, and steps of each, so that it has practically no delay
 
 
@@ -221,10 +224,7 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
     """
     depths = np.linspace(1e-4, 0.01, 25)
     below = 0.01  # m below the link, which then touches with its tip only
-    position = (0.0, 0.0, -0.0254 - below)
-    floor = Obstacles(
-        ("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,)
-    )
+    floor = _floor(below, 4e3, 0.0, hardening)
     plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS, cover_stiffness=cover))
     forces = []
     for depth in depths:
@@ -234,6 +234,13 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
         (load,) = plant.loads()
         forces.append(float(np.linalg.norm(load.force)))
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+
+
+def _floor(below: float, stiffness: float, damping: float, hardening: float) -> Obstacles:
+    """A plane this far below the link, m."""
+    position = (0.0, 0.0, -0.0254 - below)
+    law = (stiffness,), (damping,), (hardening,), (0.0,)
+    return Obstacles(("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), *law)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
@@ -329,6 +336,42 @@ def impact() -> PlantCurve:
             greatest = max(greatest, -float(k) * LEVER * plant.q[0])
         found.append(greatest)
     return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
+
+
+def stiction_cycle(step: float = RUN_STEP) -> PlantCurve:
+    """Stiction cycle of F_c, peak to peak, N m, with the exact one (5.8), at a step, s."""
+    contact, gain, seconds = 1464.28, 4e-3, 16.0
+    found = force_step(20.0, contact, gain, 3.74, (6.0, 3.0), seconds, step=step)
+    exact = simulate(found.node, IntegralLoop(gain), 20.0, seconds).at(found.time)
+    late = found.time > 0.5 * seconds
+    return level(float(np.ptp(found.force[late])), float(np.ptp(exact.contact_force[late])))
+
+
+def damped_impact(step: float = RUN_STEP, damping: float = 20.0) -> PlantCurve:
+    """Greatest force of a tip that runs into a damped surface at 0.5 rad/s, over its stiffness, N/m, at a step, s.
+
+    The force of m x'' + b x' + k x = 0 with the mass m of (3.1); the cable is so long that the rotor has no effect.
+    """
+    arm, stiffness, below = ideal_testbed(), np.array([1e3, 4e3, 1.6e4]), 0.01
+    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    speed, mass, found, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, [], []
+    for k in stiffness.tolist():
+        floor = _floor(below, k, damping, 0.0)
+        plant = released_plant(arm, World(floor, NO_SPRINGS), step)
+        q = -float(np.arcsin(below / LEVER))
+        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), (-7.0, -0.5)
+        natural, decay = float(np.sqrt(k / mass)), damping / (2.0 * mass)
+        times = np.arange(0.0, np.pi / natural, 0.1 * step)
+        swing = np.sqrt(natural**2 - decay**2)
+        x = speed / swing * np.exp(-decay * times) * np.sin(swing * times)
+        v = speed * np.exp(-decay * times) * (np.cos(swing * times) - decay / swing * np.sin(swing * times))
+        expected.append(float((k * x + damping * v).max()))
+        forces = []
+        for _ in range(round(np.pi / natural / step)):
+            plant.step([0.0])
+            forces += [float(np.linalg.norm(load.force)) for load in plant.loads()]
+        found.append(max(forces))
+    return PlantCurve(stiffness, np.array(found), np.array(expected))
 
 
 def pretension(coefficient: float = 1e-4) -> PlantCurve:
