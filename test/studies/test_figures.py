@@ -141,13 +141,6 @@ def test_lost_contact_closes_its_cycle(found: dict[str, Panels]) -> None:
     assert cycle.x.min() < -20.0 < 20.0 < cycle.x.max()
 
 
-@pytest.mark.slow  # its fixture: of all figures, where a source has changed
-def test_half_of_the_creep_is_there_where_the_motor_reverses(found: dict[str, Panels]) -> None:
-    (panel,) = found["6-creep"]
-    line = panel.line("(6.19)")
-    assert np.interp(panel.mark("motor reverses").x, line.x, line.y) == pytest.approx(0.5 * line.y[-1], rel=1e-6)
-
-
 @pytest.mark.slow
 def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Panels], tmp_path: Path) -> None:
     page = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")

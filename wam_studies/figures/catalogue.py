@@ -53,7 +53,6 @@ FIGURES: dict[str, ThesisFigure] = {
         ),
         ("5.11", "Three-dimensional trajectory illustrating an actuator-only limit cycle.", responses.trajectory),
         ("6-efficiency", "Limiting efficiency of cable stages (6.15).", closed_forms.efficiencies),
-        ("6-creep", "Creep out and back under a constant load (6.19).", closed_forms.creep),
     )
 }
 

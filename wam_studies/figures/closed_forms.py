@@ -1,9 +1,9 @@
-"""Figures of closed forms: 3.1, 4.9, efficiency (6.15) and creep (6.19) of chapter 6."""
+"""Figures of closed forms: 3.1, 4.9, and efficiency (6.15) of chapter 6."""
 
 import numpy as np
 
 from wam_studies.figures.panels import Mark, Panel, Panels, Series, line_only
-from wam_studies.plant.effects import creep_out_and_back, efficiency_under_load, resonances
+from wam_studies.plant.effects import efficiency_under_load, resonances
 from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
 from wam_theory.cable import efficiency, stage_loss
 from wam_theory.requisites import largest_cylinder, secure_angle, useful_length
@@ -86,13 +86,3 @@ def efficiencies() -> Panels:
         Panel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
         Panel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),
     )
-
-
-def creep() -> Panels:
-    """Creep (6.19) under a constant load of 40 N m, the motor going out and back."""
-    found = creep_out_and_back()
-    each = max(1, len(found.x) // 30)
-    line = Series(found.x, found.theory, found.x[::each], found.plant[::each]).scaled(1.0, 1e3)
-    back = Mark("motor reverses", float(found.x[-1]) / 2.0)
-    axes = "absolute travel of the motor [rad]", "creep of the link [mrad]"
-    return (Panel("creep, out and back", *axes, (("(6.19)", line),), marks=(back,)),)

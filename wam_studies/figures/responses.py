@@ -5,6 +5,7 @@ with an ideal motor, k_c = 1464 N m/rad as in section 5.6.
 """
 
 from functools import cache
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -116,14 +117,16 @@ def trajectory() -> Panels:
     found, exact, _, _, seconds = _coulomb()
     motion = exact.at(np.union1d(np.linspace(0.0, seconds, 2 * EVENLY), [event.time for event in exact.events]))
     shown = np.unique(np.geomspace(100.0, len(found.time) - 1.0, 110).astype(int))  # sticking times grow
-    force = Series(motion.x_m, motion.contact_force, found.motor[shown], found.force[shown]).scaled(1e3, 1.0)
-    speed = Series(motion.x_m, motion.v, found.motor[shown], found.velocity[shown]).scaled(1e3, 1.0)
-    both = Series(motion.contact_force, motion.v, found.force[shown], found.velocity[shown])
-    motor, velocity = "motor x_m at the joint [mrad]", "velocity of the link [rad/s]"
-    return (
-        Panel("a) along the velocity", motor, FORCE, (("exact", force),)),
-        Panel("b) along the force", motor, velocity, (("exact", speed),)),
-        Panel("c) along the motor", FORCE, velocity, (("exact", both),)),
+    seen = {
+        "motor x_m at the joint [mrad]": (1e3 * motion.x_m, 1e3 * found.motor[shown]),
+        FORCE: (motion.contact_force, found.force[shown]),
+        "velocity of the link [rad/s]": (motion.v, found.velocity[shown]),
+    }
+    return tuple(
+        Panel(title, x, y, (("exact", Series(seen[x][0], seen[y][0], seen[x][1], seen[y][1])),))
+        for title, (x, y) in zip(
+            ("a) along the velocity", "b) along the force", "c) along the motor"), combinations(seen, 2), strict=True
+        )
     )
 
 

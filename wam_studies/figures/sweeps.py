@@ -28,7 +28,7 @@ def scenario_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Sequenc
                 if pairs:
                     across, up = zip(*pairs, strict=True)
                     part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
-            part.set(xlabel=axis.name, ylabel="rms of the settled force error, N")
+            part.set(xlabel=axis.name, ylabel="rms of the settled force error [N]")
             part.legend()
 
 
@@ -49,5 +49,5 @@ def experiment_figure(file: Path, axes: Sequence[Axis], sets: Sets, found: Seque
                     if pairs:
                         across, up = zip(*pairs, strict=True)
                         part.scatter(across, up, s=14, label=role, color=colour)
-                part.set(title=quantity, xlabel=axis.name, ylabel=unit)
+                part.set(xlabel=axis.name, ylabel=f"{quantity} [{unit}]")
                 part.legend()

@@ -62,7 +62,7 @@ def current_loop(bandwidth: float = 100.0, delay: int = 2) -> PlantCurve:
     slow = replace(parameters, bandwidth=bandwidth, delay=delay)
     amplifier = Amplifier(configuration.shared.arm.motors, slow, np.random.default_rng(0))
     found = np.array([amplifier.step([1.0], 1e-3)[0] for _ in range(20)])
-    time = 1e-3 * np.arange(1, 21)
+    time = np.linspace(1e-3, 20e-3, 20)
     return PlantCurve(time, found, -np.expm1(-2.0 * np.pi * bandwidth * np.maximum(time - 1e-3 * delay, 0.0)))
 
 

@@ -1,10 +1,11 @@
-"""The arm on foam: commanded, true, measured and estimated force; pressing, sliding, and a push."""
+"""The arm on foam: commanded, true and estimated force; pressing, sliding, and a push."""
 
 import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
@@ -20,7 +21,6 @@ class Along(NamedTuple):
     time: Numbers
     commanded: Numbers
     true: Numbers
-    measured: Numbers
     estimated: Numbers
 
 
@@ -30,32 +30,13 @@ def pressing(runs: Mapping[str, Recording]) -> Result:
     found = along(run)
     rows: list[Comparison] = []
     for step in _named(run, "press"):
-        late = (found.time > step.end - BOUNDS.steady_press) & (found.time < step.end)
-        force = float(found.commanded[late].mean())
-        true = float(found.true[late].mean())
-        estimated = float(found.estimated[late].mean())
+        force = float(found.commanded[_late(found.time, step)].mean())
+        estimate = max(BOUNDS.estimate, BOUNDS.smallest_estimate_error / force)
+        cycle = max(BOUNDS.arm_cycle * force, BOUNDS.single_slip)
         # the last half of that time: before it the joints may still stick and slip
-        rest = (found.time > step.end - 0.5 * BOUNDS.steady_press) & (found.time < step.end)
-        rows += [
-            near(f"{step.name}, true", force, true, "N", "no error, 5.1.2", BOUNDS.force_at_rest),
-            near(
-                f"{step.name}, estimated",
-                true,
-                estimated,
-                "N",
-                "chapter 2",
-                max(BOUNDS.estimate, BOUNDS.smallest_estimate_error / force),
-            ),
-            below(
-                f"{step.name}, peak to peak",
-                np.ptp(found.true[rest]),
-                "N",
-                max(BOUNDS.arm_cycle * force, BOUNDS.single_slip),
-                "no cycle",
-            ),
-        ]
+        rows += _at_rest(found, step, step.name, (BOUNDS.force_at_rest, estimate, cycle), 0.5)
     rows.append(_position(run, _named(run, "press")))
-    return Result(rows, [_panel(found, _named(run, "press"))], _remarks(run))
+    return Result(rows, [_panel(found, _named(run, "press"))])
 
 
 def sliding(runs: Mapping[str, Recording]) -> Result:
@@ -76,7 +57,7 @@ def sliding(runs: Mapping[str, Recording]) -> Result:
         ]
     rows.append(_position(run, steps))
     every = [*_named(run, "press"), *steps, *_named(run, "rest")]
-    return Result(rows, [_panel(found, every)], _remarks(run))
+    return Result(rows, [_panel(found, every)])
 
 
 def along_the_link(runs: Mapping[str, Recording]) -> Result:
@@ -86,24 +67,43 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
     for name, run in runs.items():
         found, place = along(run), float(run.parameters.node("force_loop")["contact_position"])
         for step in _named(run, "press"):
-            late = (found.time > step.end - BOUNDS.steady_press) & (found.time < step.end)
-            force, true = float(found.commanded[late].mean()), found.true[late]
             label = f"{name}, {step.name} at {place:.2f} m"
-            rows += [
-                near(f"{label}, true", force, true.mean(), "N", "7.3", BOUNDS.force_along_link),
-                below(f"{label}, peak to peak", np.ptp(true), "N", BOUNDS.force_along_link * force),
-                near(f"{label}, estimated", true.mean(), found.estimated[late].mean(), "N", "chapter 2", math.nan),
-                _outside(run, step, label, place),
-            ]
+            cycle = BOUNDS.force_along_link * float(found.commanded[_late(found.time, step)].mean())
+            rows += _at_rest(found, step, label, (BOUNDS.force_along_link, math.nan, cycle))
+            rows.append(_outside(run, step, label, place))
         panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
     return Result(rows, panels)
+
+
+def _at_rest(
+    found: Along, step: Step, label: str, bounds: tuple[float, float, float], settled: float = 1.0
+) -> list[Comparison]:
+    """True force with the commanded one, estimate with the true force, and cycle, in the last part of a step.
+
+    Parameters
+    ----------
+    bounds : of force, estimate, and cycle, N.
+    settled : part of that time in which there is no cycle.
+    """
+    late, rest = (_late(found.time, step, part) for part in (1.0, settled))
+    commanded, true, estimated = (x[late].mean() for x in (found.commanded, found.true, found.estimated))
+    return [
+        near(f"{label}, true", commanded, true, "N", "no error, 5.1.2", bounds[0]),
+        near(f"{label}, estimated", true, estimated, "N", "chapter 2", bounds[1]),
+        below(f"{label}, peak to peak", np.ptp(found.true[rest]), "N", bounds[2], "no cycle"),
+    ]
+
+
+def _late(time: Numbers, step: Step, part: float = 1.0) -> NDArray[np.bool_]:
+    """The last part of a step, in which a press is steady."""
+    return (time > step.end - part * BOUNDS.steady_press) & (time < step.end)
 
 
 def _outside(run: Recording, step: Step, label: str, position: float) -> Comparison:
     """How far the true position of a contact is outside the set that the estimator states: none where it is in it."""
     time, columns = run.table("contact/hypotheses")
     cover = run.shared.arm.covers.names.index("outer_link")
-    here = (time > step.end - BOUNDS.steady_press) & (time < step.end) & (columns["link"] == cover)
+    here = _late(time, step) & (columns["link"] == cover)
     low, high = columns["low"][here], columns["high"][here]
     beyond = np.maximum(np.maximum(low - position, position - high), 0.0)
     outside = float(np.median(np.nan_to_num(beyond, nan=np.inf))) if len(low) else math.inf
@@ -113,7 +113,7 @@ def _outside(run: Recording, step: Step, label: str, position: float) -> Compari
 def along(run: Recording) -> Along:
     """Components along the commanded force, in the frame of the command."""
     command, truth = run.forces("force_command"), run.forces("sim/contact/wrench")
-    measured, estimated = run.forces("force_measured"), run.forces("contact/wrench")
+    estimated = run.forces("contact/wrench")
     pressed = np.linalg.norm(command.force, axis=1) > 0.0
     axis = command.force[pressed][0] / np.linalg.norm(command.force[pressed][0])
     frame = command.frames[int(np.flatnonzero(pressed)[0])]
@@ -127,7 +127,6 @@ def along(run: Recording) -> Along:
         truth.time,
         at_truth(command, 1.0),
         at_truth(truth, -1.0),
-        at_truth(measured, 1.0),
         at_truth(estimated, -1.0),
     )
 
@@ -143,8 +142,7 @@ def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
     for step in steps:
         means = []
         for time, position in (true, estimated):
-            late = (time > step.end - BOUNDS.steady_press) & (time < step.end)
-            means.append(float(np.nanmean(position[late])))
+            means.append(float(np.nanmean(position[_late(time, step)])))
         errors.append(abs(means[1] - means[0]))
     return below("position error, worst step", max(errors), "m", BOUNDS.position, "chapter 2")
 
@@ -158,11 +156,6 @@ def _panel(found: Along, steps: Sequence[Step]) -> Panel:
         ("commanded", line_only(time, found.commanded[shown])),
     ]
     return Panel("force along the commanded one", "time [s]", "force [N]", curves)
-
-
-def _remarks(run: Recording) -> tuple[str, ...]:
-    friction = run.parameters.node("driver")["world.obstacles.friction"]
-    return (f"the foam has a friction coefficient of {friction[0]:g}: while it sticks, it also pulls along the tube",)
 
 
 def pushed(runs: Mapping[str, Recording]) -> Result:

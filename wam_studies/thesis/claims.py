@@ -141,10 +141,5 @@ def table(claims: Iterable[Claim], measured: Mapping[str, str]) -> str:
 def _link(reference: str) -> str:
     """Where the page leads for a reference; '' for a function or test."""
     kind, _, name = reference.partition(" ")
-    links = {
-        "figure": f"[{name}](figures/figure-{name}.png)",
-        "experiment": f"[{name}](experiments/{name}.png)",
-        "task": f"[{name}](tasks/{name}.png)",
-        "effect": "[effects](plant.md)",
-    }
-    return links.get(kind, "")
+    folder = {"figure": "figures/figure-", "experiment": "experiments/", "task": "tasks/"}.get(kind)
+    return f"[{name}]({folder}{name}.png)" if folder else "[effects](plant.md)" * (kind == "effect")

@@ -14,7 +14,7 @@ from wam_theory.stiction import play
 
 
 def accuracy(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `force-accuracy`."""
+    """The experiment `force-accuracy`, or its run without feedback alone."""
     rows, panel = open_loop(runs["open_loop"])
     curves = []
     for name, run in runs.items():
@@ -27,7 +27,8 @@ def accuracy(runs: Mapping[str, Recording]) -> Result:
                 )
             )
             curves.append((name.replace("_", " "), measured(shown.time, shown.force)))
-    return Result(rows, [panel, Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)])
+    with_feedback = Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)
+    return Result(rows, [panel, with_feedback] if curves else [panel])
 
 
 def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
@@ -48,13 +49,6 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     each = slice(None, None, 40)
     curves = [("measured", measured(desired[each], force[each])), ("play", line_only(desired, expected))]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
-
-
-def open_loop_sample(runs: Mapping[str, Recording]) -> Result:
-    """The run of `force-accuracy` without feedback, or its first steps."""
-    (run,) = runs.values()
-    rows, panel = open_loop(run)
-    return Result(rows, [panel])
 
 
 def active_pretension(runs: Mapping[str, Recording]) -> Result:
