@@ -10,7 +10,7 @@ from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
-from wam_studies.plant.effects import PlantCurve, breakaway, creep_out_and_back, surface
+from wam_studies.plant.effects import PlantCurve, creep_out_and_back, surface
 from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, STEP, ideal_testbed, released_plant
 
 
@@ -76,5 +76,9 @@ def warm_friction(drop: float = 0.3) -> PlantCurve:
         plant = Plant(arm, EMPTY, no_effects(arm), STEP, replace(COULOMB_STICTION, warm_drop=drop))
         plant.brake(False)
         plant.heat([w])
-        found.append(breakaway(plant, False, 0.045 * (1.0 - drop * w)))
+        torque = 0.045 * (1.0 - drop * w)
+        while plant.thetad[0] < 1e-5:
+            torque *= 1.00001
+            plant.step([torque])
+        found.append(torque)
     return PlantCurve(heat, np.array(found), 0.05 * (1.0 - drop * heat))

@@ -9,6 +9,7 @@ from wam_analysis.table import markdown
 from wam_driver.sensors import Encoders
 from wam_studies.plant import effects, options
 from wam_studies.plant.effects import PlantCurve, level, torque_loop, torque_loop_response
+from wam_studies.plant.ideal_testbed import STEP
 from wam_theory.backlash_cycle import exact_cycle
 
 
