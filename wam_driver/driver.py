@@ -143,7 +143,6 @@ class Driver:
         self._disturbed = ""  # cover that is pushed by messages
         self._last_push = "", 0  # the last pushes of an enabled arm, in words, and the tick in which they acted
         self._pretension_share = parameters.effects.pretension_share
-        self._is_warming = parameters.friction.warm_drop > 0.0
         self._begin_period(1)
         self._release()
         self._measure()
@@ -191,7 +190,7 @@ class Driver:
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
         torque = self.amplifier.torque(self.currents, self.plant.theta) if enabled else self._zero
-        if self._is_warming and self.is_outer:
+        if self.is_outer and self._parameters.friction.warm_drop:
             self.plant.heat(self.amplifier.heat)
         self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble():

@@ -26,7 +26,7 @@ class PlantThresholds:
 
 @dataclass(frozen=True, slots=True)
 class CircuitThresholds:
-    """How finely a cable that ends on its pulleys remembers its load."""
+    """How finely a cable that ends on its pulleys keeps its load."""
 
     wound_part: float = 0.05  # rad of the rotor, wound under one load: half a millimetre of cable on the pinions
     passages: float = 4.0  # times a part takes over the load by a factor of e while it passes: 98 % of it

@@ -98,7 +98,7 @@ def creep_out_and_back(
     speed : of the motor, rad/s.
     seconds : in each direction.
     rounds : out and back.
-    terminated : whether the cables end on both pulleys; the theory is that of endless ones.
+    terminated : whether the cables end on both pulleys; the theory is that of cables without ends.
 
     Returns
     -------
