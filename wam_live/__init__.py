@@ -14,7 +14,6 @@
 
 Other programs next to a running stack:
 
-- stack_client: a node with the parameters of the driver
 - push: a push as by hand, of `wam call push`
 - frame_publisher: /tf and /tf_static
 - trajectory_action: the action FollowJointTrajectory

@@ -4,10 +4,8 @@ It publishes nothing before somebody drags or presses, and no longer than that.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
-
-from rclpy.node import Node
 
 from wam_description.arm import Shared, Timing
 from wam_description.parameters import build_part
@@ -25,9 +23,8 @@ from wam_live.scene import Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
 from wam_live.thresholds import LIVE
+from wam_ros.client import Reply, StackClient
 from wam_ros.messages import message_type
-from wam_ros.remote_parameters import RemoteParameters
-from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import Connection
 from wam_ros.topics import qos
 from wam_ros.wire import stamp_of
@@ -55,9 +52,9 @@ class LivePage:
     def __init__(self, namespace: str, port: int, notify: Callable[[str], None], domain_id: int | None = None) -> None:
         self._namespace, self._port, self._notify = namespace, port, notify
         self._connection = Connection(domain_id=domain_id)
-        self._asking = Node("live", context=self._connection.context, namespace=namespace)
-        self._connection.add(self._asking)
-        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
+        self._client = StackClient(namespace, "live", self._connection)
+        self._client.follow_statuses()
+        self._asking = self._client.node
         self._server: Any = None
         self._press: Press | None = None
         self._holds: dict[str, HeldTopic] = {}
@@ -75,8 +72,8 @@ class LivePage:
     def run(self, until: Callable[[], bool]) -> None:
         """Show the stack until a condition holds; it may start later."""
         try:
-            flat = self._parameters(until)
-            if flat is None:
+            flat = self._client.await_driver(until, dict.fromkeys(node for node, _ in SLIDERS))
+            if not flat:
                 return
             self._waiting.remove()
             driver = flat["driver"]
@@ -86,7 +83,7 @@ class LivePage:
             label = f"{self._asking.get_namespace()}, domain {domain}"
             more = f", {shared.arm.name}, since {time.strftime('%H:%M:%S')}"
             name_page(self._server, label, more)
-            source = RunningStack(self._connection.context, self._namespace, shared)
+            source = RunningStack(self._connection.context, self._namespace, shared, self._client.statuses)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), draggable=True)
             self.objects = objects = ObjectMeshes(self._server, world)
@@ -111,17 +108,6 @@ class LivePage:
                 self._server.stop()
             self._server = None
         self._connection.close()
-
-    def _parameters(self, until: Callable[[], bool]) -> Mapping[str, Mapping[str, Any]] | None:
-        requested = RemoteParameters(self._asking, ["driver", *dict.fromkeys(node for node, _ in SLIDERS)])
-        begin = time.monotonic()
-        while not until():
-            requested.ask()
-            self._connection.executor.spin_once(timeout_sec=0.05)
-            late = time.monotonic() - begin > 2.0
-            if "driver" in requested.found and (late or not requested.missing):
-                return requested.found
-        return None
 
     def _draw(
         self,
@@ -230,29 +216,24 @@ class LivePage:
                 self._end_press()
                 panel.notify("letting go")
             return
-        service, kind, message = service_request(request)
-        if (service, kind) not in self._clients:
-            self._clients[service, kind] = self._asking.create_client(kind, service)
-            self._clients[service, kind].wait_for_service(0.5)
-        client = self._clients[service, kind]
-        if not client.service_is_ready():
+        client, message = self._client.service(request)
+        if not client.wait_for_service(0.5):
             panel.notify(f"{request.node} does not answer", refused=True)
             return
         client.call_async(message).add_done_callback(
-            lambda future: self._answered(request, future.result(), panel, text)
+            lambda future: self._answered(request, Reply.of(request, future.result()), panel, text)
         )
 
-    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, text: str) -> None:
-        reasons = refusal_of(request, answer)
+    def _answered(self, request: Call | SetParameters, reply: Reply, panel: Controls, text: str) -> None:
         if isinstance(request, Call):
-            panel.notify(text or answer.message, refused=not answer.success)
+            panel.notify(text or reply.message, refused=not reply.success)
             return
         for name, value in request.values.items():
-            if reasons:
+            if not reply.success:
                 panel.set_slider(request.node, name, self._live[request.node, name])
             else:
                 self._live[request.node, name] = value
-            panel.notify(reasons or f"{name} = {value}", refused=bool(reasons))
+            panel.notify(reply.message or f"{name} = {value}", refused=not reply.success)
 
 
 def dither_text(timing: Timing) -> str:

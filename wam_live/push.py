@@ -7,14 +7,14 @@ from wam_description.arm import Shared
 from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.status import PAUSED
 from wam_live.hold import HeldTopic
-from wam_ros.call import CalledStack
+from wam_ros.client import StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.topics import stamp_of
 
 NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def push(stack: CalledStack, shared: Shared, wrench: Wrench, seconds: float) -> float:
+def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> float:
     """Push for some seconds of the arm's time; returns for how long it was, s.
 
     Parameters
@@ -28,7 +28,8 @@ def push(stack: CalledStack, shared: Shared, wrench: Wrench, seconds: float) -> 
     ValueError
         where the arm does not move, or another program pushes it, with what to do.
     """
-    statuses = stack.statuses()
+    stack.require_driver()
+    statuses = stack.statuses
     hold = HeldTopic(stack.node, "sim/disturbance", shared)
     begin = stamp = 0
     try:

@@ -8,26 +8,19 @@ import time
 from typing import Any, Final
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
-from wam_description.topics import BY_NAME, STATUS
+from wam_description.topics import BY_NAME
 from wam_live.snapshot import NAN, Snapshot, size
 from wam_live.thresholds import LIVE
-from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.messages import Refused, message_type
 from wam_ros.outlets import COPIED, NEWEST, copy_name
 from wam_ros.wire import decoder, stamp_of
 
 TOPICS: Final = (*sorted(COPIED), "force_command")  # of which everybody may be the publisher
-LATCHED: Final = QoSProfile(
-    reliability=ReliabilityPolicy.RELIABLE,
-    history=HistoryPolicy.KEEP_LAST,
-    depth=50,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 
 
 class RunningStack:
@@ -38,13 +31,10 @@ class RunningStack:
     context : of ROS.
     namespace : of the stack.
     shared : shared parameters of the driver.
-
-    Attributes
-    ----------
-    statuses : newest of each node, by name.
+    statuses : newest of each node, by name, kept up to date by somebody else.
     """
 
-    def __init__(self, context: Any, namespace: str, shared: Shared) -> None:
+    def __init__(self, context: Any, namespace: str, shared: Shared, statuses: dict[str, NodeStatus]) -> None:
         # its node is in no executor: what has come is taken when a picture is drawn
         self.node = Node("live_view", context=context, namespace=namespace)
         self._covers = shared.arm.covers.names
@@ -53,10 +43,9 @@ class RunningStack:
             name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
         }
         self._whole = set(COPIED)  # of which all messages are taken, because copies have not been found
-        self._status = self.node.create_subscription(message_type(BY_NAME[STATUS]), STATUS, print, LATCHED)
         self._newest: dict[str, Any] = {}
         self._stamps: dict[str, int] = {}
-        self.statuses: dict[str, NodeStatus] = {}
+        self.statuses = statuses
         self._pace: tuple[float, int] = (time.monotonic(), 0)
         self._factor = NAN
         self._heard = self._pace
@@ -64,14 +53,11 @@ class RunningStack:
     def snapshot(self) -> Snapshot:
         """What the stack shows now."""
         for name, subscription in self._topics.items():
-            if (data := _taken(subscription, raw=True)) is not None:
+            if (data := _taken(subscription)) is not None:
                 try:
                     self._newest[name], self._stamps[name] = self._decoders[name](data), stamp_of(data)
                 except Refused:
                     continue
-        while (message := _taken(self._status, raw=False)) is not None:
-            status = read_status(message)
-            self.statuses[status.node] = status
         truth = self._newest.get("sim/joint_states")
         joints: State | None = truth or self._newest.get("joint_states")
         table: Table | None = self._fresh("contact/hypotheses")
@@ -141,7 +127,7 @@ def objects_of(table: Table | None) -> tuple[ObjectState, ...]:
     return tuple(ObjectState._make(row) for row in table.rows) if table else ()
 
 
-def _taken(subscription: Any, raw: bool) -> Any:
+def _taken(subscription: Any) -> Any:
     with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, raw)
+        taken = subscription.handle.take_message(subscription.msg_type, True)
     return None if taken is None else taken[0]

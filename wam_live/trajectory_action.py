@@ -22,8 +22,8 @@ from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, 
 from wam_description.arm import Shared
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
-from wam_live.stack_client import run_next_to
 from wam_live.thresholds import LIVE
+from wam_ros.client import run_next_to
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
 from wam_ros.topics import qos
 

@@ -9,14 +9,14 @@
 - wire: the codec between bytes and values; messages: message objects to values and back; markers: what viewers draw
 - local_bus: messages between nodes of one process, without the middleware
 - parameters: declared, described, live; remote_parameters: those of other nodes
-- requests: requests to services and their answers; call: one request from a shell
+- requests: requests to services and their answers; client: a running stack as a program next to it sees it
 - recorder, recorder_node, recorder_interface: every topic into a bag; recorded_stack: whether that is one run
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - long_steps: a node that holds up the others of its process
-- processors: those that the processes of one lockstep keep to
+- processors: one that the driver has to itself in realtime
 - process_signals: signals from the imports of a program to its end; program: that of a node
-- conformance: a running driver tested against its contract; driver_probe: the node that does it
-- driver_bench: states and currents of that driver; driver_checks: a function for each row
+- conformance: a running driver tested against its contract; driver_bench: the node that does it
+- driver_checks: a function for each row of the contract
 - testing: the test kit; pytest_plugin: its fixtures
 - limits: waits, counts and lengths of all these
 - network: limits ROS to this machine; one node of a name in each place

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple, cast
 
 from rclpy.logging import get_logger
@@ -24,7 +24,7 @@ from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
-from wam_ros.run import FIRST, LAST, PARENT, Connection, prepare_logging_directory, spin
+from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, prepare_logging_directory, spin
 from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
@@ -82,7 +82,7 @@ def parameter_file(configuration: Configuration) -> Iterator[Path]:
         yield file
 
 
-class Processes:
+class Processes(Closing):
     """Nodes in processes of their own; leaving the context stops them all, brakes first, bag last.
 
     Parameters
@@ -120,12 +120,6 @@ class Processes:
         }
         self._first = next((name for name in self._processes if FIRST in name.split()), FIRST)
 
-    def __enter__(self) -> "Processes":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
-        self.stop()
-
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
         codes = {name: process.poll() for name, process in self._processes.items()}
@@ -142,7 +136,7 @@ class Processes:
         """Nodes that have ended and should not have; why, they have printed themselves."""
         return [f"node {name} {_ending(code)}" for name, code in self.ended().items() if code]
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
 
         All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
@@ -300,7 +294,7 @@ class PlayedScenario(NamedTuple):
     fault: str
 
 
-class Composition:
+class Composition(Connection):
     """Nodes in this process, in one executor; leaving the context destroys them, brakes first, bag last.
 
     Parameters
@@ -314,8 +308,6 @@ class Composition:
     Attributes
     ----------
     nodes : the nodes by name.
-    context, executor : of this connection, for further nodes.
-    add : called with a further node, which is spun with the others.
     killed : none, as nodes of this process end by themselves.
     """
 
@@ -331,9 +323,7 @@ class Composition:
         log_level: str = "info",
     ) -> None:
         names = node_names(configuration)
-        self._connection = Connection(["wam", "--ros-args", "--log-level", log_level], domain_id)
-        self.context, self.executor = self._connection.context, self._connection.executor
-        self.add = self._connection.add
+        super().__init__(["wam", "--ros-args", "--log-level", log_level], domain_id)
         BUSES[self.context] = LocalBus(self.executor, names.values())
         self.nodes: dict[str, Node] = {}
         self._may_end: dict[str, Any] = {}
@@ -358,12 +348,6 @@ class Composition:
         self.add(node)
         if hasattr(getattr(node, "node", node), "done"):
             self._may_end[name] = node
-
-    def __enter__(self) -> "Composition":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
-        self.close()
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name, as if they were processes."""
@@ -392,6 +376,6 @@ class Composition:
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""
         recorder = self.nodes.get(LAST)
-        self._connection.close()
+        super().close()
         self.bag_failure = str(getattr(recorder, "failure", ""))
         self.nodes.clear()

@@ -1,15 +1,35 @@
-"""A driver under test: brought into a state, its currents and its mode looked at."""
+"""A node in the place of the velocity loop that answers a driver under test, and looks at its currents and mode."""
 
 import math
 import statistics
+import time
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from wam_description.agreement import DIGESTS
 from wam_description.arm import Shared
-from wam_description.driver_contract import REPLY, DriverContract
-from wam_ros.driver_probe import Arrived, DriverProbe, Spin
+from wam_description.driver_contract import REPLY, SERVICES, DriverContract
+from wam_description.event import Level
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import NodeStatus, State
+from wam_description.topics import BY_NAME, STATUS
+from wam_description.transmission_map import TransmissionMap
+from wam_description.wiring import Call
+from wam_ros.client import StackClient
+from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
+from wam_ros.messages import diagnostic_status, joint_state
+from wam_ros.topics import NAMESPACE, qos, stamp_of, topic_name
 
+KEPT = {"motor_states": JointState, "motor_currents": JointState, "/clock": Clock, "robot_description": String}
+COMMAND = "motor_current_command"
 Restart = Callable[[], None]
 
 
@@ -17,28 +37,178 @@ class Untested(Exception):
     """A row cannot be tested; the text states why."""
 
 
-class DriverBench(DriverProbe):
-    """The probe, and what the checks of the rows do with a driver.
+class Arrived(NamedTuple):
+    """A message and when it came, s of the steady clock."""
+
+    when: float
+    stamp: int
+    message: Any
+
+
+class DriverBench(StackClient):
+    """Answers each state with currents that carry the links, with a small one more on the first motor.
 
     Parameters
     ----------
     shared : configuration of the arm.
     share : of the periods in which a state has to come.
     current : added to the first motor, A, with a changing sign.
-    spin : handles what has arrived, for at most this many seconds.
-    ros : as rclpy's Node takes them.
+    namespace, connection : as for `StackClient`.
 
     Attributes
     ----------
+    arrived : what came by topic.
+    reported : the driver's statuses and when they came, newest last.
+    diagnostics : names in /diagnostics so far.
+    commanded : the currents of the last command, A, in the order of the motors.
+    carrying : currents that hold the arm up, A.
+    answered : stamp of the newest state that was answered, ns.
+    is_answering : whether states are answered.
+    after : messages that are sent after the next answers, made from the stamp of the state.
+    wanted : makes the answer from stamp and currents; None for the proper one.
+    longest_pause : s, in which this node itself did not run.
     end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
     """
 
     end: Restart | None = None
     restart: Restart | None = None
 
-    def __init__(self, shared: Shared, share: float, current: float, spin: Spin, **ros: Any) -> None:
-        super().__init__(shared, current, spin, **ros)
+    def __init__(
+        self, shared: Shared, share: float, current: float, namespace: str = NAMESPACE, connection: Any = None
+    ) -> None:
+        super().__init__(namespace, "velocity_loop", connection, shared)
         self.contract = DriverContract.of(shared, share)
+        self._arm, self._timing, self._current = shared.arm, shared.timing, current
+        self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
+        self.carrying = [0.0] * len(self.contract.motors)
+        self.commanded = list(self.carrying)
+        self.arrived = {topic: deque[Arrived](maxlen=CONFORMANCE_LIMITS.kept) for topic in KEPT}
+        self.reported: deque[tuple[float, NodeStatus]] = deque(maxlen=CONFORMANCE_LIMITS.kept)
+        self.diagnostics: set[str] = set()
+        self.answered = 0
+        self.longest_pause = 0.0
+        self.is_answering = True
+        self.after: list[Callable[[int], Any]] = []
+        self.wanted: Callable[[int, list[float]], Any] | None = None
+        self._session = -1
+        self._command = self.publisher(COMMAND)
+        for topic, kind in KEPT.items():
+            row = BY_NAME[topic]
+            self.node.create_subscription(kind, topic_name(self.node, row), self._keeping(topic), qos(row))
+        row = BY_NAME["/diagnostics"]
+        self.node.create_subscription(DiagnosticArray, row.name, self._take_report, qos(row))
+        self.follow_statuses()
+        self._services = {name: self.service(_call(name))[0] for name in SERVICES}
+        self.report()
+
+    def _keeping(self, topic: str) -> Callable[[Any], None]:
+        kept = self.arrived[topic]
+
+        def keep(message: Any) -> None:
+            stamp = 0
+            if topic == "/clock":
+                stamp = message.clock.sec * 1_000_000_000 + message.clock.nanosec
+            elif topic != "robot_description":
+                stamp = stamp_of(message)
+            kept.append(Arrived(time.monotonic(), stamp, message))
+            if topic == "motor_states":
+                self._answer(stamp, message)
+
+        return keep
+
+    def _answer(self, stamp: int, state: Any) -> None:
+        if not self.is_answering:
+            return
+        tick = stamp // self._timing.period_ns
+        if tick % self._timing.outer_divisor == 0 and len(state.position) == len(self.contract.motors):
+            q = self._map.joint_positions(list(state.position))
+            torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
+            self.carrying = [t / k for t, k in zip(torque, self.contract.torque_constant, strict=True)]
+        self.commanded = list(self.carrying)
+        self.commanded[0] += self._current if tick // CONFORMANCE_LIMITS.swing % 2 else -self._current
+        make = self.wanted or self.command
+        self._command.publish(make(stamp, self.commanded))
+        self.answered = stamp
+        if self.after:
+            self._command.publish(self.after.pop(0)(stamp))
+
+    def command(self, stamp: int, currents: list[float]) -> Any:
+        """A proper command."""
+        return joint_state(stamp, self.contract.motors, State([], [], currents))
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Keep a status of the driver, and follow its session."""
+        if status.node == "driver":
+            self.reported.append((time.monotonic(), status))
+            if status.session != self._session:
+                self._session = status.session
+                self.report()
+
+    def _take_report(self, message: Any) -> None:
+        self.diagnostics |= {status.name for status in message.status}
+
+    def report(self, fault: str = "", node: str = "velocity_loop", started_with: str = "") -> None:
+        """Publish a status of this node, or of another one: ready, or with a fault.
+
+        Parameters
+        ----------
+        started_with : digests of its shared parameters (`wam_description.agreement`).
+        """
+        facts = {DIGESTS: started_with} if started_with else {}
+        status = READY._replace(node=node, session=max(self._session, 0), fault=fault, facts=facts)
+        if fault:
+            status = status._replace(level=Level.ERROR, message=fault)
+        self.publisher(STATUS).publish(diagnostic_status(status, self._arm.name))
+
+    def be_proper(self) -> None:
+        """Answer again as a velocity loop that is right."""
+        self.is_answering, self.wanted, self.after = True, None, []
+        self.report()
+
+    # looking
+
+    @property
+    def status(self) -> NodeStatus:
+        """The driver's newest status."""
+        return self.reported[-1][1] if self.reported else NodeStatus(Level.STALE, "none has come")
+
+    def forget(self) -> None:
+        """Drop what has come so far."""
+        for kept in self.arrived.values():
+            kept.clear()
+
+    def spin_once(self, seconds: float = CONFORMANCE_LIMITS.spin) -> None:
+        """As that of the client; a long one is a pause."""
+        begin = time.monotonic()
+        super().spin_once(seconds)
+        self.longest_pause = max(self.longest_pause, time.monotonic() - begin)
+
+    def watch(self, seconds: float) -> None:
+        """Let time pass."""
+        self.wait(lambda: False, seconds)
+
+    def ask(self, service: str, switch: bool | None = None) -> tuple[bool, str]:
+        """The answer of a service; (False, '') where there is none."""
+        client, message = self.service(_call(service, switch))
+        limit = CONFORMANCE_LIMITS.service_wait
+        answer = self.answer(client, message, limit, limit) if self.wait(client.service_is_ready, limit) else None
+        return (bool(answer.success), str(answer.message)) if answer else (False, "")
+
+    def lacking(self, sent: tuple[str, ...], taken: tuple[str, ...]) -> list[str]:
+        """What the driver does not connect to, of the topics that it sends and takes and of its services."""
+        names = {topic: topic_name(self.node, BY_NAME[topic]) for topic in sent}
+        lacking = [topic for topic in sent if not self.node.count_publishers(names[topic])]
+        lacking += [topic for topic in taken if not self._command.get_subscription_count()]
+        lacking += [f"driver/{name}" for name, client in self._services.items() if not client.service_is_ready()]
+        return lacking + ([] if self.reported else [STATUS])
+
+    def second_publisher(self) -> Any:
+        """Another publisher of the command, of a node of its own, and what ends it."""
+        other = Node("second_velocity_loop", namespace=self.node.get_namespace(), context=self.node.context)
+        other.create_publisher(JointState, COMMAND, qos(BY_NAME[COMMAND]))
+        return other
+
+    # the driver in a state, and its currents
 
     def brake(self) -> None:
         """To braked, from any state."""
@@ -53,7 +223,7 @@ class DriverBench(DriverProbe):
             self.is_answering = True
             self.watch(CONFORMANCE_LIMITS.settle)
             answer = self.ask("enable", True)
-            if answer[0] and self.wait(lambda: self.status.mode == "enabled"):
+            if answer[0] and self.wait(lambda: self.status.mode == "enabled", REPLY):
                 self.forget()
                 self.watch(CONFORMANCE_LIMITS.settle)
                 if self.status.mode == "enabled":
@@ -96,7 +266,7 @@ class DriverBench(DriverProbe):
 
     def in_mode(self, mode: str) -> str:
         """What is wrong with the mode, '' where it is this one."""
-        if self.wait(lambda: self.status.mode == mode):
+        if self.wait(lambda: self.status.mode == mode, REPLY):
             return ""
         return f"status.mode is '{self.status.mode}'; it has to be '{mode}'"
 
@@ -139,7 +309,7 @@ class DriverBench(DriverProbe):
         for what, make in messages.items():
             self.enable()
             self.after = [make] * 5
-            self.wait(lambda: not self.after)
+            self.wait(lambda: not self.after, REPLY)
             self.watch(CONFORMANCE_LIMITS.settle)
             for state in self.states():
                 if not all(map(math.isfinite, state.message.effort)):
@@ -150,3 +320,8 @@ class DriverBench(DriverProbe):
             if self.status.mode != "enabled":
                 return f"{what}: the driver does not stay enabled: {self.status.message}"
         return ""
+
+
+def _call(service: str, switch: bool | None = None) -> Call:
+    """A request to the driver; of a switch the value counts."""
+    return Call("driver", service, bool(switch) if SERVICES[service] else None)

@@ -24,7 +24,7 @@ def _interface(bench: DriverBench) -> str:
 
     def lacking() -> list[str]:
         found = bench.lacking(SENT, TAKEN)
-        name = f"{bench.get_namespace().strip('/')}: driver"
+        name = f"{bench.node.get_namespace().strip('/')}: driver"
         return found if name in bench.diagnostics else [*found, f"/diagnostics of '{name}'"]
 
     bench.wait(lambda: not lacking(), CONFORMANCE_LIMITS.start)
@@ -120,15 +120,15 @@ def _braked(bench: DriverBench) -> str:
 
 
 def _status(bench: DriverBench) -> str:
-    before = len(bench.statuses)
+    before = len(bench.reported)
     bench.watch(4 * STATUS_AGE)
-    times = [when for when, _ in bench.statuses][before:]
+    times = [when for when, _ in bench.reported][before:]
     status = bench.status
     if not (status.session and status.mode):
         return f"session is {status.session or 'missing'}, mode is '{status.mode}'"
     if len(times) < 2 or statistics.median(b - a for a, b in pairwise(times)) > STATUS_AGE:
         return f"{len(times)} came in {4 * STATUS_AGE:g} s"
-    infos = bench.get_publishers_info_by_topic("status")
+    infos = bench.node.get_publishers_info_by_topic("status")
     if not all(info.qos_profile.durability.name == "TRANSIENT_LOCAL" for info in infos):
         return "it is not latched: durability is not transient local"
     return ""
@@ -273,7 +273,7 @@ def _claims(bench: DriverBench) -> str:
         return "" if "motor_current_command" in topics else f"no event of its status names the topic: {topics}"
     finally:
         other.destroy_node()
-        bench.wait(lambda: bench.count_publishers("motor_current_command") == 1, CONFORMANCE_LIMITS.vanish)
+        bench.wait(lambda: bench.node.count_publishers("motor_current_command") == 1, CONFORMANCE_LIMITS.vanish)
         bench.watch(3 * CONFORMANCE_LIMITS.settle)
 
 
@@ -306,7 +306,7 @@ def _session(bench: DriverBench) -> str:
     if bench.restart is None:
         raise Untested("the driver runs already; give its command with --driver")
     before = bench.status.session
-    bench.statuses.clear()
+    bench.reported.clear()
     bench.restart()
     if not bench.wait(lambda: bench.status.session, CONFORMANCE_LIMITS.start):
         return "no status has come since"

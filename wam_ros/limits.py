@@ -44,8 +44,6 @@ class ProcessLimits:
     recorder_end: float = 30.0  # s without any sign of work, before a recorder that does not end is killed
     recorder_reports: float = 2.0  # s between two lines about a recorder that is still writing
     processors: int = 3  # processors, of which the driver may have one to itself in realtime
-    load_look: float = 0.05  # s, in which the idlest processor is found
-    load_steps: int = 10  # of load; within one of them it is chance which processor is the idlest
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,6 @@ class RecorderLimits:
     # s, between two looks for messages; one after the other by the executor they cost twice as much
     drain_period: float = 0.01
     announced: float = 1.0  # s, at the end, for messages that were announced
-    silence: float = 5.0  # s without any message, after which a recorder that was started by hand reports it
     statuses: int = 64  # in a message of /diagnostics
     count_length: int = 16  # digits of a count in /diagnostics
 
@@ -70,8 +67,8 @@ class CallLimits:
 
     answer: float = 10.0  # s, for an answer
     silence: float = 2.0  # s, after which a topic that comes in every period of the arm has stopped
-    attempts: int = 20  # requests to a service that is just being discovered
-    set_attempts: int = 3  # requests to set parameters: the guard of the force loop takes its time over new gains
+    attempt: float = 0.5  # s, after which a service that is just being discovered gets the request again
+    set_attempt: float = 3.3  # s, the same for parameters: the guard takes its time over new gains
     waiting: int = 100  # messages that may wait for a slow terminal
     discovery: float = 2.0  # s, after which no more of a stack comes
     parameters: float = 2.0  # s; an answer can be lost while services are still being discovered

@@ -41,8 +41,7 @@ class AdaptedNode(StackNode):
 
     Parameters
     ----------
-    declaration : of the node.
-    ros : context, namespace and so on, as rclpy's Node takes them.
+    declaration, ros : as for `StackNode`.
 
     Attributes
     ----------

@@ -30,29 +30,6 @@ from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, qos, topic_name
 
 
-class Silence:
-    """Whether nothing comes for a while.
-
-    Attributes
-    ----------
-    heard : messages so far.
-    """
-
-    def __init__(self) -> None:
-        self.heard = self._before = 0
-        self._at, self._is_reported = time.monotonic(), False
-
-    def begins(self) -> bool:
-        """Whether no message has come for `RECORDER_LIMITS.silence`; true once for each pause."""
-        now = time.monotonic()
-        if self.heard != self._before:
-            self._before, self._at, self._is_reported = self.heard, now, False
-        elif not self._is_reported and now - self._at > RECORDER_LIMITS.silence:
-            self._is_reported = True
-            return True
-        return False
-
-
 class RecorderNode(TolerantNode):
     """Records from construction to `destroy_node`, which closes the bag."""
 
@@ -94,7 +71,7 @@ class RecorderNode(TolerantNode):
         self._attached = ""
         self._dropped = 0
         self._failed = False
-        self._silence = Silence()  # of others, recorded or not
+        self._has_heard = False  # others, recorded or not
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain, clock=steady)
         self.create_timer(0.1, self.attend, clock=steady)
@@ -120,7 +97,7 @@ class RecorderNode(TolerantNode):
     @property
     def _empty(self) -> str:
         """That no message of the stack has come to a recorder that was started by hand; '' where one has."""
-        if self._ends_last or self._silence.heard:
+        if self._ends_last or self._has_heard:
             return ""
         return f"{self.bag.path} is empty: no message came; start the stack with 'wam up' before the recorder"
 
@@ -173,7 +150,6 @@ class RecorderNode(TolerantNode):
         """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""
         self.recorder.flush()
         self._warn()
-        self._look_for_messages()
         self.stack.attend(self._writers(self._status_name))
         if self.ready or self.stack.parameters.missing or self._unmatched():
             return
@@ -199,12 +175,6 @@ class RecorderNode(TolerantNode):
             self._dropped = dropped
             so_far = (count._replace(lost_at_end=0) for count in self.recorder.counts())  # it may still come
             self.get_logger().warning(f"the recorder was too slow: {summary(so_far)}")
-
-    def _look_for_messages(self) -> None:
-        """Report once that nothing comes, to a recorder that was started by hand and may wait for nobody."""
-        if not self._ends_last and self._silence.begins():
-            why = "the stack has ended, or is paused" if self._silence.heard else "no stack runs here"
-            self.get_logger().warning(f"no message for {RECORDER_LIMITS.silence:g} s: {why}; Ctrl-C ends the recording")
 
     def _report(self) -> None:
         state = self._state("recording")
@@ -244,7 +214,7 @@ class RecorderNode(TolerantNode):
                     arrived.append((info["source_timestamp"], name, data, received, number))
         arrived.sort(key=itemgetter(0))
         for sent, name, data, received, number in arrived:
-            self._silence.heard += name not in self._own_topics
+            self._has_heard |= name not in self._own_topics
             self.recorder.receive(name, data, received, sent, number)
             if name == self._diagnostics_name:
                 self._take_totals(data)

@@ -42,6 +42,11 @@ class RemoteParameters:
         """Nodes that have not answered yet."""
         return [name for name in self._clients if name not in self.found]
 
+    def complete(self) -> bool:
+        """Ask, and return whether all have answered."""
+        self.ask()
+        return not self.missing
+
     def ask(self) -> None:
         """Ask the nodes that are there and have not answered; call it again until none is missing."""
         now = time.monotonic()

@@ -32,13 +32,9 @@ def service_request(request: Request) -> ServiceRequest:
         sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
         message = SetParametersService.Request(parameters=sent)
         return ServiceRequest(f"{request.node}/set_parameters", SetParametersService, message)
-    kind, message = switch_request(request.data)
-    return ServiceRequest(f"{request.node}/{request.service}", kind, message)
-
-
-def switch_request(data: bool | None) -> tuple[Any, Any]:
-    """Type and message of a request with a value, or of a std_srvs/Trigger where it is None."""
-    return (Trigger, Trigger.Request()) if data is None else (SetBool, SetBool.Request(data=data))
+    if request.data is None:
+        return ServiceRequest(f"{request.node}/{request.service}", Trigger, Trigger.Request())
+    return ServiceRequest(f"{request.node}/{request.service}", SetBool, SetBool.Request(data=request.data))
 
 
 def refusal_of(request: Request, answer: Any) -> str:
@@ -48,28 +44,6 @@ def refusal_of(request: Request, answer: Any) -> str:
             return f"{request.node} failed on it and may use a part of it; its log has the reason"
         return "; ".join(result.reason for result in answer.results if not result.successful)
     return "" if answer.success else str(answer.message)
-
-
-def answer_of(client: Any, message: Any, attempts: int, wait: Callable[[Any], object]) -> Any:
-    """The answer of a service, None where there is none.
-
-    An answer can be lost while the service still discovers who asks; asking twice does no harm.
-
-    Parameters
-    ----------
-    client : of the service, which is ready.
-    message : the request.
-    attempts : how often it is sent.
-    wait : called with the future of each attempt, spins until it is done or the patience with this attempt is over.
-    """
-    futures: list[Any] = []
-    for _ in range(attempts):
-        futures.append(client.call_async(message))
-        wait(futures[-1])
-        for future in futures:  # an earlier one may be answered meanwhile
-            if future.done():
-                return future.result()
-    return None
 
 
 class RequestQueue:

@@ -17,23 +17,23 @@ from typing import Any, Final
 import yaml
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.serialization import deserialize_message
 
 from wam_bag.bag import Bag, read
 from wam_bag.columns import Columns, columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, POINT, STATUS, TABLE, WRENCH
+from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH
+from wam_description.wiring import Call
 from wam_ros.bring_up import Composition
+from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
 from wam_ros.local_bus import BUSES
-from wam_ros.messages import message_type, read_status
+from wam_ros.messages import message_type
 from wam_ros.network import is_inhabited
-from wam_ros.requests import switch_request
 from wam_ros.run import Connection
-from wam_ros.topics import DEPTH, NAMESPACE, SECOND, qos, topic_name
-from wam_ros.wire import decoder, encoder, stamp_of
+from wam_ros.topics import NAMESPACE, SECOND, listening, topic_name
+from wam_ros.wire import decoder, stamp_of
 
 _EMPTY: Final[Mapping[str, Any]] = {
     JOINT_STATE: State([], [], []),
@@ -175,11 +175,10 @@ class RunningArm:
         self.context = self._composition.context
         driver: Any = self.nodes.get("driver")
         self._driver: Any = driver.driver if driver else None
-        self.node = self.add(Node("test", namespace=NAMESPACE, context=self.context))
-        self._publishers: dict[str, Publisher] = {}
-        self._senders: dict[str, tuple[Publisher, Callable[[int, Any], Any]]] = {}
+        self._client = StackClient(NAMESPACE, "test", self._composition, self.configuration.shared)
+        self._client.follow_statuses()
+        self.node = self._client.node
         self._streams: dict[str, tuple[int, Any]] = {}  # until a stamp, ns: a value
-        self._statuses: dict[str, NodeStatus] = {}
         self._listen()
         return self
 
@@ -193,18 +192,14 @@ class RunningArm:
             if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
                 bus.subscribe(self.node.resolve_topic_name(topic), take)
             else:
-                profile = qos(row)
-                profile.depth = DEPTH
-                self.node.create_subscription(message_type(row), topic_name(self.node, row), take, profile, raw=True)
+                name = topic_name(self.node, row)
+                self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
     def _taking(self, topic: str, keep: Callable[[bytes], None]) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
             keep(data)
             if topic == "joint_states":
                 self._stream(stamp_of(data))
-            elif topic == STATUS:
-                status = read_status(deserialize_message(data, message_type(self.interface.topics[STATUS])))
-                self._statuses[status.node] = status
 
         return take
 
@@ -237,7 +232,7 @@ class RunningArm:
     def status(self, node: str) -> NodeStatus | None:
         """The newest status of a node, None before the first."""
         self._require_start()
-        return self._statuses.get(node)
+        return self._client.statuses.get(node)
 
     # what the test does
 
@@ -301,12 +296,11 @@ class RunningArm:
     def call(self, service: str, switch: bool | None = None) -> Any:
         """The answer of a service of a node, as ``call("driver/enable", True)``; it has `success` and `message`."""
         self._require_start()
-        kind, message = switch_request(switch)
-        client = self.node.create_client(kind, service)
+        node, _, name = service.partition("/")
+        client, message = self._client.service(Call(node, name, switch))
         self.run_until(client.service_is_ready)
         future = client.call_async(message)
         self._spin(future.done, TEST_LIMITS.arm_time, lambda: None)  # a fault that it causes is no failure of the call
-        self.node.destroy_client(client)
         return future.result()
 
     def enable(self) -> None:
@@ -337,8 +331,7 @@ class RunningArm:
             time only; 0 sends it once.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
         """
-        publisher = self.publisher(topic)
-        self._senders[topic] = publisher, encoder(self.interface.topics[topic], self.configuration.shared)
+        self.publisher(topic)
         states = self.recorded.data.get("joint_states") or self.recorded.data["motor_states"]
         stamp = stamp_of(states[-1]) if states else 0
         self._streams[topic] = stamp + round(seconds * SECOND), self.value(topic, **fields) if value is None else value
@@ -351,18 +344,14 @@ class RunningArm:
     def publisher(self, topic: str) -> Publisher:
         """A publisher of the test, which all nodes of the stack that take the topic have found."""
         self._require_start()
-        if topic not in self._publishers:
-            row = self.interface.topics[topic]
-            self._publishers[topic] = self.node.create_publisher(message_type(row), topic, qos(row))
-            takers = len(self.interface.subscribers(topic))
-            self.run_until(lambda: self._publishers[topic].get_subscription_count() >= takers)
-        return self._publishers[topic]
+        publisher, takers = self._client.publisher(topic), len(self.interface.subscribers(topic))
+        self.run_until(lambda: publisher.get_subscription_count() >= takers)
+        return publisher
 
     def _stream(self, stamp: int, only: str = "") -> None:
         for topic, (end, value) in list(self._streams.items()):
             if only in ("", topic):
-                publisher, encode = self._senders[topic]
-                publisher.publish(encode(stamp, value))
+                self._client.send(topic, stamp, value)
             if stamp >= end:
                 self._streams.pop(topic)
 

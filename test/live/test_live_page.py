@@ -2,10 +2,8 @@
 
 import argparse
 import asyncio
-import base64
 import json
 import math
-import os
 import shutil
 import socket
 import subprocess
@@ -14,6 +12,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,10 +26,9 @@ from bag_comparison import compare
 from browser import browser
 from conftest import LONG
 
-from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
-from wam_cli.commands.live import NICENESS, PageProcess, page_next_to
+from wam_cli.commands.live import page_next_to
 from wam_cli.options import take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
@@ -263,20 +261,6 @@ def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
     paused = shown(5.0, driver._replace(facts={PAUSED: "paused"}))
     assert "no state" not in paused
     assert " · paused" in paused
-
-
-def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
-    panel = Controls(server, ARM, {})
-    stop = next(one for one in server.gui._gui_input_handle_from_uuid.values() if one.label == "Emergency stop")
-    assert stop.order < panel._status.order
-    assert stop.order < panel._shown.order
-
-
-def test_a_slider_that_the_page_moves_asks_for_nothing(server: Any) -> None:
-    panel = Controls(server, ARM, {("force_loop", "posture_gain"): 4.0})
-    panel.set_slider("force_loop", "posture_gain", 3.0)
-    time.sleep(0.2)
-    assert panel.requests.empty()
 
 
 def test_a_taken_port_is_refused_by_name() -> None:
@@ -532,7 +516,7 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
 
 def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: Network) -> None:
     node, shared = ros.node("driver"), CONFIGURATION.shared
-    stack = RunningStack(ros.context, "wam", shared)
+    stack = RunningStack(ros.context, "wam", shared, {})
     rows = {name: BY_NAME[name] for name in ("sim/contact/wrench", "sim/contact/point", "sim/joint_states")}
     publishers = {name: node.create_publisher(message_type(row), name, qos(row)) for name, row in rows.items()}
     values = (
@@ -605,24 +589,6 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
         shown.wait(lambda: panel.snapshot.true.cover == "outer_link", spin)  # topics come one after the other
 
 
-def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
-    from wam_description.wiring import Call
-
-    with ready(domain_id) as (composition, shown, panel, spin):
-        node = composition.nodes["driver"]
-        press = Press("outer_link", (0.0, -2.0, 0.0))
-        panel.requests.put(press)
-        shown.wait(lambda: "enable the arm first" in panel._shown.content, spin)
-        panel.requests.put(Call("driver", "enable", True))
-        shown.wait(lambda: mode_of(shown) == "enabled", spin)
-        panel.requests.put(press)
-        shown.wait(lambda: panel.snapshot.commanded == pytest.approx(2.0), spin)
-        panel.requests.put(NO_PRESS)
-        shown.wait(lambda: node.count_publishers("force_command") == 0, spin)
-        shown.wait(lambda: math.isnan(panel.snapshot.commanded), spin)
-        assert mode_of(shown) == "enabled"
-
-
 # beside a stack
 
 
@@ -670,14 +636,6 @@ def test_nobody_waits_for_a_page_that_is_stopped(domain_id: int) -> None:
         assert port_is_free(port)
 
 
-def test_the_page_of_a_stack_lets_its_nodes_go_first(domain_id: int) -> None:
-    page = PageProcess(free_port(), "wam")
-    try:
-        until(lambda: os.getpriority(os.PRIO_PROCESS, page._process.pid) >= NICENESS)
-    finally:
-        page.close()
-
-
 # a real browser
 
 FLAGS = (
@@ -686,7 +644,6 @@ FLAGS = (
     "--disable-sync", "--disable-dev-shm-usage", "--remote-allow-origins=*", "--window-size=1280,800",
 )  # fmt: skip
 
-SLOWEST = 2.5  # frames a second, with which a drag by the mouse still works
 PATIENCE = 100.0  # s
 ANSWERED = 40.0  # s, within which the browser answers on any machine that can draw
 
@@ -714,17 +671,6 @@ class Tab:
         found = self.ask("Runtime.evaluate", expression="document.body.innerText", returnByValue=True)
         return str(found["result"].get("value", ""))
 
-    def title(self) -> str:
-        """Title of the window."""
-        found = self.ask("Runtime.evaluate", expression="document.title", returnByValue=True)
-        return str(found["result"].get("value", ""))
-
-    def height(self, label: str) -> float:
-        """Distance of a button from the top of the window, px."""
-        find = f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {label!r})"
-        top = self.ask("Runtime.evaluate", expression=f"{find}.getBoundingClientRect().top", returnByValue=True)
-        return float(top["result"]["value"])
-
     def mouse(self, kind: str, x: float, y: float, pressed: bool) -> None:
         """Move, press or release the left button."""
         button = {"button": "left" if pressed or kind == "mouseReleased" else "none", "buttons": int(pressed)}
@@ -734,32 +680,6 @@ class Tab:
         """Press a button by its label."""
         find = f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {label!r}).click()"
         self.ask("Runtime.evaluate", expression=find)
-
-    def frames_per_second(self) -> float:
-        """How often the page is drawn."""
-        count = (
-            "new Promise(done => { let n = 0; const begin = performance.now(); const draw = () => { n++;"
-            " const t = performance.now() - begin; t < 2000 ? requestAnimationFrame(draw) : done(1000 * n / t); };"
-            " requestAnimationFrame(draw); })"
-        )
-        found = self.ask("Runtime.evaluate", expression=count, awaitPromise=True, returnByValue=True)
-        return float(found["result"]["value"])
-
-    def drawn(self, colour: str) -> list[int]:
-        """How many pixels of each plot have a colour."""
-        near = " && ".join(f"Math.abs(d[i + {i}] - {part}) < 25" for i, part in enumerate(channels(colour)))
-        count = (
-            "[...document.querySelectorAll('.uplot canvas')].map(c => {"
-            " if (!c.width) return 0;"
-            " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
-            f" for (let i = 0; i < d.length; i += 4) if ({near}) n++; return n; }})"
-        )
-        found = self.ask("Runtime.evaluate", expression=count, returnByValue=True)
-        return list(found["result"].get("value", ()))
-
-    def picture(self) -> bytes:
-        """PNG of the window."""
-        return base64.b64decode(self.ask("Page.captureScreenshot")["data"])
 
 
 @contextmanager
@@ -809,16 +729,10 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
         def drive() -> None:
             with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
                 until(lambda: "Emergency stop" in tab.text() and server.get_clients())
-                until(lambda: tab.title().startswith(f"/wam, domain {domain_id}, {ARM.name}, since "))
                 tab.click("Enable")
                 until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())
                 clients = list(server.get_clients().values())
                 until(lambda: clients[0].camera.image_width > 0)
-                if (rate := tab.frames_per_second()) < SLOWEST:
-                    pytest.skip(
-                        f"the browser draws {rate:.1f} frames a second beside all that runs here, too few to drag"
-                    )
-                height = tab.height("Emergency stop")  # the panel has unfolded
                 camera = clients[0].camera
                 window = (camera.image_width, camera.image_height)
                 start = panel.snapshot.q
@@ -831,31 +745,16 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                 until(lambda: panel.snapshot.true.cover == "outer_link")
                 until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
                 until(lambda: "you push with" in tab.text())
-                until(lambda: panel._force_plot.scales["y"]["range"][1] > LIVE.ranges[0])
-                until(lambda: all(count > 20 for count in tab.drawn(TRUE)))  # also the plot whose range has changed
                 tab.mouse("mouseReleased", x + 144.0, y, False)
                 until(lambda: panel.snapshot.true.cover == "")
-                before = panel.snapshot.stamp
-                until(lambda: panel._force_plot.data[0][-1] > before / 1e9)
                 tab.click("Brake")
                 until(lambda: mode_of(shown) == "braked")
-                assert tab.height("Emergency stop") == height
-                assert len(tab.picture()) > 10_000
 
-        failed: list[BaseException] = []
-
-        def guarded() -> None:
-            try:
-                drive()
-            except BaseException as error:
-                failed.append(error)
-
-        user = threading.Thread(target=guarded, daemon=True)
-        user.start()
-        while user.is_alive():
-            spin()
-        if failed:
-            raise failed[0]
+        with ThreadPoolExecutor() as threads:
+            user = threads.submit(drive)
+            while not user.done():
+                spin()
+        user.result()
 
 
 def until(holds: Callable[[], Any]) -> None:

@@ -18,7 +18,7 @@ from wam_cli.commands.call import _wrench, arguments
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.wiring import Call
-from wam_ros.call import CalledStack
+from wam_ros.client import StackClient
 from wam_ros.limits import CALL_LIMITS
 
 WAM = [sys.executable, "-P", "-m", "wam_cli.program"]
@@ -102,7 +102,7 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
         there = set(err.partition("; there are ")[2].strip().split(", "))
         assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
         assert "wam_call" not in there
-    with CalledStack("wam") as here:
+    with StackClient("wam") as here:
         refused = here.request(Call("nosuch", "tare")).message
     assert refused.startswith("no service /wam/nosuch/tare within ")
     assert {"driver", "force_loop"} <= set(refused.partition("; there are ")[2].split(", "))
@@ -112,14 +112,14 @@ def test_next_to_a_driver_of_ones_own_the_shared_parameters_are_those_of_another
     ros: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`wam bag record` needs them, and a real driver need not have them."""
-    monkeypatch.setattr("wam_ros.call.CALL_LIMITS", replace(CALL_LIMITS, answer=LONG))
+    monkeypatch.setattr("wam_ros.client.CALL_LIMITS", replace(CALL_LIMITS, answer=LONG))
     driver = ros.node("driver")
     driver.declare_parameter("serial", "WAM7")
     node = subprocess.Popen([*WAM, "node", "gravity", "-r", "__ns:=/wam", "-p", "timing.mode:=realtime"])
 
     def shared() -> Shared:
-        with CalledStack("wam") as stack:
-            return stack.shared()
+        with StackClient("wam") as stack:
+            return stack.read_shared()
 
     try:
         with ThreadPoolExecutor() as threads:

@@ -15,9 +15,7 @@ from typing import Any
 import pytest
 from conftest import LONG, soon
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.context import Context
-from sensor_msgs.msg import JointState
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 from wam_bag.bag import read
 from wam_cli.main import main
@@ -28,8 +26,7 @@ from wam_description.topics import BY_NAME
 from wam_ros import bring_up
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.limits import CALL_LIMITS, PROCESS_LIMITS
-from wam_ros.process_signals import HELD_UP as HELD_UP_BY
-from wam_ros.process_signals import LISTENER_GONE, bound_leaving, leaving
+from wam_ros.process_signals import LISTENER_GONE
 from wam_ros.topics import qos
 
 ROOT = Path(__file__).parents[2]
@@ -209,7 +206,7 @@ def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
     pid = pid_of(recording, "recorder")
     os.kill(pid, signal.SIGSTOP)
     threading.Timer(1.5, os.kill, (pid, signal.SIGCONT)).start()  # much later than the patience with other nodes
-    recording.stop()
+    recording.close()
     assert recording.killed == []
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
     assert "waiting for the recorder to write the bag, " in capfd.readouterr().err
@@ -231,7 +228,7 @@ def test_a_recorder_that_is_told_to_end_before_it_has_a_bag_lacks_no_messages(
         pid = pid_of(processes, "recorder")
         os.kill(pid, signal.SIGSTOP)  # so that it has no bag yet however busy the machine is
         threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
-    processes.stop()
+    processes.close()
     assert (processes.bag_failure, processes.killed) == ("", [])
     assert not list(tmp_path.glob("bags/*"))
 
@@ -252,7 +249,7 @@ def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
 ) -> None:
     monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, recorder_end=0.5))
     os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
-    recording.stop()
+    recording.close()
     assert recording.killed == ["recorder"]
     assert "node recorder is killed: it has done nothing for" in capfd.readouterr().err
     (bag,) = tmp_path.glob("bags/*")
@@ -280,7 +277,7 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     monkeypatch.chdir(tmp_path)
     processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
     wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
-    processes.stop()
+    processes.close()
     assert processes.killed == []
     assert processes.bag_failure == ""
     assert processes._processes["recorder"].returncode == -signal.SIGVTALRM
@@ -290,48 +287,10 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     assert not [line for line in printed if "WARN" in line and "waiting for the recorder" not in line]  # a busy machine
 
 
-def test_a_process_with_a_failure_ends_by_itself_so_that_its_code_reports_it() -> None:
-    context, before = Context(), signal.getsignal(HELD_UP_BY)
-    try:
-        for failure, is_bounded in (("nothing was touched", False), ("", True)):
-            bound_leaving(context, lambda failure=failure: failure)
-            with leaving(context):
-                assert (signal.getitimer(signal.ITIMER_VIRTUAL)[0] > 0.0) is is_bounded
-            assert signal.getitimer(signal.ITIMER_VIRTUAL)[0] == 0.0
-    finally:
-        signal.signal(HELD_UP_BY, before)
-
-
 def main_without_exit(*words: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 0
-
-
-def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> None:
-    def call(request: str) -> tuple[int, str]:
-        done = subprocess.run(
-            [sys.executable, "-m", "wam_cli.main", "call", request],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=LONG,
-        )
-        return done.returncode, done.stdout + done.stderr
-
-    code, said = call("enable")
-    assert code == 1
-    assert "no service /wam/driver/enable" in said
-    assert "wam up" in said
-    up(started)
-    assert call("enable") == (0, "enabled: brakes released\n")
-    assert call("tare")[0] == 0
-    assert call("estop")[0] == 0
-    code, said = call("enable")
-    assert code == 1
-    assert "call reset_fault first" in said
-    assert call("reset_fault")[0] == 0
-    assert call("disable")[0] == 0
 
 
 def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
@@ -402,20 +361,6 @@ def test_a_signal_during_start_up_ends_all_silently(
     assert "Traceback" not in stack.said()
 
 
-def test_the_command_ends_silently_from_its_first_import_on() -> None:
-    interrupted = (
-        "import os, signal, sys\n"
-        "class Interrupt:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'argparse': os.kill(os.getpid(), signal.SIGINT)\n"
-        "sys.meta_path.insert(0, Interrupt())\n"
-        "from wam_cli.program import main\n"
-        "main()"
-    )
-    done = subprocess.run([sys.executable, "-P", "-c", interrupted], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.SIGINT, "", "")
-
-
 def has_loaded(stack: Stack, library: str) -> bool:
     """Whether a program has begun to load a library, by the files that it has mapped."""
     with contextlib.suppress(OSError):
@@ -438,32 +383,6 @@ def test_signals_while_a_program_ends_do_not_change_how_it_ends(program: str, ro
     wait(interrupt, f"the end; {stack.said()}")
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
-
-
-@pytest.mark.parametrize("name", ["driver", "velocity_loop"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: Any, started: Any) -> None:
-    listener = ros.node("listener")
-    stack = started("-m", "wam_cli.main", "node", name)
-    ros.wait(lambda: name in listener.get_node_names() or stack.process.poll() is not None)
-    stack.process.send_signal(number)
-    wait(lambda: stack.process.poll() is not None, f"the end of {name}; {stack.said()}", soon())
-    assert stack.process.returncode == 0
-    assert "Traceback" not in stack.said()
-
-
-def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any) -> None:
-    said: list[str] = []
-    states: list[Any] = []
-    listener = ros.node("listener")
-    listener.create_subscription(DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"]))
-    listener.create_subscription(JointState, "motor_states", states.append, qos(BY_NAME["motor_states"]))
-    stack = started("-m", "wam_cli.main", "node", "driver", "-p", "timing.mode:=realtime")
-    ros.wait(lambda: said and len(states) > 100, what="states of a driver that is alone")
-    assert set(said) == {"braked"}
-    assert "[wam.driver]: priority: " in stack.said()
-    stack.process.terminate()
-    wait(lambda: stack.process.poll() is not None, "the end", soon())
 
 
 @pytest.mark.parametrize("environment", ["unset", "not a directory", "read-only"])
@@ -585,35 +504,10 @@ def test_record_takes_mode_and_nodes_from_the_running_stack(
 def test_record_without_a_stack_ends_with_the_reason_and_no_bag(
     tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
-    monkeypatch.setattr("wam_ros.call.CALL_LIMITS", replace(CALL_LIMITS, answer=0.2))
+    monkeypatch.setattr("wam_ros.client.CALL_LIMITS", replace(CALL_LIMITS, answer=0.2))
     code, _, err = command(capfd, "bag", "record", "--directory", str(tmp_path / "bags"))
     assert (code, list(tmp_path.glob("bags/*"))) == (1, [])
     assert err == "wam bag: no node of a stack in /wam answers within 0.2 s; start the stack with 'wam up'\n"
-
-
-def test_record_refuses_a_value_that_the_running_stack_has_already(capsys: Any) -> None:
-    code, _, err = command(capsys, "bag", "record", "--set", "timing.mode=realtime")
-    assert code == 1
-    assert "--set timing.mode has no effect here: the running stack has its own" in err
-
-
-def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
-    script = tmp_path / "script.yaml"
-    script.write_text("steps: [{name: wait, seconds: 0.05}, {name: release, seconds: 100.0, request: enable}]")
-    configured = Configuration.load(packaged("wam")).with_values(
-        {
-            "nodes": ["driver", "transform", "scenario"],
-            "timing.mode": "realtime",
-            "driver:late_periods": 1.0,
-            "scenario:script": str(script),
-        }
-    )
-    with Composition(configured, domain_id=domain_id) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        begin = time.monotonic()
-        composition.spin(lambda: scenario.done or time.monotonic() - begin > LONG)
-        assert scenario.done
-        assert "refused: no motor_current_command comes in; start velocity_loop" in scenario.failure
 
 
 def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, domain_id: int) -> None:
@@ -675,7 +569,7 @@ def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
     monkeypatch.setattr(subprocess.Popen, "send_signal", lambda process, number: sent.append(number))
     os.kill(pid_of(recording, "recorder"), number)
     recording.wait(bool)
-    recording.stop()
+    recording.close()
     assert (LISTENER_GONE in sent) is is_announced
 
 
@@ -726,20 +620,6 @@ def test_the_driver_does_not_repeat_its_status_over_one_that_is_on_its_way(
         after = published["status"] - before - while_frozen
     assert 1 <= while_frozen <= frozen / 0.2 + 2
     assert after > 10
-
-
-def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
-    script = tmp_path / "script.yaml"
-    script.write_text("steps: [{name: wait, seconds: 100.0}]")
-    stack = started("-m", "wam_cli.main", "up", "--realtime", "--scenario", str(script), *BOLD)
-    client = ros.node("asker").create_client(Trigger, "driver/estop")
-    ros.wait(client.service_is_ready)
-    wait(lambda: "wait" in stack.said(), f"the first step; {stack.said()}")
-    future = client.call_async(Trigger.Request())
-    ros.wait(future.done)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
-    assert stack.process.returncode == 1
-    assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()
 
 
 def test_a_node_without_a_package_that_it_needs_ends_with_one_line(tmp_path: Path, domain_id: int) -> None:

@@ -60,12 +60,12 @@ def _record(given: argparse.Namespace) -> None:
     configuration = configuration_of(given).with_values(own)
     recording_folder(configuration, given.name)
     from wam_ros.bring_up import parameter_file  # the other requests need no ROS
-    from wam_ros.call import CalledStack
+    from wam_ros.client import StackClient
     from wam_ros.node import node_makers
     from wam_ros.run import run as run_node
 
-    with CalledStack(given.namespace) as stack:
-        shared = stack.shared()
+    with StackClient(given.namespace) as stack:
+        shared = stack.read_shared()
     nodes = [name for name in Interface(shared).names if name != RECORDER]
     print(f"the stack in /{given.namespace} runs in {shared.timing.mode}: {', '.join(nodes)}", flush=True)
     with parameter_file(_of_stack(configuration, shared)) as file:

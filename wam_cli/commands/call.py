@@ -23,7 +23,7 @@ from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
-from wam_ros.call import START, CalledStack, Reply
+from wam_ros.client import START, Reply, StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
 
@@ -87,7 +87,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Make the request and print its answer."""
     others = {"get": _get, "set": _set, "echo": _echo, "push": _push}
-    with CalledStack(given.namespace) as stack:
+    with StackClient(given.namespace) as stack:
         if given.request in others:
             return others[given.request](given, stack)
         return _stated(list(map(stack.request, SERVICES[given.request][1])))
@@ -100,7 +100,7 @@ def _stated(replies: Sequence[Reply]) -> int:
     return 0 if reply.success else 1
 
 
-def _get(given: argparse.Namespace, stack: CalledStack) -> int:
+def _get(given: argparse.Namespace, stack: StackClient) -> int:
     node, _, name = given.name.partition(":")
     values = stack.parameters(node)
     wanted = {key: value for key, value in values.items() if not name or key == name or key.startswith(f"{name}.")}
@@ -126,7 +126,7 @@ def _get(given: argparse.Namespace, stack: CalledStack) -> int:
     return 0
 
 
-def _set(given: argparse.Namespace, stack: CalledStack) -> int:
+def _set(given: argparse.Namespace, stack: StackClient) -> int:
     if ":" not in given.value.partition("=")[0]:
         raise ValueError(f"'{given.value}' has no node; write NODE:PARAMETER=VALUE, for example {EXAMPLE}")
     ((key, value),) = option_values([given.value], "wam call set").items()
@@ -163,10 +163,11 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
     )
 
 
-def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
+def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     silence = math.inf if given.timeout is None else given.timeout
+    stack.follow_statuses()
     is_published = partial(stack.is_published, given.topic)
-    waiting = Waiting(given.topic, given.count, silence, stack.heard_statuses(), is_published)
+    waiting = Waiting(given.topic, given.count, silence, stack.statuses, is_published)
     try:
         for message in islice(stack.messages(given.topic, check=waiting.check), given.count):
             waiting.take()
@@ -244,7 +245,7 @@ class Waiting:
         return "" if self._is_published() else "; no node publishes it now"
 
 
-def _push(given: argparse.Namespace, stack: CalledStack) -> int:
+def _push(given: argparse.Namespace, stack: StackClient) -> int:
     wrench, at, shared = _wrench(given, stack.parameters("driver"))
     seconds = push(stack, shared, wrench, given.seconds)
     print(f"pushed {given.cover} with {math.hypot(*wrench.force):g} N at {at:.2f} m for {seconds:.2f} s")

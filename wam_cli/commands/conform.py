@@ -19,7 +19,6 @@ from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_bench import DriverBench
 from wam_ros.network import require_places
-from wam_ros.run import Connection
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,7 +86,7 @@ def run(given: argparse.Namespace) -> int:
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
     with (
-        connected(given.namespace, configuration, given.share, given.current) as bench,
+        DriverBench(configuration.shared, given.share, given.current, given.namespace) as bench,
         served(configuration, given.arm),
     ):
         driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
@@ -159,22 +158,3 @@ def on_bus(configuration: Configuration, bus: str) -> Configuration:
         return configuration
     interface, _, channel = bus.rpartition(":")
     return configuration.with_values({"driver:interface": interface or "socketcan", "driver:channel": channel})
-
-
-@contextmanager
-def connected(where: str, configuration: Configuration, share: float, current: float) -> Iterator[DriverBench]:
-    """A bench on the network of the driver."""
-    connection = Connection()
-    try:
-        bench = DriverBench(
-            configuration.shared,
-            share,
-            current,
-            lambda seconds: connection.executor.spin_once(timeout_sec=seconds),
-            context=connection.context,
-            namespace=where,
-        )
-        connection.add(bench)
-        yield bench
-    finally:
-        connection.close()

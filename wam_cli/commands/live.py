@@ -78,7 +78,7 @@ def _page(given: argparse.Namespace) -> None:
 def _frames(given: argparse.Namespace) -> None:
     with of_installation("tf2_msgs"):
         from wam_live.frame_publisher import FramesNode
-    from wam_live.stack_client import run_next_to
+    from wam_ros.client import run_next_to
 
     stop, prefix = Stop(), given.frame_prefix or ""
     run_next_to(

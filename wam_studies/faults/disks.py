@@ -7,15 +7,13 @@ from contextlib import suppress
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import Final
 
 from wam_bag.bag import BagError, read
-from wam_description.event import CAUSE
+from wam_description.event import CAUSE, Level
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
-from wam_studies.faults.watched_stack import NodeEndedError, WatchedStack, recorded_into
+from wam_studies.faults.watched_stack import WatchedStack, recorded_into, watched_trial
 
 Work = Callable[[WatchedStack, Path, Random], None]
-ERROR: Final = b"\x02"
 
 
 def play(case: FaultCase) -> FaultTrial:
@@ -29,25 +27,23 @@ def play(case: FaultCase) -> FaultTrial:
     chance = Random(f"disks {case.seed} {case.number}")
     KEPT.discard()
     with TemporaryDirectory(prefix="wam_faults_") as folder:
+
+        def work(stack: WatchedStack) -> int:
+            stack.run(chance.uniform(0.05, 0.3))
+            ways[name](stack, Path(folder, "bag"), chance)
+            return 1
+
         own = {
             **recorded_into(case.configuration, folder),
             "driver:post_mortem_directory": "/proc/none" if ways[name] is _fault else "",
         }
-        stack = WatchedStack(case.configuration.with_values(own))
-        reason = stack.begin()
+        trial = watched_trial(case._replace(configuration=case.configuration.with_values(own)), name, work)
         try:
-            if not reason:
-                stack.run(chance.uniform(0.05, 0.3))
-                ways[name](stack, Path(folder, "bag"), chance)
-                reason = stack.recover()
-        except NodeEndedError as error:
-            reason = str(error)
-        try:
-            stack.close()
+            KEPT.discard()
         except Exception as error:
-            stack.escapes.append(f"the end of a node: {type(error).__name__}: {error}")
-    escapes = (*stack.escapes, *filter(None, [reason]))
-    return FaultTrial(case.kind, name, escapes=escapes, motion=stack.motion, force=stack.force)
+            ended = f"the end of a node: {type(error).__name__}: {error}"
+            trial = trial._replace(escapes=(*trial.escapes, ended))
+    return trial
 
 
 def _fill(stack: WatchedStack, bag: Path, chance: Random) -> None:
@@ -71,7 +67,7 @@ def _remove(stack: WatchedStack, bag: Path, chance: Random) -> None:
 def _is_reported(stack: WatchedStack) -> None:
     def reported() -> bool:
         stack.run(0.01)
-        return "recorder" in stack.statuses and stack.statuses["recorder"].level == ERROR
+        return "recorder" in stack.statuses and stack.statuses["recorder"].level is Level.ERROR
 
     if not stack.wait(reported, FAULTS.reported):
         stack.escapes.append(f"the recorder reported nothing within {FAULTS.reported:g} s")

@@ -17,8 +17,9 @@ def play(case: FaultCase) -> FaultTrial:
     """A trial of one loss."""
     chance = Random(f"losses {case.seed} {case.number}")
     chain: NodeProcesses = KEPT.ready(NodeProcesses, case.configuration)
-    name = chain.names[case.number % len(chain.names)]
-    trial = _lost(case, chain, name, WAYS[case.number // len(chain.names) % len(WAYS)], chance)
+    names = list(chain.processes)
+    name = names[case.number % len(names)]
+    trial = _lost(case, chain, name, WAYS[case.number // len(names) % len(WAYS)], chance)
     if trial.escapes:
         KEPT.discard()
     return trial
@@ -26,28 +27,29 @@ def play(case: FaultCase) -> FaultTrial:
 
 def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals, chance: Random) -> FaultTrial:
     what = f"{name} {way.name}"
-    if reason := chain.enabled(FAULTS.recovered):
+    if reason := chain.enabled():
         return FaultTrial(case.kind, what, 1, (f"before: {reason}",))
-    chain.wait(lambda: False, chance.uniform(0.0, 0.1))
+    chain.watch(chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
     chain.reports.clear()
-    chain.send(name, way)
+    process = chain.processes[name]
+    process.send(way)
     delay, escapes = math.nan, list[str]()
     if name == "driver":
-        chain.wait(lambda: False, chance.uniform(*FAULTS.frozen) if way == signal.SIGSTOP else 0.2)
+        chain.watch(chance.uniform(*FAULTS.frozen) if way == signal.SIGSTOP else 0.2)
     else:
         delay = _noticed(chain, name, escapes)
     if way == signal.SIGSTOP:
-        chain.send(name, signal.SIGCONT)
+        process.send(signal.SIGCONT)
     else:
-        chain.wait(lambda: name in chain.ended(), FAULTS.noticed)
-        chain.send(name, signal.SIGKILL)
-        chain.wait(lambda: name in chain.ended(), FAULTS.noticed)
-    if others := [one for one in chain.ended() if one != name]:
+        chain.wait(lambda: name in chain.ended, FAULTS.noticed)
+        process.send(signal.SIGKILL)
+        chain.wait(lambda: name in chain.ended, FAULTS.noticed)
+    if others := [one for one in chain.ended if one != name]:
         escapes.append(f"{', '.join(others)} ended, too")
     if way != signal.SIGSTOP:
-        chain.start(name)
-    if reason := chain.enabled(FAULTS.recovered):
+        process.start()
+    if reason := chain.enabled():
         escapes.append(reason)
     is_new_arm = name == "driver" and way != signal.SIGSTOP
     motion = 0.0 if is_new_arm else max(abs(a - b) for a, b in zip(q, chain.q, strict=True))
@@ -62,7 +64,7 @@ def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:
     """Wait for the fault that names a lost node; returns the time to zero current, s of the arm's time."""
     if not chain.wait(lambda: chain.mode == "fault", FAULTS.noticed):
         escapes.append(f"not noticed within {FAULTS.noticed:g} s")
-    chain.wait(lambda: False, 0.05)
+    chain.watch(0.05)
     delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
     if delay > FAULTS.zero_current:
         escapes.append(f"current {delay * 1e3:.0f} ms after the loss")

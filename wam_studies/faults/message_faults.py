@@ -26,10 +26,6 @@ class BrokenValues:
 
 BROKEN: Final = BrokenValues()
 TEXTS: Final = ("", "x" * 10_000, "\x1b[2J\x1b[31m", "joint1", "base", "driver", "\U0001f9be", "../../etc", "[" * 500)
-SIZES: Final = {
-    "boolean": "?", "octet": "B", "byte": "B", "uint8": "B", "int8": "b", "uint16": "H", "int16": "h",
-    "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d",
-}  # fmt: skip
 
 Message = Any
 Stamps = Callable[[Random, int], int]
@@ -215,43 +211,6 @@ def garbage(data: bytes, chance: Random) -> bytes:
     return data[:4] + struct.pack("<I", 2**32 - 1) * chance.randrange(1, 60)
 
 
-def big_endian(message: Message) -> bytes:
-    """The message in the other byte order, which is a valid message."""
-    out = bytearray(b"\0\0\0\0")
-    _write(message, out)
-    return bytes(out)
-
-
-def _write(message: Message, out: bytearray) -> None:
-    for name, kind in message.get_fields_and_field_types().items():
-        value = getattr(message, name)
-        if kind.startswith("sequence<"):
-            _put(out, "I", len(value))
-            for member in value:
-                _write_one(member, kind[9:-1], out)
-        elif kind.endswith("]"):
-            for member in value:
-                _write_one(member, kind.partition("[")[0], out)
-        else:
-            _write_one(value, kind, out)
-
-
-def _write_one(value: Any, kind: str, out: bytearray) -> None:
-    if hasattr(value, "get_fields_and_field_types"):
-        _write(value, out)
-    elif kind.startswith("string"):
-        text = value.encode() + b"\0"
-        _put(out, "I", len(text))
-        out += text
-    else:
-        _put(out, SIZES[kind], value[0] if isinstance(value, bytes) else value)
-
-
-def _put(out: bytearray, code: str, value: Any) -> None:
-    size = struct.calcsize(code)
-    out += bytes(-(len(out) - 4) % size) + struct.pack(f">{code}", value)
-
-
 # the faults
 
 
@@ -273,7 +232,7 @@ class MessageFault(NamedTuple):
     change: Change
 
 
-GARBAGE, BIG_ENDIAN = "bytes that are no message", "the other byte order"
+GARBAGE: Final = "bytes that are no message"
 MESSAGE_FAULTS: Final = (
     MessageFault("a number not finite", True, partial(with_numbers, values=NOT_FINITE)),
     MessageFault("a huge number", True, partial(with_numbers, values=BROKEN.huge)),
@@ -286,7 +245,6 @@ MESSAGE_FAULTS: Final = (
     MessageFault("a stamp of too many nanoseconds", True, with_excess_nanoseconds),
     MessageFault("the same message again", False, unchanged),
     MessageFault(GARBAGE, True, unchanged),
-    MessageFault(BIG_ENDIAN, False, unchanged),
 )
 
 
@@ -296,8 +254,6 @@ def broken(
     """The bytes of a message after it has been broken, None where it cannot be broken in this way."""
     if not fault.change(message, chance, now):
         return None
-    if fault.name == BIG_ENDIAN:
-        return big_endian(message)
     data = serialize(message)
     return garbage(data, chance) if fault.name == GARBAGE else data
 

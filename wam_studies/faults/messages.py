@@ -4,6 +4,8 @@ from functools import partial
 from random import Random
 from typing import Final, NamedTuple
 
+from rclpy.serialization import serialize_message
+
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
@@ -49,17 +51,17 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     if publisher is None:
         return 1
     if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
-        stack.allowed_force = stack.configuration.shared.disturbance_force_limit
+        stack.allowed_force = stack.shared.disturbance_force_limit
     for _ in range(FAULTS.messages):
         message = stack.newest(todo.topic)
         if todo.fault.moves:
             made_effective(todo.topic, message, stack.cover)
-        data = broken(message, todo.fault, chance, stack.stamp(), stack.serialize)
+        data = broken(message, todo.fault, chance, stack.stamp(), serialize_message)
         if data is not None:
             stack.inject(publisher, data)
             sent += 1
         stack.run(FAULTS.between)
     if todo.is_foreign:
-        stack.remove(publisher)
+        stack.node.destroy_publisher(publisher)
     stack.run(FAULTS.after)
     return max(sent, 1)

@@ -70,31 +70,28 @@ def _present(stack: WatchedStack, name: str) -> dict[str, Any]:
 def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
     """Send the set; what is wrong goes to the escapes of the stack."""
     before = _present(stack, name)
-    client = stack.node.create_client(SetParametersAtomically, f"{name}/set_parameters_atomically")
-    try:
-        stack.wait(client.service_is_ready, 2.0)
-        answer = _answer(stack, client, [message(one) for one in todo.assignments])
-        if answer is None:
-            stack.escapes.append("no answer to the set")
-            return 1
-        after = _present(stack, name)
-        changed = [key for key in before if not _same(before[key], after[key])]
-        if not answer.successful and changed:
-            stack.escapes.append(f"refused, but {changed[0]} has changed")
-        if answer.successful and todo.is_wrong:
-            stack.escapes.append(f"accepted: {str(todo.assignments)[-200:]}")
-        if not answer.successful and not answer.reason:
-            stack.escapes.append("refused without a reason")
-        if answer.successful and changed:
-            _push(stack)
-            kinds = {one.name: one for one in todo.assignments}
-            back = [message(kinds[key]._replace(value=before[key])) for key in changed if key in kinds]
-            undone = _answer(stack, client, back)
-            if undone is None or not undone.successful:
-                stack.escapes.append("the values before are refused")
-        stack.run(0.005)
-    finally:
-        stack.node.destroy_client(client)
+    client = stack.client(SetParametersAtomically, f"{name}/set_parameters_atomically")
+    stack.wait(client.service_is_ready, 2.0)
+    answer = _answer(stack, client, [message(one) for one in todo.assignments])
+    if answer is None:
+        stack.escapes.append("no answer to the set")
+        return 1
+    after = _present(stack, name)
+    changed = [key for key in before if not _same(before[key], after[key])]
+    if not answer.successful and changed:
+        stack.escapes.append(f"refused, but {changed[0]} has changed")
+    if answer.successful and todo.is_wrong:
+        stack.escapes.append(f"accepted: {str(todo.assignments)[-200:]}")
+    if not answer.successful and not answer.reason:
+        stack.escapes.append("refused without a reason")
+    if answer.successful and changed:
+        _push(stack)
+        kinds = {one.name: one for one in todo.assignments}
+        back = [message(kinds[key]._replace(value=before[key])) for key in changed if key in kinds]
+        undone = _answer(stack, client, back)
+        if undone is None or not undone.successful:
+            stack.escapes.append("the values before are refused")
+    stack.run(0.005)
     return 1
 
 
@@ -106,7 +103,7 @@ def _answer(stack: WatchedStack, client: Any, parameters: list[Parameter]) -> An
 def _push(stack: WatchedStack) -> None:
     """A small push: with parameters that are accepted the arm stays slow and enabled."""
     plant = stack.driver.plant
-    plant.push(stack.configuration.shared.arm.covers.names[-1], np.array([0.0, FAULTS.push, 0.0]), np.zeros(3))
+    plant.push(stack.cover, np.array([0.0, FAULTS.push, 0.0]), np.zeros(3))
     stack.run(FAULTS.pushed)
     plant.release()
     stack.run(FAULTS.settling)

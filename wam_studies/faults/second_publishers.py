@@ -8,11 +8,12 @@ from typing import Final
 
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
 from wam_bag.cdr import LITTLE_ENDIAN
-from wam_ros.topics import NAMESPACE
+from wam_ros.topics import NAMESPACE, qos
 from wam_ros.wire import stamp_of
 from wam_studies.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
@@ -56,13 +57,13 @@ def _stream(topic: str, stack: WatchedStack) -> int:
             message = stack.newest(topic)
             made_effective(topic, message, stack.cover)
             set_stamp(message, stack.stamp())
-            stack.inject(publisher, stack.serialize(message))
+            stack.inject(publisher, serialize_message(message))
             stack.run(0.001)
         stack.run(FAULTS.after_publishers)
         if topic in GUARDED and not any(event.values.get("topic") == topic for event in stack.driver.safety.events):
             stack.escapes.append(f"no fault names {topic}: '{stack.driver.safety.fault}'")
     finally:
-        stack.remove(publisher)
+        stack.node.destroy_publisher(publisher)
     return 1
 
 
@@ -70,13 +71,13 @@ def _other_type(topic: str, stack: WatchedStack) -> int:
     """Publish messages of another type under the topic's name."""
     kind = Int64 if stack.type_of(topic) is String else String
     try:
-        publisher = stack.node.create_publisher(kind, topic, stack.qos_of(topic))
+        publisher = stack.node.create_publisher(kind, topic, qos(stack.topics[topic]))
     except RCLError:  # the middleware allows one type for each name among the nodes of one process
         return 1
     for _ in range(20):
         publisher.publish(kind())
         stack.run(0.002)
-    stack.remove(publisher)
+    stack.node.destroy_publisher(publisher)
     return 1
 
 
@@ -90,7 +91,7 @@ def _replay(messages: dict[str, list[bytes]], stamps: str, stack: WatchedStack) 
                 stack.inject(publishers[topic], _stamped(data[i], stamps, begin - first))
         stack.run(0.001)
     for publisher in publishers.values():
-        stack.remove(publisher)
+        stack.node.destroy_publisher(publisher)
     stack.run(FAULTS.after_publishers)
     return 1
 

@@ -22,9 +22,7 @@ class FaultLimits:
 
     longest_start: float = 120.0  # s of a stack
     patience: float = 15.0  # s of work without progress and without a fault that is a hang
-    answered: float = 0.5  # s, for each attempt to ask a service
-    attempts: int = 20  # to ask a service of a stack in this process
-    attempts_of_processes: int = 6  # to ask a service of nodes in processes of their own
+    answered: float = 5.0  # s, for the answer of a service
     idle: float = 0.25  # s of work that a second of waiting counts as
     rest: float = 0.2  # s of work after which the time of an arm in fault is known to be at rest
 
@@ -118,9 +116,9 @@ class NodeKeeper:
 
     def discard(self) -> None:
         """End the nodes: one has ended, their parameters have changed, or they cannot be enabled."""
-        if self._kept is not None:
-            self._kept.close()
-        self._key = self._kept = None
+        kept, self._key, self._kept = self._kept, None, None
+        if kept is not None:
+            kept.close()
 
 
 KEPT = NodeKeeper()  # of this process

@@ -1,0 +1,393 @@
+"""A running stack as a program next to it sees it: requests, parameters, statuses, topics."""
+
+import importlib
+import math
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.srv import DescribeParameters
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from wam_bag.value_messages import Encode
+from wam_description.arm import Shared
+from wam_description.interface import Interface
+from wam_description.nodes import NODES
+from wam_description.parameters import build_part
+from wam_description.signals import NodeStatus
+from wam_description.topics import BY_NAME, STATUS
+from wam_description.wiring import Call, SetParameters
+from wam_ros.limits import CALL_LIMITS
+from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.remote_parameters import RemoteParameters
+from wam_ros.requests import Request, refusal_of, service_request
+from wam_ros.run import Closing, Connection
+from wam_ros.topics import NAMESPACE, listening, qos
+from wam_ros.wire import decoder, deserialized, encoder, stamp_of
+
+MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
+START: Final = "start the stack with 'wam up'"
+
+
+class Reply(NamedTuple):
+    """The answer to a request."""
+
+    success: bool
+    message: str
+
+    @classmethod
+    def of(cls, request: Request, answer: Any) -> "Reply":
+        """The answer of the service of a request."""
+        refusal = refusal_of(request, answer)
+        return cls(not refusal, refusal or getattr(answer, "message", ""))
+
+
+class NoAnswerError(OSError):
+    """A node, service or topic that is not there; the text states what to do."""
+
+
+class StackClient(Closing):
+    """The nodes of one arm; leaving the context leaves the network.
+
+    Parameters
+    ----------
+    namespace : of the arm.
+    name : of the node that asks.
+    connection : whose executor spins it, as a Connection or a Composition; None: one of its own.
+    shared : shared parameters of the stack, for `listen` and `send`.
+
+    Attributes
+    ----------
+    node : that asks, in the namespace of the arm.
+    statuses : newest of each node by its name, after `follow_statuses` and while anything is awaited.
+    """
+
+    clock: Callable[[], float] = staticmethod(time.monotonic)
+
+    def __init__(
+        self, namespace: str = NAMESPACE, name: str = "wam_call", connection: Any = None, shared: Shared | None = None
+    ) -> None:
+        self.connection = connection or Connection()
+        self._is_own = connection is None
+        self.node = self.connection.add(Node(name, context=self.connection.context, namespace=namespace))
+        self.statuses: dict[str, NodeStatus] = {}
+        self.shared: Any = shared
+        self.topics = Interface(shared).topics if shared else BY_NAME
+        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
+        self._publishers: dict[str, Publisher] = {}
+        self._encoders: dict[str, Encode] = {}
+
+    def close(self) -> None:
+        """Leave the network, where the connection is its own."""
+        if self._is_own:
+            self.connection.close()
+
+    # waiting
+
+    def spin_once(self, seconds: float = 0.01) -> None:
+        """Handle what comes first within this time."""
+        self.connection.executor.spin_once(timeout_sec=seconds)
+
+    def wait(self, until: Callable[[], Any], seconds: float = CALL_LIMITS.answer) -> bool:
+        """Spin until something is true; False where it is not within this time of `clock`."""
+        end = self.clock() + seconds
+        while not (found := until()) and self.clock() < end:
+            self.spin_once()
+        return bool(found)
+
+    # requests
+
+    def service(self, request: Request) -> tuple[Any, Any]:
+        """The client of a request, and the message that it sends."""
+        service, kind, message = service_request(request)
+        return self.client(kind, service), message
+
+    def client(self, kind: Any, service: str) -> Any:
+        """The client of a service by its type and name."""
+        if (service, kind) not in self._clients:
+            self._clients[service, kind] = self.node.create_client(kind, service)
+        return self._clients[service, kind]
+
+    def request(self, request: Call | SetParameters, seconds: float = CALL_LIMITS.answer) -> Reply:
+        """Ask a node and wait for its answer, for this time."""
+        client, message = self.service(request)
+        name = self.node.resolve_service_name(client.srv_name)
+        if not self.wait(client.service_is_ready, seconds):
+            there = self._nodes_without(request.node)
+            advice = f"there are {', '.join(there)}" if there else START
+            return Reply(False, f"no service {name} within {seconds:g} s; {advice}")
+        attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
+        answer = self.answer(client, message, seconds, attempt)
+        if answer is None:
+            return Reply(False, f"no answer from {name} within {seconds:g} s")
+        return Reply.of(request, answer)
+
+    def answer(self, client: Any, message: Any, seconds: float, attempt: float = CALL_LIMITS.attempt) -> Any:
+        """The answer of a service, None where there is none.
+
+        An answer can be lost while the service still discovers who asks; asking twice does no harm.
+
+        Parameters
+        ----------
+        client : of the service, which is ready.
+        message : the request.
+        seconds : for the answer.
+        attempt : s, after which the request is sent again.
+        """
+        futures: list[Any] = []
+
+        def found() -> list[Any]:  # an earlier one may be answered meanwhile
+            return [future for future in futures if future.done()]
+
+        for _ in range(max(1, round(seconds / attempt))):
+            futures.append(client.call_async(message))
+            if self.wait(found, attempt):
+                return found()[0].result()
+        return None
+
+    # parameters
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """Every parameter of a node by its dotted name.
+
+        Raises
+        ------
+        NoAnswerError
+            where it does not answer, or there is no such node.
+        """
+        requested = RemoteParameters(self.node, [node])
+        self._require(requested.complete, f"no node '{node}' answers", lambda: self._nodes_without(node))
+        return requested.found[node]
+
+    def read_shared(self) -> Shared:
+        """The shared parameters of the stack, as its driver has them; of another node next to a driver without them.
+
+        Raises
+        ------
+        NoAnswerError
+            where no node answers that has them.
+        ParameterError
+            where they are those of another version.
+        """
+        requested = RemoteParameters(self.node, NODES)
+        first = math.inf
+
+        def found() -> list[dict[str, Any]]:
+            return [requested.found[name] for name in NODES if MODE in requested.found.get(name, {})]
+
+        def is_answered() -> bool:
+            nonlocal first
+            requested.ask()
+            if found():
+                first = min(first, time.monotonic())
+            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > CALL_LIMITS.discovery
+
+        self._require(is_answered, f"no node of a stack in {self.node.get_namespace()} answers")
+        return build_part(Shared, found()[0])
+
+    def await_driver(self, until: Callable[[], bool], others: Iterable[str] = ()) -> Mapping[str, Mapping[str, Any]]:
+        """Parameters by node of a driver that may start later, and of other nodes that are there.
+
+        Parameters
+        ----------
+        until : ends the waiting; there are none then.
+        others : names of these nodes.
+        """
+        requested = RemoteParameters(self.node, ["driver", *others])
+        begin = time.monotonic()
+        while not until():
+            is_late = time.monotonic() - begin > CALL_LIMITS.discovery
+            if requested.complete() or (is_late and "driver" in requested.found):
+                return requested.found
+            self.spin_once(0.05)
+        return {}
+
+    def _nodes_without(self, node: str) -> list[str]:
+        """The nodes of the stack, none where this one is among them."""
+        own = self.node.get_namespace()
+        found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
+        return [] if node in found else sorted(found - {self.node.get_name()})
+
+    def live(self, node: str, names: Collection[str]) -> list[str]:
+        """Those of the parameters of a node that a request may change while it runs.
+
+        Raises
+        ------
+        NoAnswerError
+            where it does not answer.
+        """
+        client = self.client(DescribeParameters, f"{node}/describe_parameters")
+        question, limit = DescribeParameters.Request(names=list(names)), CALL_LIMITS.answer
+        answer = self.answer(client, question, limit) if self.wait(client.service_is_ready, limit) else None
+        if answer is None:
+            raise NoAnswerError(f"node '{node}' does not describe its parameters within {limit:g} s; {START}")
+        return [found.name for found in answer.descriptors if not found.read_only]
+
+    # statuses and topics
+
+    def follow_statuses(self) -> None:
+        """Take the statuses from now on; in lockstep the nodes wait until this program has them."""
+        row = BY_NAME[STATUS]
+        self.node.create_subscription(message_type(row), STATUS, self._hear, listening(row), raw=True)
+
+    def _hear(self, data: bytes) -> None:
+        try:
+            status = read_status(deserialized(data, DiagnosticStatus, STATUS))
+        except Refused:
+            return
+        self.statuses[status.node] = status
+        self.take_status(status)
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Called with each status that comes."""
+
+    @property
+    def mode(self) -> str:
+        """Mode of the driver, as it reports it; '' before that."""
+        return self.statuses["driver"].mode if "driver" in self.statuses else ""
+
+    def require_driver(self) -> None:
+        """Follow the statuses, and wait for that of the driver.
+
+        Raises
+        ------
+        NoAnswerError
+            where it sends none.
+        """
+        self.follow_statuses()
+        self._require(lambda: "driver" in self.statuses, "no status of the driver")
+
+    def listen(self, topic: str, take: Callable[[int, Any], None], arrays: str = "") -> None:
+        """Let `take` be called with stamp, ns, and value of each good message of a topic; `arrays` as for `decoder`."""
+        row = self.topics[topic]
+        decode = decoder(row, self.shared, arrays)
+
+        def receive(data: bytes) -> None:
+            with suppress(Refused):
+                take(stamp_of(data), decode(data))
+
+        self.node.create_subscription(message_type(row), topic, receive, listening(row), raw=True)
+
+    def publisher(self, topic: str) -> Publisher:
+        """The publisher of a topic of the table."""
+        if topic not in self._publishers:
+            row = self.topics[topic]
+            self._publishers[topic] = self.node.create_publisher(message_type(row), topic, qos(row))
+        return self._publishers[topic]
+
+    def send(self, topic: str, stamp: int, value: Any) -> None:
+        """Publish a value on a topic of the table, as the answer to a state, ns."""
+        if topic not in self._encoders:
+            self._encoders[topic] = encoder(self.topics[topic], self.shared)
+        self.publisher(topic).publish(self._encoders[topic](stamp, value))
+
+    def messages(
+        self, topic: str, silence: float = math.inf, check: Callable[[], object] = lambda: None
+    ) -> Iterator[Any]:
+        """Messages of a topic as they come, without end; a run is not delayed by it.
+
+        Parameters
+        ----------
+        topic : name in the namespace of the arm, or a full one.
+        silence : s, in which a message must come.
+        check : called while none comes, and while there is no such topic; it may raise what is to end the waiting.
+
+        Raises
+        ------
+        NoAnswerError
+            where there is no such topic.
+        TimeoutError
+            where no message came for so long.
+        """
+        name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
+
+        def kinds() -> list[str]:
+            return dict(self.node.get_topic_names_and_types()).get(name, []) if self._is_of_others(name) else []
+
+        def topics() -> list[str]:
+            found = (name for name, _ in self.node.get_topic_names_and_types() if name.startswith(own))
+            visible = (name for name in found if "/_" not in name)  # others are hidden
+            return [name.removeprefix(own) for name in visible if self._is_of_others(name)]
+
+        self._require(kinds, f"no topic {name}", topics, check)
+        package, _, kind = kinds()[0].split("/")
+        row = BY_NAME.get(topic)
+        profile = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
+        if row is not None and row.latched:
+            profile = listening(row)
+        elif row is None:
+            profile.durability = DurabilityPolicy.VOLATILE
+        taken: list[Any] = []
+        subscription = self.node.create_subscription(
+            getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
+        )
+        last = time.monotonic()
+        try:
+            while True:
+                self.spin_once(0.1)
+                if taken:
+                    yield from taken
+                    taken.clear()
+                    last = time.monotonic()
+                elif time.monotonic() - last > silence:
+                    raise TimeoutError(f"no {topic} for {silence:g} s")
+                else:
+                    check()
+        finally:
+            self.node.destroy_subscription(subscription)
+
+    def is_published(self, topic: str) -> bool:
+        """Whether a node publishes a topic, named as for `messages`, at present."""
+        return self.node.count_publishers(topic) > 0
+
+    def _is_of_others(self, topic: str) -> bool:
+        """Whether a node has a topic other than one that calls, as this one, which subscribes to the status."""
+        ends = (*self.node.get_publishers_info_by_topic(topic), *self.node.get_subscriptions_info_by_topic(topic))
+        return any(end.node_name != self.node.get_name() for end in ends)
+
+    def _require(
+        self,
+        condition: Callable[[], Any],
+        failure: str,
+        others: Callable[[], Sequence[str]] = tuple,
+        check: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Wait for a condition, unless a check raises; not as long where others are there instead, and no more come."""
+        begin = since = time.monotonic()
+        there: Sequence[str] = ()
+        while not condition():
+            now, before, there = time.monotonic(), there, others()
+            since = now if there != before else since
+            if there and now - since > CALL_LIMITS.discovery:
+                raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
+            if now - begin > CALL_LIMITS.answer:
+                raise NoAnswerError(f"{failure} within {CALL_LIMITS.answer:g} s; {START}")
+            check()
+            self.spin_once(0.05)
+
+
+def run_next_to(
+    namespace: str,
+    make: Callable[[Any, Shared], Node],
+    until: Callable[[], bool],
+    between: Callable[[Any], object] = lambda node: None,
+) -> None:
+    """Run a node of the user's until a condition holds, next to a stack, which may start later.
+
+    Parameters
+    ----------
+    namespace : of the stack.
+    make : makes the node from the context of ROS and the driver's shared parameters.
+    until : the condition.
+    between : called with the node between two callbacks, at least every tenth of a second.
+    """
+    with StackClient(namespace, "asks_for_parameters") as client:
+        if found := client.await_driver(until):
+            node = client.connection.add(make(client.connection.context, build_part(Shared, found["driver"])))
+            while not until():
+                client.spin_once(0.1)
+                between(node)
