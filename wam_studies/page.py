@@ -50,7 +50,7 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     )
     shown = f"![{measured.study.title}]({picture})" if picture else ""
     missed = measured.scores.missed
-    verdict = f"Missed: {'; '.join(missed)}." if missed else "Every required value is met."
+    verdict = "\n".join(["Missed:", "", *(f"- {one}" for one in missed)]) if missed else "Every required value is met."
     return "\n\n".join(filter(None, [head, shown, verdict, required_table(measured.scores.rows)]))
 
 
