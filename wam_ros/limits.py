@@ -89,7 +89,7 @@ class ConformanceLimits:
     service_wait: float = 10.0  # s, for a service to be found
     spin: float = 0.005  # s of one turn of the executor
     look: float = 0.4  # s of watching
-    start: float = 20.0  # s, for a driver to appear
+    start: float = 60.0  # s, for a driver to appear on a busy machine
     least_travel: float = 0.02  # rad, below which a velocity cannot be compared
     period_error: float = 0.05  # largest relative difference of the period
     vanish: float = 5.0  # s, for a publisher to vanish
