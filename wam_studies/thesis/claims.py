@@ -133,7 +133,8 @@ def table(claims: Iterable[Claim], measured: Mapping[str, str]) -> str:
     for claim in claims:
         agreement = PLACE.sub(lambda found: measured[found[0][1:-1]], claim.agreement)
         links = dict.fromkeys(filter(None, map(_link, claim.shown)))
-        remark = f"{agreement}. {claim.open}".strip(". ") if claim.status is Status.PLANT else claim.open
+        found = agreement if claim.status is Status.PLANT else ""
+        remark = ". ".join(f"{one[0].upper()}{one[1:]}" for one in (found, claim.open) if one)
         rows.append((f"{claim.section} {claim.claim}", " ".join([claim.status, *links]), remark))
     return markdown(("claim", "status", "agreement; what is open"), rows)
 
