@@ -15,7 +15,7 @@ from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
 from wam_driver.bus.interface import BusParameters
-from wam_driver.bus.line import CanLine, Line
+from wam_driver.bus.line import CanLine
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.simulator import SimulatedBus
 from wam_ros.bring_up import NodeProcess
@@ -27,33 +27,6 @@ SENDER = 0x3E0  # of an identifier; 0 is the host
 QUEUE, BARE_QUEUE = "driver on virtual", "python-can on virtual"
 SOCKETS, BARE_SOCKETS = "driver on udp_multicast", "python-can on udp_multicast"
 LATE = "late cycles at 500 Hz [%]"
-
-
-class Switched:
-    """A line that is that of the simulated arm for the start, and then one of python-can."""
-
-    def __init__(self, line: SimulatedBus) -> None:
-        self._line: Line = line
-        self.sleep, self.counts, self.close = line.sleep, line.counts, line.close
-
-    def use(self, line: Line) -> None:
-        """Send and receive on another line."""
-        self._line = line
-
-    def now(self) -> float:
-        """Its clock, s."""
-        return self._line.now()
-
-    def let_pass(self, seconds: float) -> None:
-        """Only the clock passes."""
-
-    def send(self, frame: Frame) -> bool:
-        """Whether the frame was sent."""
-        return self._line.send(frame)
-
-    def receive(self, timeout: float) -> Frame | None:
-        """The next frame."""
-        return self._line.receive(timeout)
 
 
 def message(frame: Frame) -> can.Message:
@@ -83,19 +56,22 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
             missing -= bool(found and found.arbitration_id & SENDER)  # not an echo
         host.send(message(torques), 0.0)
 
-    line = Switched(SimulatedBus.of(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE))
-    driver = ArmBus(line, CONFIGURATION.shared.arm, PERIOD)  # type: ignore[arg-type]
+    arm_of_start = SimulatedBus.of(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
+    driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD)
     while not driver.is_running:
         driver.exchange()
-    clock = count(line.now() + PERIOD, PERIOD)
+    clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
-    line.use(CanLine(host, lambda: at[0], time.sleep, 64 * (interface == "udp_multicast")))
+    line = CanLine(host, lambda: at[0], time.sleep, 64 * (interface == "udp_multicast"))
+    own = driver._host
+    own.line, own.receive, own.now = line, line.receive, line.now
 
     def driven(tick: int) -> None:
         driver.exchange()
         driver.command([0.1, -0.1, 0.1, -0.1])
 
-    loops, spent = (driven, bare), ([], [])
+    loops = driven, bare
+    spent: tuple[list[int], list[int]] = ([], [])
     driver.release()
     for _ in range(chunks):
         for loop, times in zip(loops, spent, strict=True):

@@ -68,7 +68,7 @@ class BusThresholds:
     most_frames: int = 40  # taken in one period: one of 2 ms has no more
     echoes: int = 64  # newest own frames that are dropped where a bus gives them back
     stray: int = 3  # frames that none of ours sends, before there is a fault: one may be left over in a queue
-    jump: float = 0.25  # turn of a motor between two positions, above which one is dropped: 157 rad/s in 10 ms
+    jump: float = 0.25  # turn of a motor within `silent`, 157 rad/s, above which a position is dropped
     gain_ratio: float = (
         1.5  # of a controller's counts per N m and the nominal ones, either way; real ones differ by 1.3
     )

@@ -15,6 +15,7 @@ from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_fault import BusFault
 from wam_driver.bus.frames import Frame
 from wam_driver.bus.line import CanLine, Line, ServedArm
+from wam_driver.bus.motor_track import MotorTrack
 from wam_driver.bus.safety_module import Button
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.bus.start_up import Wait
@@ -146,6 +147,12 @@ def test_velocities_are_those_of_the_motors() -> None:
     assert rig.arm.velocity == pytest.approx(rig.plant.thetad, abs=0.2 * max(map(abs, rig.plant.thetad)))
 
 
+def test_a_late_period_is_no_jump_of_a_motor_that_moves() -> None:
+    track = MotorTrack(4096)
+    assert [track.take(count, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))] == [True, True, False]
+    assert track.velocity == pytest.approx(math.tau * 1400 / 4096 / 0.1)
+
+
 def test_an_arm_without_a_zero_waits_for_a_person_at_home() -> None:
     rig = Rig(is_homed=False)
     rig.plant.brake(True)  # the person holds it
@@ -201,9 +208,11 @@ def motor(rig: Rig, draw: random.Random) -> int:
     return draw.randint(1, len(rig.currents))
 
 
-def setting(name: str, value: int) -> Inject:
+def setting(value: int, *names: str, node: int = 0) -> Inject:
+    """Properties of a node, or of a motor controller that is drawn, have another value."""
+
     def inject(rig: Rig, draw: random.Random) -> None:
-        rig.bus.controllers[motor(rig, draw)].values[name] = value
+        rig.bus.controllers[node or motor(rig, draw)].values.update(dict.fromkeys(names, value))
 
     return inject
 
@@ -262,19 +271,6 @@ def power_off(rig: Rig, draw: random.Random) -> None:
     rig.bus.on_line = lambda frame: [] if frame.sender else [frame]
 
 
-def reset_motor(rig: Rig, draw: random.Random) -> None:
-    values = rig.bus.controllers[motor(rig, draw)].values
-    values["STAT"] = values["MODE"] = values["T"] = 0
-
-
-def too_much_torque(rig: Rig, draw: random.Random) -> None:
-    rig.bus.controllers[10].values["TL2"] = 1
-
-
-def too_fast(rig: Rig, draw: random.Random) -> None:
-    rig.bus.controllers[10].values["VL2"] = 1
-
-
 def extra_motor(rig: Rig, draw: random.Random) -> None:
     rig.bus.controllers[5] = type(rig.bus.controllers[1])(5, NEW, dict(rig.bus.controllers[1].values))
 
@@ -304,29 +300,29 @@ AT_START: dict[str, tuple[Inject, BusFault]] = {
     "no safety module": (remove(lambda rig, draw: 10), BusFault.NO_SAFETY_MODULE),
     "missing controller": (remove(motor), BusFault.MISSING),
     "one controller too many": (extra_motor, BusFault.UNKNOWN_NODE),
-    "another kind of node": (setting("ROLE", 5), BusFault.NOT_MOTOR),
+    "another kind of node": (setting(5, "ROLE"), BusFault.NOT_MOTOR),
     "firmware that is too old": (firmware(20), BusFault.FIRMWARE),
     "two firmwares": (firmware(55), BusFault.MIXED_FIRMWARE),
     "stays asleep": (on_line(lambda rig, chosen: lambda f: [] if f.identifier == chosen and len(f.data) == 6 else [f]),
                      BusFault.NOT_AWAKE),
-    "wrong counts": (setting("CTS", 1024), BusFault.COUNTS),
-    "wrong gain": (setting("IPNM", 500), BusFault.GAIN),
-    "no torque": (setting("MT", 0), BusFault.LIMIT),
-    "wrong index": (setting("PIDX", 9), BusFault.INDEX),
-    "wrong group": (setting("GRPC", 5), BusFault.INDEX),
+    "wrong counts": (setting(1024, "CTS"), BusFault.COUNTS),
+    "wrong gain": (setting(500, "IPNM"), BusFault.GAIN),
+    "no torque": (setting(0, "MT"), BusFault.LIMIT),
+    "wrong index": (setting(9, "PIDX"), BusFault.INDEX),
+    "wrong group": (setting(5, "GRPC"), BusFault.INDEX),
     "full queue at the start": (refused(math.inf), BusFault.NOT_SENT),
 }  # fmt: skip
 RUNNING: dict[str, tuple[Inject, BusFault]] = {
     "silent controller": (on_line(silent_motor), BusFault.NO_REPLY),
-    "reset controller": (reset_motor, BusFault.RESET),
+    "reset controller": (setting(0, "STAT", "MODE", "T"), BusFault.RESET),
     "cut bus": (silence(lambda node: node <= 7), BusFault.ALL_SILENT),
     "power loss": (power_off, BusFault.NO_POWER),
     "E-stop": (press(Button.ESTOP), BusFault.ESTOP),
     "idle by the person": (press(Button.IDLE), BusFault.SAFETY_IDLE),
-    "torque limit": (too_much_torque, BusFault.SAFETY_IDLE),
-    "velocity limit": (too_fast, BusFault.SAFETY_IDLE),
+    "torque limit": (setting(1, "TL2", node=10), BusFault.SAFETY_IDLE),
+    "velocity limit": (setting(1, "VL2", node=10), BusFault.SAFETY_IDLE),
     "silent safety module": (silence(lambda node: node == 10), BusFault.SAFETY_SILENT),
-    "idle controller": (setting("MODE", 0), BusFault.CONTROLLER_IDLE),
+    "idle controller": (setting(0, "MODE"), BusFault.CONTROLLER_IDLE),
     "doubled node": (on_line(doubled), BusFault.DOUBLED),
     "jumping encoder": (on_line(jumping), BusFault.JUMP),
     "second host": (on_line(foreign), BusFault.FOREIGN),

@@ -19,6 +19,7 @@ from wam_ros.bring_up import NodeProcess
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_bench import DriverBench
 from wam_ros.network import require_places
+from wam_ros.priority import set_priority
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -118,12 +119,13 @@ def served(configuration: Configuration, version: int) -> Iterator[None]:
 
 
 def _serve(configuration: Configuration, version: int) -> None:
-    """Be the arm on the bus of a configuration."""
+    """Be the arm on the bus of a configuration, as prompt as the driver."""
+    set_priority(configuration.shared.timing.fifo_priority, configuration.shared.timing.niceness)
     own = configuration.node("driver", BusParameters)
     line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
     arm = ServedArm(line, SimulatedBus.of(configuration.shared, own, version))
     while True:
-        arm.answer(configuration.shared.timing.substep)
+        arm.answer(configuration.shared.timing.period)
 
 
 def _listen(configuration: Configuration, seconds: float) -> int:

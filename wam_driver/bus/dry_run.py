@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from wam_description.arm import Shared
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Position, Value
+from wam_driver.bus.frames import Bit, BusNode, Frame, Position, Value
 from wam_driver.bus.host import Host
 from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import Line
@@ -79,19 +79,18 @@ def in_words(frame: Frame, version: int) -> str:
         return f"{start} has {_name(found.number, version, found.node)} = {found.value}"
     if not frame.data:
         return f"{start}: no data"
-    to = f"group {frame.receiver}" if frame.is_to_group else _node(frame.receiver)
-    number, is_written = frame.data[0] & ~Bit.WRITE, bool(frame.data[0] & Bit.WRITE)
-    name = _name(number, version, frame.receiver)
-    if not is_written:
-        return f"{start} to {to}: get {name}"
-    if frame.is_to_group and frame.receiver in (BusGroup.ARM, BusGroup.WRIST) and name == "T":
-        return f"{start} to {to}: torques {frames.read_torques(frame)} counts"
-    return f"{start} to {to}: set {name} to {frames.written(frame)}"
+    start += f" to {f'group {frame.receiver}' if frame.is_to_group else _node(frame.receiver)}: "
+    name = _name(frame.data[0] & ~Bit.WRITE, version, frame.receiver)
+    if not frame.data[0] & Bit.WRITE:
+        return f"{start}get {name}"
+    if frame.is_to_group and name == "T":
+        return f"{start}torques {frames.read_torques(frame)} counts"
+    return f"{start}set {name} to {frames.written(frame)}"
 
 
 def _node(number: int) -> str:
-    known = {BusNode.HOST: "host", BusNode.SAFETY_MODULE: "safety module"}
-    return known.get(BusNode(number), "") if number in tuple(BusNode) else f"controller {number}"
+    known: dict[int, str] = {BusNode.HOST: "host", BusNode.SAFETY_MODULE: "safety module"}
+    return known.get(number, f"controller {number}")
 
 
 def _name(number: int, version: int, node: int) -> str:

@@ -30,7 +30,7 @@ class MotorTrack:
         position = count * self._step
         moved, dt = position - self.position, time - self._time
         if dt > 0.0:
-            if abs(moved) > BUS.jump * math.tau:
+            if abs(moved) > BUS.jump * math.tau * max(1.0, dt / BUS.silent):
                 self.has_jumped = True
                 return False
             self.velocity = moved / dt

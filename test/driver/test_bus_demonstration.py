@@ -1,0 +1,104 @@
+"""The demonstration over the simulated bus, in bus time, against the plain driver at the same rates."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wam_sim.simulation
+from wam_analysis.demo_summary import DemoSummary, summarize
+from wam_bag.bag import read
+from wam_control.task.scenario import load_for
+from wam_description.arm import Shared
+from wam_description.configuration import SHARED, Configuration, packaged
+from wam_driver.bus.arm_bus import ArmBus
+from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.bus.start_up import Wait
+from wam_driver.driver import Driver, DriverParameters
+from wam_driver.plant import Plant
+from wam_sim.simulated_bag import record
+
+MORE = 0.03  # of the commanded force, by which the true force may be further off over the bus
+
+
+class PlantOnBus:
+    """A plant whose motors are reached over the bus only; a person holds it until it is enabled."""
+
+    def __init__(self, plant: Plant, shared: Shared) -> None:
+        self._plant, self._constant, self._is_braked = plant, shared.arm.motors.torque_constant, True
+        self._arm = ArmBus(SimulatedBus(shared.arm, plant, shared.timing.substep), shared.arm, shared.timing.period)
+        plant.brake(True)
+        while self._arm.wait is not Wait.NOTHING:
+            self._exchange()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._plant, name)
+
+    @property
+    def theta(self) -> list[float]:
+        return self._arm.position
+
+    @property
+    def thetad(self) -> list[float]:
+        return self._arm.velocity
+
+    def brake(self, on: bool) -> None:
+        if on != self._is_braked:
+            self._is_braked = on
+            self._plant.brake(on)
+            (self._arm.brake if on else self._arm.release)()
+
+    def step(self, torque: Sequence[float], substeps: int) -> None:
+        self._arm.command([each / k for each, k in zip(torque, self._constant, strict=True)])
+        self._exchange()
+
+    def _exchange(self) -> None:
+        self._arm.exchange()
+        assert self._arm.trouble is None, self._arm.fault
+
+
+class DriverOnBus(Driver):
+    def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
+        super().__init__(shared, parameters)
+        self.plant = PlantOnBus(self.plant, shared)  # type: ignore[assignment]
+        self._measure()
+
+
+def at_rates_of_the_bus(name: str) -> Configuration:
+    """The configuration of the plain arm with rates and gains of that on its bus."""
+    plain, on_bus = Configuration.load(packaged(name)), Configuration.load(packaged(f"{name}-bus"))
+    own = ("interface", "channel", "nodes", "timing.mode")
+    changed = {
+        (key if node == SHARED else f"{node}:{key}"): value
+        for node, flat in on_bus.sections.items()
+        for key, value in flat.items()
+        if key not in own and plain.sections[node].get(key) != value
+    }
+    return plain.with_values(changed)
+
+
+def played(configuration: Configuration, bag: Path) -> DemoSummary:
+    steps = load_for(configuration, str(configuration.sections["scenario"]["script"]))
+    assert record(configuration, steps, bag) == ""
+    return summarize(read(bag))
+
+
+def force_errors(summary: DemoSummary) -> list[float]:
+    """Of the true force in the last second of each hold, as a part of what is commanded."""
+    traces, found = summary.traces, []
+    for hold in summary.holds:
+        at = (traces.stamp > hold.end - 10**9) & (traces.stamp <= hold.end)
+        found.append(abs(float(np.linalg.norm(traces.true.force[at].mean(axis=0))) / hold.commanded - 1.0))
+    return found
+
+
+@pytest.mark.slow
+def test_forces_over_the_bus_are_those_of_the_plain_driver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    configuration = at_rates_of_the_bus("barrett-wam4")
+    plain = force_errors(played(configuration, tmp_path / "plain"))
+    monkeypatch.setattr(wam_sim.simulation, "Driver", DriverOnBus)
+    over_bus = force_errors(played(configuration, tmp_path / "bus"))
+    assert len(plain) == len(over_bus) == 3
+    assert max(over_bus) < max(plain) + MORE, (plain, over_bus)
