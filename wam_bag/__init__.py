@@ -1,4 +1,4 @@
-"""Bags of ROS 2 (MCAP) written, read as numpy columns, cut and repaired; usable alone, without ROS.
+"""Bags of ROS 2 (MCAP) written, read as numpy columns, and repaired; usable alone, without ROS.
 
 For users:
 
@@ -6,7 +6,6 @@ For users:
 - `contents`: `contents` lists topics, times and attachments without reading messages; `mode_of`.
 - `losses`: `losses` is what a bag lacks, from the records of the recorder and of repairs.
 - `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.
-- `cut`: `cut` writes a part of a bag as a new bag.
 - `repair`: `repair` writes files that are broken or were not closed again from what can be read.
 - `errors`: `BagError`, `RecordingError`, and what is raised within the package.
 - `printable`: text from outside without control characters, for terminals and logs.

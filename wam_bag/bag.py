@@ -30,6 +30,7 @@ from wam_bag.columns import (
     Series,
     TableColumns,
     WrenchColumns,
+    series,
 )
 from wam_bag.contents import add_attachments, merge
 from wam_bag.errors import BagError, Damage
@@ -70,7 +71,7 @@ class Bag(NamedTuple):
         return f"Bag({str(self.path)!r}, {len(self.topics)} topics, {messages} messages)"
 
     def series(self, topic: str) -> Series:
-        """A topic as named series of equal length, see `wam_bag.columns.Columns`.
+        """A topic as named series of equal length, see `wam_bag.columns.series`.
 
         Parameters
         ----------
@@ -86,7 +87,7 @@ class Bag(NamedTuple):
         if len(found) != 1:
             listed = ", ".join(found or sorted(self.topics)) or "none"
             raise BagError(f"{self.path}: {len(found) or 'no'} topics are named '{topic}'; choose one of {listed}")
-        return self.topics[found[0]].series()
+        return series(self.topics[found[0]])
 
     def to_pandas(self, topic: str) -> Any:
         """A topic as a DataFrame with the time, s, as its index; arguments and errors as those of `series`.

@@ -8,10 +8,10 @@ import keyword
 import struct
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_bag.definitions import definition, schema
 from wam_bag.errors import Damage
@@ -22,14 +22,6 @@ ENCAPSULATION: Final = 4
 ORDERS: Final = {b"\0\0": ">", b"\0\1": "<"}
 LITTLE_ENDIAN: Final = b"\0\1\0\0"
 SECOND: Final = 1_000_000_000  # ns
-_CODES = {
-    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
-}  # fmt: skip
-_LETTERS = {
-    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d",
-}  # fmt: skip
-
 _STAMPS = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 
 _AFTER_STAMP: Final = ENCAPSULATION + 8
@@ -45,7 +37,63 @@ class Leaf(NamedTuple):
     length: int | None
 
 
-class Layout:
+class Reading:
+    """A message that is read from its start to its end.
+
+    Parameters
+    ----------
+    data : it, with its encapsulation.
+
+    Attributes
+    ----------
+    counts_at : place and value of every count in the message, of characters, numbers or messages.
+    end : bytes that were read.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        try:
+            self.order = ORDERS[data[:2]]
+        except KeyError:
+            raise Damage(f"a message has the encapsulation {data[:2].hex() or 'none'}; plain CDR is read") from None
+        self.data = data
+        self.counts_at: list[tuple[int, int]] = []
+        self.end = ENCAPSULATION
+
+    def skip(self, size: int) -> int:
+        """Pass over some bytes; returns the first."""
+        start = self.end
+        self.end += size
+        if self.end > len(self.data):
+            raise Damage("a message ends early")
+        return start
+
+    def numbers(self, kind: str, count: int) -> tuple[int, np.dtype[Any]]:
+        """Pass over numbers; their first byte and type."""
+        dtype = number_type(self.order, kind)
+        if count:
+            self.end += -(self.end - ENCAPSULATION) % dtype.itemsize
+        return self.skip(dtype.itemsize * count), dtype
+
+    def count(self) -> int:
+        """The count of what follows."""
+        start, _ = self.numbers("uint32", 1)
+        (count,) = struct.unpack_from(self.order + "I", self.data, start)
+        self.counts_at.append((start, count))
+        return int(count)
+
+    def text(self) -> str:
+        """A string without its terminator; bytes that are not UTF-8 are written with backslashes."""
+        start = self.skip(self.count())
+        return self.data[start : self.end][:-1].decode("utf-8", "backslashreplace")
+
+
+@cache
+def number_type(order: str, kind: str) -> np.dtype[Any]:
+    """Type of a primitive in this byte order."""
+    return np.dtype(order + PRIMITIVES[kind])
+
+
+class Layout(Reading):
     """The place of everything in messages that have the same counts and strings as this one.
 
     Parameters
@@ -56,45 +104,38 @@ class Layout:
 
     Attributes
     ----------
-    numbers : numbers and arrays of them, by path: 'header.stamp.sec', 'position', 'markers[0].scale.x'.
+    numbers_at : numbers and arrays of them, by path: 'header.stamp.sec', 'position', 'markers[0].scale.x'.
     texts : strings and arrays of them, by path.
     counts : length of each sequence of messages, by path.
-    counts_at : place and value of every count in the message, of characters, numbers or messages.
     fixed : for each byte of the message whether it decides the layout: byte order, counts, strings.
-    end : bytes of the message.
     """
 
     def __init__(self, kind: str, definitions: Definitions, data: bytes) -> None:
-        self.order = byte_order(data)
-        self.numbers: dict[str, Leaf] = {}
+        super().__init__(data)
+        self.numbers_at: dict[str, Leaf] = {}
         self.texts: dict[str, tuple[str, ...]] = {}
         self.counts: dict[str, int] = {}
-        self.counts_at: list[tuple[int, int]] = []
         self.fixed = np.zeros(len(data), np.bool_)
         self.fixed[:2] = True
-        self.data = data
         self._definitions = definitions
-        self.end = ENCAPSULATION
         self._message(kind, "")
+        for start, _ in self.counts_at:
+            self.fixed[start : start + 4] = True
 
     def _message(self, kind: str, path: str) -> None:
         fields = self._definitions[kind]
         for name, inner, length in fields:
             self._field(f"{path}.{name}" if path else name, inner, length)
         if not fields:
-            self._skip(1)
+            self.skip(1)
 
     def _field(self, path: str, kind: str, length: int | None) -> None:
-        count = length or (1 if length is None else self._count())
+        count = length or (1 if length is None else self.count())
         if kind == "string":
-            self.texts[path] = tuple(self._text() for _ in range(count))
+            self.texts[path] = tuple(self.text() for _ in range(count))
         elif kind in PRIMITIVES:
-            size = PRIMITIVES[kind]
-            if count:
-                self._align(size)
-            dtype = np.dtype(self.order + _CODES[kind])
-            self.numbers[path] = Leaf(self.end - ENCAPSULATION, dtype, None if length is None else count)
-            self._skip(size * count)
+            start, dtype = self.numbers(kind, count)
+            self.numbers_at[path] = Leaf(start - ENCAPSULATION, dtype, None if length is None else count)
         elif length is None:
             self._message(kind, path)
         else:
@@ -102,45 +143,12 @@ class Layout:
             for i in range(count):
                 self._message(kind, f"{path}[{i}]")
 
-    def _count(self) -> int:
-        self._align(4)
-        start = self.end
-        self._skip(4)
-        self.fixed[start : self.end] = True
-        (count,) = struct.unpack_from(self.order + "I", self.data, start)
-        self.counts_at.append((start, count))
-        return int(count)
-
-    def _text(self) -> str:
-        length = self._count()
-        start = self.end
-        self._skip(length)
-        self.fixed[start : self.end] = True
-        return text_of(self.data[start : self.end])
-
-    def _align(self, size: int) -> None:
-        self.end += -(self.end - ENCAPSULATION) % size
-
-    def _skip(self, size: int) -> None:
-        self.end += size
-        if self.end > len(self.data):
-            raise Damage("a message ends early")
-
-
-def byte_order(data: bytes) -> str:
-    """'<' or '>' by the encapsulation."""
-    try:
-        return ORDERS[data[:2]]
-    except KeyError:
-        raise Damage(f"a message has the encapsulation {data[:2].hex() or 'none'}; plain CDR is read") from None
-
-
-def text_of(data: bytes) -> str:
-    """A string without its terminator; bytes that are not UTF-8 are written with backslashes."""
-    return data[:-1].decode("utf-8", "backslashreplace")
-
-
-Step = Callable[[bytes, int], tuple[Any, int]]
+    def text(self) -> str:
+        """A string, whose bytes decide the layout."""
+        text = super().text()
+        start, count = self.counts_at[-1]
+        self.fixed[start + 4 : start + 4 + count] = True
+        return text
 
 
 class Decoder:
@@ -154,119 +162,39 @@ class Decoder:
 
     def __init__(self, kind: str, definitions: Definitions) -> None:
         self.kind, self.definitions = kind, definitions
-        self._steps: dict[tuple[str, str], Step] = {}
+        self._classes: dict[str, Any] = {}
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        order = byte_order(data)
-        try:
-            message, _ = self._struct(self.kind, order)(data[ENCAPSULATION:], 0)
-        except struct.error:
-            raise Damage("a message ends early") from None
-        return message
+        return self._message(Reading(data), self.kind)
 
-    def _struct(self, kind: str, order: str) -> Step:
-        """The step of a type, made once: types in types may occur any number of times."""
-        step = self._steps.get((kind, order))
-        if step is None:
-            step = self._steps[kind, order] = self._new_struct(kind, order)
-        return step
-
-    def _new_struct(self, kind: str, order: str) -> Step:
+    def _message(self, reading: Reading, kind: str) -> Any:
         fields = self.definitions[kind]
-        names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
-        made: Any = namedtuple(kind.rpartition("/")[2], names)  # type: ignore[misc]
-        steps = [self._field(inner, length, order) for _, inner, length in fields]
+        values = [self._field(reading, inner, length) for _, inner, length in fields]
+        if not fields:
+            reading.skip(1)
+        if kind not in self._classes:
+            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
+            self._classes[kind] = namedtuple(kind.rpartition("/")[2], names)
+        return self._classes[kind](*values)
 
-        def decode(data: bytes, position: int) -> tuple[Any, int]:
-            values = []
-            for step in steps:
-                value, position = step(data, position)
-                values.append(value)
-            if not steps and position > len(data):
-                raise Damage("a message ends early")
-            return made._make(values), position + (not steps)
+    def _field(self, reading: Reading, kind: str, length: int | None) -> Any:
+        if length is None:
+            return self._one(reading, kind)
+        count = length or reading.count()
+        if kind not in PRIMITIVES:
+            return [self._one(reading, kind) for _ in range(count)]
+        start, dtype = reading.numbers(kind, count)
+        return np.frombuffer(reading.data, dtype, count, start)
 
-        return decode
-
-    def _field(self, kind: str, length: int | None, order: str) -> Step:
-        if length is not None and kind in PRIMITIVES:
-            return _array(kind, length, order)
-        if kind in PRIMITIVES:
-            return _number(kind, order)
-        one = _string(order) if kind == "string" else self._struct(kind, order)
-        return one if length is None else _sequence(one, length, order)
-
-
-def _number(kind: str, order: str) -> Step:
-    size = PRIMITIVES[kind]
-    take = struct.Struct(order + _LETTERS[_CODES[kind]]).unpack_from
-
-    def decode(data: bytes, position: int) -> tuple[Any, int]:
-        position += -position % size
-        return take(data, position)[0], position + size
-
-    def decode_bool(data: bytes, position: int) -> tuple[bool, int]:
-        return take(data, position)[0] != 0, position + 1
-
-    return decode_bool if kind == "bool" else decode
-
-
-def _counter(length: int, order: str) -> Callable[[bytes, int], tuple[int, int]]:
-    """Reads the count of a sequence; a fixed array has none in the message."""
-    take = struct.Struct(order + "I").unpack_from
-
-    def count(data: bytes, position: int) -> tuple[int, int]:
-        position += -position % 4
-        return take(data, position)[0], position + 4
-
-    return count if not length else lambda data, position: (length, position)
-
-
-def _array(kind: str, length: int, order: str) -> Step:
-    size, dtype = PRIMITIVES[kind], np.dtype(order + _CODES[kind])
-    counter = _counter(length, order)
-
-    def decode(data: bytes, position: int) -> tuple[NDArray[Any], int]:
-        count, position = counter(data, position)
-        if not count:
-            return np.empty(0, dtype), position
-        position += -position % size
-        end = position + count * size
-        if end > len(data):
-            raise Damage("a message ends early")
-        return np.frombuffer(data, dtype, count, position), end
-
-    return decode
-
-
-def _string(order: str) -> Step:
-    counter = _counter(0, order)
-
-    def decode(data: bytes, position: int) -> tuple[str, int]:
-        count, start = counter(data, position)
-        end = start + count
-        if end > len(data):
-            raise Damage("a message ends early")
-        return text_of(data[start:end]), end
-
-    return decode
-
-
-def _sequence(one: Step, length: int, order: str) -> Step:
-    counter = _counter(length, order)
-
-    def decode(data: bytes, position: int) -> tuple[list[Any], int]:
-        count, position = counter(data, position)
-        values = []
-        for _ in range(count):
-            value, position = one(data, position)
-            if position > len(data):
-                raise Damage("a message ends early")
-            values.append(value)
-        return values, position
-
-    return decode
+    def _one(self, reading: Reading, kind: str) -> Any:
+        if kind == "string":
+            return reading.text()
+        if kind not in PRIMITIVES:
+            return self._message(reading, kind)
+        start, _ = reading.numbers(kind, 1)
+        (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
+        return value != 0 if kind == "bool" else value
 
 
 def encoded(kind: str, value: Sequence[Any]) -> bytes:
@@ -312,8 +240,8 @@ def _add_one(body: bytearray, kind: str, value: Any) -> None:
 def _add_numbers(body: bytearray, kind: str, values: Sequence[float]) -> None:
     """Numbers, aligned to their size."""
     if values:
-        body += bytes(-len(body) % PRIMITIVES[kind])
-        body += struct.pack(f"<{len(values)}{_LETTERS[_CODES[kind]]}", *values)
+        body += bytes(-len(body) % number_type("<", kind).itemsize)
+        body += struct.pack(f"<{len(values)}{PRIMITIVES[kind]}", *values)
 
 
 class Pattern:
@@ -336,7 +264,7 @@ class Pattern:
     def __init__(self, kind: str, value: Sequence[Any], table: str = "") -> None:
         data = encoded(kind, value)
         spans: list[tuple[int, int]] = []  # of the groups
-        for path, (offset, dtype, length) in Layout(kind, definitions(kind, schema(kind)), data).numbers.items():
+        for path, (offset, dtype, length) in Layout(kind, definitions(kind, schema(kind)), data).numbers_at.items():
             begin = ENCAPSULATION + offset
             end = begin + dtype.itemsize * (1 if length is None else length)
             if path != table and dtype.str != "<f8":

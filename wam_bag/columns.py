@@ -5,7 +5,8 @@ of them, and a column is a view of many records at once.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -29,25 +30,19 @@ JOINT_FIELDS = ("position", "velocity", "effort")
 UNNAMED, DOUBLED = "joints without a name", "a joint's name twice"
 
 
-def stamped(times: NDArray[np.int64]) -> Series:
-    """The series 'time', s, of times in ns."""
-    return {"time": times / 1e9}
+def _shown(columns: Any) -> str:
+    """A line for a prompt, in place of every array."""
+    listed = next((getattr(columns, name) for name in ("names", "columns", "frames") if name in columns._fields), ())
+    named = ", ".join(map(str, dict.fromkeys(listed)))
+    return f"{type(columns).__name__}({len(columns.log_time_ns)} messages{': ' * bool(named)}{named})"
 
 
-def split(fields: Mapping[str, NDArray[Any]], names: Iterable[object]) -> Series:
-    """A series 'field.name' for each column of each field; none of a field that is empty."""
-    names = list(names)
-    return {
-        f"{field}.{name}": column
-        for field, values in fields.items()
-        for name, column in zip(names, values.T, strict=False)
-    }
+def _brief(kind: Any) -> Any:
+    kind.__repr__ = _shown
+    return kind
 
 
-def _listed(frames: Texts) -> str:
-    return ", ".join(sorted(map(str, set(frames))))
-
-
+@_brief
 class JointColumns(NamedTuple):
     """sensor_msgs/JointState, k messages of n joints, matched by name.
 
@@ -65,15 +60,8 @@ class JointColumns(NamedTuple):
     effort: Numbers
     irregular: Mapping[str, int] = MappingProxyType({})
 
-    def __repr__(self) -> str:
-        return f"JointColumns({len(self.log_time_ns)} messages: {', '.join(self.names)})"
 
-    def series(self) -> Series:
-        """The stamp and 'position.joint1' and so on; see `Columns`."""
-        fields = {"position": self.position, "velocity": self.velocity, "effort": self.effort}
-        return stamped(self.stamp_ns) | split(fields, self.names)
-
-
+@_brief
 class WrenchColumns(NamedTuple):
     """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
 
@@ -83,16 +71,8 @@ class WrenchColumns(NamedTuple):
     force: Numbers
     torque: Numbers
 
-    def __repr__(self) -> str:
-        return f"WrenchColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
 
-    def series(self) -> Series:
-        """The stamp, 'frame', 'force.x' to 'torque.z'; see `Columns`."""
-        return (
-            stamped(self.stamp_ns) | {"frame": self.frames} | split({"force": self.force, "torque": self.torque}, AXES)
-        )
-
-
+@_brief
 class PointColumns(NamedTuple):
     """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
 
@@ -101,14 +81,8 @@ class PointColumns(NamedTuple):
     frames: Texts
     point: Numbers
 
-    def __repr__(self) -> str:
-        return f"PointColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
 
-    def series(self) -> Series:
-        """The stamp, 'frame', 'point.x' to 'point.z'; see `Columns`."""
-        return stamped(self.stamp_ns) | {"frame": self.frames} | split({"point": self.point}, AXES)
-
-
+@_brief
 class TableColumns(NamedTuple):
     """sensor_msgs/PointCloud2, k messages with p points together: a table with a row for each point.
 
@@ -122,62 +96,34 @@ class TableColumns(NamedTuple):
     message: Index
     columns: dict[str, NDArray[Any]]
 
-    def __repr__(self) -> str:
-        return f"TableColumns({len(self.log_time_ns)} messages: {', '.join(self.columns)})"
-
     @property
     def row_stamp_ns(self) -> Times:
         """Stamp of the message of each row, ns, (p,)."""
         return self.stamp_ns[self.message]
 
-    def series(self) -> Series:
-        """The stamp and 'message' of each row, its numbers by name; see `Columns`."""
-        found = stamped(self.row_stamp_ns) | {"message": self.message}
-        for name, values in self.columns.items():
-            found |= split({name: values}, range(values.shape[-1])) if values.ndim > 1 else {name: values}
-        return found
 
-
+@_brief
 class BoolColumns(NamedTuple):
     """std_msgs/Bool, k messages."""
 
     log_time_ns: Times
     data: NDArray[np.bool_]
 
-    def __repr__(self) -> str:
-        return f"BoolColumns({len(self.log_time_ns)} messages)"
 
-    def series(self) -> Series:
-        """The log time and 'data'; see `Columns`."""
-        return stamped(self.log_time_ns) | {"data": self.data}
-
-
+@_brief
 class ClockColumns(NamedTuple):
     """rosgraph_msgs/Clock, k messages."""
 
     log_time_ns: Times
     stamp_ns: Times
 
-    def __repr__(self) -> str:
-        return f"ClockColumns({len(self.log_time_ns)} messages)"
 
-    def series(self) -> Series:
-        """The stamp alone; see `Columns`."""
-        return stamped(self.stamp_ns)
-
-
+@_brief
 class Messages(NamedTuple):
     """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
 
     log_time_ns: Times
     messages: Sequence[Any]
-
-    def __repr__(self) -> str:
-        return f"Messages({len(self.log_time_ns)} messages)"
-
-    def series(self) -> Series:
-        """The log time and 'message'; see `Columns`."""
-        return stamped(self.log_time_ns) | {"message": np.fromiter(self.messages, object, len(self.messages))}
 
     def column(self, path: str) -> NDArray[Any]:
         """One field of every message, for example 'header.stamp.sec'; shape (k,), or (k, n) of equal arrays."""
@@ -185,8 +131,33 @@ class Messages(NamedTuple):
         return np.array(values, object if values and isinstance(values[0], str) else None)
 
 
-# of all: `series`, named series of equal length (k,) as data frames and spreadsheets take them, with 'time', s
 Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | ClockColumns | Messages
+
+
+def series(columns: Columns) -> Series:
+    """Named series of equal length (k,), as data frames and spreadsheets take them.
+
+    'time', s, is the stamp, or the log time where messages have none.  A field with several values is a series for
+    each of them, as 'position.joint1' or 'force.x'; that of a table has a row for each of its rows.
+    """
+    found: Series = {"time": getattr(columns, "stamp_ns", columns.log_time_ns) / 1e9}
+    names: Sequence[object] = AXES
+    if isinstance(columns, JointColumns):
+        fields, names = {name: getattr(columns, name) for name in JOINT_FIELDS}, columns.names
+    elif isinstance(columns, TableColumns):
+        fields, names = {"message": columns.message, **columns.columns}, range(2**16)
+        found["time"] = found["time"][columns.message]
+    elif isinstance(columns, Messages):
+        fields = {"message": np.fromiter(columns.messages, object, len(columns.messages))}
+    else:
+        fields = {name.replace("frames", "frame"): column for name, column in columns._asdict().items()}
+        fields = {name: column for name, column in fields.items() if not name.endswith("_ns")}
+    for field, values in fields.items():
+        if values.ndim < 2:
+            found[field] = values
+        else:
+            found |= {f"{field}.{name}": column for name, column in zip(names, values.T, strict=False)}
+    return found
 
 
 class Collector:
@@ -275,13 +246,15 @@ def _filled(groups: list[Any], place: int, shape: tuple[int, ...], dtype: Any) -
     return column
 
 
+def _assembled(kind: Any, shapes: Sequence[tuple[int, ...]], times: Times, groups: list[Any]) -> Any:
+    """Columns of stamps, frames and arrays, which have this shape in each message."""
+    arrays = (_filled(groups, i, (len(times), *shape), np.float64) for i, shape in enumerate(shapes, 2))
+    return kind(*_stamped(times, groups), *arrays)
+
+
 def _stamped(times: Times, groups: list[Any]) -> tuple[Times, Times, Texts]:
     k = len(times)
     return times, _filled(groups, 0, (k,), np.int64), _filled(groups, 1, (k,), np.object_)
-
-
-def _vectors(times: Times, groups: list[Any], place: int) -> Numbers:
-    return _filled(groups, place, (len(times), 3), np.float64)
 
 
 def joint_names(names: Sequence[str], width: int) -> tuple[str, ...]:
@@ -311,23 +284,19 @@ def irregularities(names: Sequence[str], widths: Mapping[str, int]) -> Iterator[
 
 def _joint_columns(times: Times, groups: list[Any]) -> JointColumns:
     irregular = Counter[str]()
-    named = []
-    for where, (stamps, frame, given, fields) in groups:
+    owners = []
+    for _, (stamps, _, given, fields) in groups:
         widths = {name: field.shape[1] for name, field in zip(JOINT_FIELDS, fields, strict=True)}
         irregular.update({what: len(stamps) for what in irregularities(given, widths)})
-        named.append((where, (stamps, frame, joint_names(given, max(widths.values())), fields)))
-    groups = named
-    names = tuple(dict.fromkeys(name for _, values in groups for name in values[2]))
+        owners.append(joint_names(given, max(widths.values())))
+    names = tuple(dict.fromkeys(name for own in owners for name in own))
     arrays = []
-    for field in range(3):
-        every = {values[3][field].shape[1] for _, values in groups}
-        is_complete = every <= {len(names)} and all(values[2] == names for _, values in groups)
-        array = np.empty((len(times), len(names) if any(every) else 0))
-        if not is_complete:
-            array[:] = np.nan
-        for where, (_, _, own, fields) in groups if any(every) else ():
-            values = fields[field]
-            if values.shape[1] != len(own):
+    for place in range(len(JOINT_FIELDS)):
+        is_there = any(values[3][place].size for _, values in groups)
+        array = np.full((len(times), len(names) if is_there else 0), np.nan)
+        for (where, (_, _, _, fields)), own in zip(groups, owners, strict=True):
+            values = fields[place]
+            if values.shape[1] < len(own):
                 continue
             if own == names:
                 array[where] = values
@@ -351,13 +320,11 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
     "sensor_msgs/msg/JointState": (_joints, _joint_columns),
     "geometry_msgs/msg/WrenchStamped": (
         lambda group: (*_header(group), group.vector("wrench.force"), group.vector("wrench.torque")),
-        lambda times, groups: WrenchColumns(
-            *_stamped(times, groups), _vectors(times, groups, 2), _vectors(times, groups, 3)
-        ),
+        partial(_assembled, WrenchColumns, ((3,), (3,))),
     ),
     "geometry_msgs/msg/PointStamped": (
         lambda group: (*_header(group), group.vector("point")),
-        lambda times, groups: PointColumns(*_stamped(times, groups), _vectors(times, groups, 2)),
+        partial(_assembled, PointColumns, ((3,),)),
     ),
     "sensor_msgs/msg/PointCloud2": (lambda group: (*_header(group), tables(group)), _table_columns),
     "std_msgs/msg/Bool": (

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, ChunkIndex, Footer, Schema, Statistics
+from mcap.records import Attachment, Channel, ChunkIndex, Footer, Message, Schema, Statistics
 
 from wam_bag.errors import Damage, NotClosedError, TooLargeError
 from wam_bag.mcap_records import (
@@ -27,10 +27,11 @@ from wam_bag.mcap_records import (
     chunk_index,
     chunk_of,
     decompress,
+    message,
     parsed,
     walk,
 )
-from wam_bag.message_search import NEVER, Found, MessageBatch, find, log_times, together
+from wam_bag.message_search import DATA, NEVER, Found, MessageBatch, find, log_times, together
 
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
 TAIL: Final = 16  # bytes behind the records of a batch, so that a wide read of the last one stays inside
@@ -185,10 +186,16 @@ class McapFile:
         """Content of a record."""
         return self._read(record.start + HEAD.size, record.end - record.start - HEAD.size)
 
-    def chunk(self, record: RecordExtent) -> MessageBatch:
-        """The messages of a chunk record, checked; its indexes are not needed."""
+    def messages(self, record: RecordExtent) -> list[Message]:
+        """The messages of a chunk record, checked, in their order; its indexes are not needed."""
         index = chunk_of(record.start, record.end, self._read(record.start + HEAD.size, 24))
-        return self._load([index], index.uncompressed_size)
+        buffer, by_channel = self._load([index], index.uncompressed_size)
+        found = [
+            place
+            for some in by_channel.values()
+            for place in zip(some.offsets.tolist(), some.sizes.tolist(), strict=True)
+        ]
+        return [message(buffer[start + HEAD.size : start + DATA + size].tobytes()) for start, size in sorted(found)]
 
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, if there is one."""

@@ -3,8 +3,7 @@
 What has been written is always whole: a chunk goes to disk together with its indexes, and if that fails,
 because the disk is full, the file is cut back to what was whole before and can still be finished.  The writer
 of the `mcap` library cannot do that: after a failed write its statistics, indexes and checksum include what is
-not on disk.  Nor does it copy chunks as they are, which a repair needs, or take a level of compression.  So
-records are those of the library, and when they are written is decided here.
+not on disk.  So records are those of the library, and when they are written is decided here.
 """
 
 import contextlib
@@ -19,11 +18,8 @@ import numpy as np
 import zstandard
 from mcap import records
 from mcap.opcode import Opcode
-from numpy.typing import NDArray
 
 from wam_bag.mcap_records import FOOTER_SIZE, HEAD, MAGIC, serialized
-
-Entries = NDArray[np.uint64]  # of a message index: log time, offset, log time, offset ...
 
 FAST: Final = 3
 _MESSAGE = struct.Struct("<BQHIQQ")  # start of a message record: opcode, length, channel, sequence, log, publish time
@@ -79,11 +75,10 @@ class McapWriter:
         self.define(channel)
         return channel.id
 
-    def define(self, definition: records.Schema | records.Channel, is_new: bool = True) -> None:
-        """Take a schema or channel with its id; one that is not new is in a chunk already."""
+    def define(self, definition: records.Schema | records.Channel) -> None:
+        """Take a schema or channel with its id."""
         self._summarize(Opcode.SCHEMA if isinstance(definition, records.Schema) else Opcode.CHANNEL, definition)
-        if is_new:
-            self._buffer += serialized(definition)
+        self._buffer += serialized(definition)
 
     def add(self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
         """Add a message to the chunk; the chunk goes to disk when it is full."""
@@ -108,25 +103,15 @@ class McapWriter:
         chunk = records.Chunk(
             "zstd", self._compressor.compress(data), max(times), min(times), zlib.crc32(data), len(data)
         )
-        self.add_chunk(chunk, {channel: np.array(entries, "<u8") for channel, entries in index.items()})
-
-    def add_chunk(self, chunk: records.Chunk, index: Mapping[int, Entries]) -> None:
-        """Write a whole chunk.
-
-        Parameters
-        ----------
-        chunk : the chunk.
-        index : by channel id the log time and the place in the chunk of each message, one after the other.
-        """
         pieces = [serialized(chunk)]
         start, length = self.position, len(pieces[0])
         end = start + length
         offsets = {}
         for channel, entries in index.items():
             offsets[channel] = end
-            packed = entries.tobytes()
-            pieces.append(_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(packed), channel, len(packed)) + packed)
-            end += len(pieces[-1])
+            pieces.append(_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + 8 * len(entries), channel, 8 * len(entries)))
+            pieces.append(np.array(entries, "<u8").tobytes())
+            end += len(pieces[-2]) + len(pieces[-1])
         self._put(b"".join(pieces))
         first, last = chunk.message_start_time, chunk.message_end_time
         found = records.ChunkIndex(

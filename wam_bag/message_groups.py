@@ -30,7 +30,7 @@ class Group(NamedTuple):
     def numbers(self, path: str) -> NDArray[Any]:
         """Numbers of each message at a path, (m, n)."""
         try:
-            leaf = self.layout.numbers[path]
+            leaf = self.layout.numbers_at[path]
         except KeyError:
             raise Damage(f"its type has no numbers '{path}'") from None
         size = leaf.dtype.itemsize * (1 if leaf.length is None else leaf.length)

@@ -1,6 +1,6 @@
 """Points of sensor_msgs/PointCloud2 as a table: the bytes in each message read as its fields describe them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 from wam_bag.errors import Damage
 from wam_bag.message_groups import Group, Index
 
-TYPES: Final = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")  # of the numbers 1 to 8 in PointField
+TYPES: Final = dict(enumerate(("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"), 1))  # of the numbers in PointField
 _SIZES: Final = ("height", "width", "is_bigendian", "point_step", "row_step")
 
 
 class PointTable(NamedTuple):
-    """Points of m messages that have p points each: which messages, and the fields by name, (m, p) or (m, p, n)."""
+    """Points of m messages that have p points each: which messages, and the points, (m, p), with named fields."""
 
     messages: Index
-    points: int
-    columns: dict[str, NDArray[Any]]
+    points: NDArray[Any]
 
 
 def tables(group: Group) -> list[PointTable]:
@@ -31,8 +30,6 @@ def tables(group: Group) -> list[PointTable]:
     """
     count = group.layout.counts["fields"]
     names = [group.text(f"fields[{i}].name")[0] for i in range(count)]
-    if len(set(names)) < count:
-        raise Damage(f"a point cloud has two fields of the same name; its fields: {', '.join(names)}")
     paths = [*_SIZES, *(f"fields[{i}].{part}" for i in range(count) for part in ("offset", "datatype", "count"))]
     described = np.hstack([group.numbers(path).astype(np.int64) for path in paths])
     data = group.numbers("data")
@@ -41,39 +38,29 @@ def tables(group: Group) -> list[PointTable]:
     while len(rows):  # mostly all have the same description
         first = described[rows[0]]
         same = (described[rows] == first).all(axis=1)
-        points = _points(data[rows[same]], first[: len(_SIZES)].tolist())
-        fields = _fields(points, names, first[len(_SIZES) :].reshape(-1, 3).tolist(), bool(first[2]))
-        found.append(PointTable(rows[same], points.shape[1], dict(zip(names, fields, strict=True))))
+        found.append(PointTable(rows[same], _points(data[rows[same]], names, first.tolist())))
         rows = rows[~same]
     return found
 
 
-def _points(data: NDArray[np.uint8], sizes: list[int]) -> NDArray[np.uint8]:
-    """Bytes of m messages as points, (m, points, bytes of a point)."""
-    height, width, _, point_step, row_step = sizes
-    fits = row_step >= width * point_step and height * row_step == data.shape[1]
-    if not fits or (height * width and not point_step):
+def _points(data: NDArray[np.uint8], names: list[str], described: list[int]) -> NDArray[Any]:
+    """Bytes of m messages as points, (m, p), from the values of `_SIZES` and the three of each field."""
+    height, width, is_bigendian, step, row_step = described[: len(_SIZES)]
+    fields = [described[i : i + 3] for i in range(len(_SIZES), len(described), 3)]
+    order = ">" if is_bigendian else "<"
+    try:
+        # some writers leave the count of a single number 0
+        formats = [(order + TYPES[number], (count,) if count > 1 else ()) for _, number, count in fields]
+        offsets = [offset for offset, _, _ in fields]
+        kind = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
+        lines = data.reshape(len(data), height, row_step)[:, :, : width * step]
+        return np.ascontiguousarray(lines).view(kind).reshape(len(data), height * width)
+    except (KeyError, ValueError, OverflowError, ZeroDivisionError) as error:
+        listed = ", ".join(f"{name} {place}" for name, place in zip(names, fields, strict=True))
         raise Damage(
-            f"a point cloud of {height} rows of {width} points has point_step {point_step}, row_step {row_step} and "
-            f"{data.shape[1]} bytes of data, which do not fit"
-        )
-    lines = data.reshape(len(data), height, row_step)[:, :, : width * point_step]
-    return lines.reshape(len(data), height * width, point_step)
-
-
-def _fields(
-    points: NDArray[np.uint8], names: Sequence[str], fields: list[list[int]], is_bigendian: bool
-) -> Iterator[NDArray[Any]]:
-    for name, (offset, number, count) in zip(names, fields, strict=True):
-        if not 1 <= number <= len(TYPES):
-            raise Damage(f"field '{name}' of a point cloud has the datatype {number}; allowed: 1 to {len(TYPES)}")
-        dtype = np.dtype((">" if is_bigendian else "<") + TYPES[number - 1])
-        width = count or 1  # some writers leave it 0
-        end = offset + width * dtype.itemsize
-        if end > points.shape[2]:
-            raise Damage(f"field '{name}' of a point cloud ends at byte {end} of points of {points.shape[2]} bytes")
-        values = np.ascontiguousarray(points[:, :, offset:end]).view(dtype).astype(dtype.newbyteorder("="))
-        yield values if width > 1 else values[:, :, 0]
+            f"a point cloud of {height} rows of {width} points, point_step {step} and row_step {row_step} does not fit "
+            f"its {data.shape[1]} bytes of data or its fields (offset, datatype, count): {listed} ({error})"
+        ) from None
 
 
 def table_columns(found: Sequence[PointTable]) -> tuple[Index, dict[str, NDArray[Any]]]:
@@ -84,14 +71,17 @@ def table_columns(found: Sequence[PointTable]) -> tuple[Index, dict[str, NDArray
     Damage
         if messages with points have different fields.
     """
-    filled = [table for table in found if table.points] or found[:1]
-    shapes = {name: values.shape[2:] for table in filled[:1] for name, values in table.columns.items()}
-    for table in filled:
-        if (others := {name: values.shape[2:] for name, values in table.columns.items()}) != shapes:
-            raise Damage(f"point clouds of one topic have the fields {', '.join(shapes)} and {', '.join(others)}")
-    message = np.concatenate([np.empty(0, np.intp), *(np.repeat(table.messages, table.points) for table in filled)])
+    filled = [table for table in found if table.points.size] or found[:1]
+    shapes = [{name: table.points[name].shape[2:] for name in table.points.dtype.names or ()} for table in filled]
+    for other in shapes:
+        if other != shapes[0]:
+            raise Damage(f"point clouds of one topic have the fields {', '.join(shapes[0])} and {', '.join(other)}")
+    message = np.concatenate(
+        [np.empty(0, np.intp), *(np.repeat(table.messages, table.points.shape[1]) for table in filled)]
+    )
     order = np.argsort(message, kind="stable")
-    return message[order], {
-        name: np.concatenate([table.columns[name].reshape(-1, *shape) for table in filled])[order]
-        for name, shape in shapes.items()
-    }
+    columns = {}
+    for name, shape in shapes[0].items() if shapes else ():
+        values = np.concatenate([table.points[name].reshape(-1, *shape) for table in filled])
+        columns[name] = values.astype(values.dtype.newbyteorder("="))[order]
+    return message[order], columns

@@ -1,26 +1,24 @@
 """Bags repaired: files that were not closed, or are damaged, written again from what can be read of them."""
 
+import contextlib
 import os
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import yaml
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
 
-from wam_bag import safe_yaml
-from wam_bag.bag_file import refuse_compressed
+from wam_bag.bag_file import files, refuse_compressed
 from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
 from wam_bag.mcap_file import McapFile, MessageCounts, RecordExtent
-from wam_bag.mcap_records import HEAD, message, parsed
-from wam_bag.mcap_writer import Entries, McapWriter
-from wam_bag.message_search import MessageBatch, log_times
+from wam_bag.mcap_records import message, parsed
+from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 
 UNFINISHED: Final = ".repaired"  # suffix of a file while it is written
@@ -39,34 +37,6 @@ class Repaired(NamedTuple):
     def was_whole(self) -> bool:
         """Whether nothing had to be repaired."""
         return self.losses is None
-
-
-class _Account:
-    """What is copied and what is lost while a file is written again."""
-
-    def __init__(self) -> None:
-        self.bytes = 0
-        self.others = 0
-        self.holes: list[Hole] = []
-        self.lost: Counter[int] = Counter()  # by channel id
-        self.all_known = True
-        self.last: int | None = None
-
-    def copied(self, times: Collection[int]) -> None:
-        """Messages of these log times were saved; holes that were open end before them."""
-        if times:
-            self.holes = [hole if hole.end is not None else hole._replace(end=min(times)) for hole in self.holes]
-            self.last = max(times) if self.last is None else max(self.last, *times)
-
-    def lose(self, size: int, index: dict[int, list[int]] | None = None) -> None:
-        """Bytes could not be read; `index` has the log times of the messages in them by channel id, if it is known."""
-        self.bytes += size
-        if index and (times := [time for found in index.values() for time in found]):
-            self.holes.append(Hole(min(times), max(times), size))
-            self.lost.update({channel: len(found) for channel, found in index.items()})
-        else:
-            self.holes.append(Hole(self.last, None, size))
-            self.all_known = False
 
 
 def repair(path: Path) -> list[Repaired]:
@@ -88,19 +58,19 @@ def repair(path: Path) -> list[Repaired]:
     """
     if path.is_file():
         return [_repair_file(path)]
-    files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    if not files:
+    found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
+    if not found:
         refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file; give a bag directory or an .mcap file")
     release(path)
     done = []
-    for file in files:
-        if file.stat().st_size == 0 and len(files) > 1:
+    for file in found:
+        if file.stat().st_size == 0 and len(found) > 1:
             file.unlink()  # the recorder was killed as it started a new file
         else:
             done.append(_repair_file(file))
     names = [result.name for result in done]
-    if not all(result.was_whole for result in done) or _listed(path / "metadata.yaml") != names:
+    if not all(result.was_whole for result in done) or not _is_listed(path, names):
         write_metadata(path, _information([path / name for name in names]))
     return done
 
@@ -145,31 +115,28 @@ class _Copy:
 
     def __init__(self, file: McapFile, writer: McapWriter) -> None:
         self._file, self._writer = file, writer
-        self._account = _Account()
-        self._defined: set[tuple[type, int]] = set()
+        self._bytes, self._others = 0, 0  # lost
+        self._holes: list[Hole] = []
+        self._lost: Counter[int] = Counter()  # by channel id
+        self._all_known = True
+        self._last: int | None = None  # log time of what was copied
+        self._defined: list[Schema | Channel] = []
         self._earlier: dict[str, str] = {}  # entries of earlier repairs
 
     def run(self) -> FileLosses:
         """Copy everything; returns what is lost."""
-        file, writer, account = self._file, self._writer, self._account
+        file, writer = self._file, self._writer
         position = 0
         for record in list(file.salvage()):  # all of them first: the definitions at the end may be needed
             if position and record.start > position:
-                account.lose(record.start - position)
+                self._lose(RecordExtent(Opcode.MESSAGE, position, record.start))
             position = max(position, record.end)
             try:
                 self._copy(record)
             except BROKEN:
-                size = record.end - record.start
-                if record.opcode == Opcode.CHUNK:
-                    account.lose(size, self._times_of_lost_chunk(record.end))
-                elif record.opcode == Opcode.MESSAGE:
-                    account.lose(size)
-                else:
-                    account.bytes += size
-                    account.others += 1
+                self._lose(record)
         if file.data_size() > position and not file.is_data_end(position):
-            account.lose(file.data_size() - position)
+            self._lose(RecordExtent(Opcode.MESSAGE, position, file.data_size()))
         writer.flush()
         losses = self._losses()
         number = sum(key.startswith(file.path.name) for key in self._earlier)
@@ -178,41 +145,51 @@ class _Copy:
         writer.finish()
         return losses
 
+    def _lose(self, record: RecordExtent) -> None:
+        """Note what could not be read; of a chunk, its messages as far as the indexes behind it can be read."""
+        size = record.end - record.start
+        self._bytes += size
+        index = self._times_of_lost_chunk(record.end) if record.opcode == Opcode.CHUNK else {}
+        if times := [time for found in index.values() for time in found]:
+            self._holes.append(Hole(min(times), max(times), size))
+            self._lost.update({channel: len(found) for channel, found in index.items()})
+        elif record.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+            self._holes.append(Hole(self._last, None, size))
+            self._all_known = False
+        else:
+            self._others += 1
+
+    def _times_of_lost_chunk(self, position: int) -> dict[int, list[int]]:
+        """Log times of the messages of a chunk by channel id."""
+        found: dict[int, list[int]] = {}
+        with contextlib.suppress(*BROKEN):
+            while (record := self._file.record_at(position)).opcode == Opcode.MESSAGE_INDEX:
+                content = self._file.content(record)
+                channel, _ = _INDEX_HEAD.unpack_from(content)
+                entries = np.frombuffer(content, "<u8", offset=_INDEX_HEAD.size)
+                found[channel] = entries.reshape(-1, 2)[:, 0].tolist()
+                position = record.end
+        return found
+
     def _losses(self) -> FileLosses:
         """The losses by topic; compared with the file's own count of its messages, if there is one."""
-        file, account = self._file, self._account
-        lost, all_known, holes = account.lost, account.all_known, account.holes
+        file, holes, lost = self._file, self._holes, self._lost
         if holes and file.counts is not None:
-            lost, all_known = Counter(file.counts.by_channel) - Counter(self._writer.counts), True
+            lost, self._all_known = Counter(file.counts.by_channel) - Counter(self._writer.counts), True
             holes = holes if lost else []  # only indexes could not be read
         messages: Counter[str] = Counter()
         for number, count in lost.items():
             channel = file.channels.get(number)
             messages[channel.topic if channel else f"channel {number}"] += count
-        return FileLosses(account.bytes, file.has_end(), tuple(holes), dict(messages), all_known, account.others)
-
-    def _times_of_lost_chunk(self, position: int) -> dict[int, list[int]]:
-        """Log times of the messages of a chunk by channel id, as far as the indexes behind it can be read."""
-        found: dict[int, list[int]] = {}
-        try:
-            while True:
-                record = self._file.record_at(position)
-                entries = record.end - record.start - HEAD.size - _INDEX_HEAD.size
-                if record.opcode != Opcode.MESSAGE_INDEX or entries < 0 or entries % 16:
-                    return found
-                content = self._file.content(record)
-                channel, _ = _INDEX_HEAD.unpack_from(content)
-                found[channel] = np.frombuffer(content, "<u8", offset=_INDEX_HEAD.size)[::2].tolist()
-                position = record.end
-        except BROKEN:
-            return found
+        return FileLosses(self._bytes, file.has_end(), tuple(holes), dict(messages), self._all_known, self._others)
 
     def _copy(self, record: RecordExtent) -> None:
         file, writer, opcode = self._file, self._writer, record.opcode
         if opcode == Opcode.CHUNK:
-            self._copy_chunk(record)
+            self._add(file.messages(record))
+            writer.flush()  # a chunk stays one
         elif opcode == Opcode.MESSAGE:
-            self._copy_message(message(file.content(record)))
+            self._add([message(file.content(record))])
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             file.define(opcode, file.content(record))
         elif opcode == Opcode.ATTACHMENT:
@@ -227,51 +204,31 @@ class _Copy:
             writer.flush()
             writer.metadata(metadata.name, metadata.metadata)
 
-    def _copy_chunk(self, record: RecordExtent) -> None:
-        batch = self._file.chunk(record)
-        self._check_defined(batch.found)
-        self._writer.flush()
-        self._define(is_new=False)
-        entries = dict(_entries(batch))
-        self._writer.add_chunk(parsed(Opcode.CHUNK, self._file.content(record)), entries)
-        self._account.copied([int(time) for found in entries.values() for time in (found[::2].min(), found[::2].max())])
-
-    def _copy_message(self, copied: Message) -> None:
-        self._check_defined([copied.channel_id])
-        self._define(is_new=True)
-        self._writer.add(copied.channel_id, copied.log_time, copied.publish_time, copied.sequence, copied.data)
-        self._account.copied([copied.log_time])
-
-    def _define(self, is_new: bool) -> None:
+    def _add(self, messages: Sequence[Message]) -> None:
+        """Write messages; holes that are open end before them."""
         schemas, channels = self._file.schemas, self._file.channels
-        if len(self._defined) == len(schemas) + len(channels):
-            return
-        definitions: list[Schema | Channel] = [*schemas.values(), *channels.values()]
-        for definition in definitions:
-            key = type(definition), definition.id
-            if key not in self._defined:
-                self._writer.define(definition, is_new)
-                self._defined.add(key)
-
-    def _check_defined(self, channels: Collection[int]) -> None:
-        for channel in channels:
-            if channel not in self._file.channels or self._file.channels[channel].schema_id not in self._file.schemas:
-                raise Damage(f"messages are on channel {channel}, which is not defined")
-
-
-def _entries(batch: MessageBatch) -> Iterator[tuple[int, Entries]]:
-    for channel, found in batch.found.items():
-        times = log_times(batch.buffer, found)
-        yield channel, np.column_stack([times, found.offsets]).astype("<u8").ravel()
+        for one in messages:
+            if one.channel_id not in channels or channels[one.channel_id].schema_id not in schemas:
+                raise Damage(f"a message is on channel {one.channel_id}, which is not defined")
+        if len(self._defined) < len(schemas) + len(channels):
+            every: list[Schema | Channel] = [*schemas.values(), *channels.values()]
+            new = [one for one in every if one not in self._defined]
+            for definition in new:
+                self._writer.define(definition)
+            self._defined += new
+        for one in messages:
+            self._writer.add(one.channel_id, one.log_time, one.publish_time, one.sequence, one.data)
+        if times := [one.log_time for one in messages]:
+            self._holes = [hole if hole.end is not None else hole._replace(end=min(times)) for hole in self._holes]
+            self._last = max(times) if self._last is None else max(self._last, *times)
 
 
-def _listed(path: Path) -> list[str]:
-    """Files that a metadata.yaml lists; none if it cannot be read."""
+def _is_listed(path: Path, names: list[str]) -> bool:
+    """Whether the metadata.yaml of a bag lists these files."""
     try:
-        text = path.read_text(encoding="utf-8")
-        return list(safe_yaml.load(text)["rosbag2_bagfile_information"]["relative_file_paths"])
-    except (OSError, yaml.YAMLError, ValueError, LookupError, TypeError):
-        return []
+        return [file.name for file in files(path)] == names
+    except BagError:
+        return False
 
 
 def _information(files: list[Path]) -> dict[str, Any]:

@@ -40,7 +40,6 @@ from wam_bag.bag import (
     read,
 )
 from wam_bag.contents import contents, mode_of
-from wam_bag.cut import Cut, cut
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
 from wam_bag.repair import repair
@@ -252,13 +251,13 @@ def test_point_clouds_of_any_number_of_points_are_one_table(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"row_step": 81}, "row_step 81 and"),
+        ({"row_step": 81}, "row_step 81 does"),
         ({"width": 4}, "1 rows of 4 points"),
         ({"height": 2}, "2 rows of 3 points"),
         ({"point_step": 0}, "point_step 0"),
-        ({"point_step": 30}, "field 'ab' of a point cloud ends at byte 32 of points of 30 bytes"),
-        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 9, 1)]}, "datatype 9; allowed: 1 to 8"),
-        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 8, 1)] * 2}, "two fields of the same name"),
+        ({"point_step": 30}, "point_step 30"),
+        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 9, 1)]}, "x \\[0, 9, 1\\]"),
+        ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("x", 0, 8, 1)] * 2}, "name already used"),
         ({"fields": [STORE.types["sensor_msgs/msg/PointField"]("y", 0, 8, 1)]}, "have the fields x, n, ab and y"),
     ],
 )
@@ -411,7 +410,7 @@ def test_a_small_file_that_decompresses_to_much_is_refused_and_left_as_it_is(tmp
         writer.finish()
     before = path.read_bytes()
     assert len(before) < 100_000
-    for look in (read, raw, lambda path: cut(path, tmp_path / "part", Cut()), repair):
+    for look in (read, raw, repair):
         with (
             limits(MEMORY // 16),
             pytest.raises(BagError, match=r"bag\.mcap .*is to hold \d+ bytes; chunks of at most"),

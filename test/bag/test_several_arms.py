@@ -12,7 +12,6 @@ from sample_messages import STORE, joint_state, status
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents
-from wam_bag.cut import Cut, cut
 from wam_bag.losses import losses
 from wam_cli.main import main
 from wam_description.configuration import SHARED, Configuration, packaged
@@ -136,5 +135,3 @@ def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: 
     lost = losses(both, bag_of_both.metadata, bag_of_both.attachments, bag_of_both.counts)
     assert sorted(lost.dropped) == [f"/{arm}/contact/in_contact from driver" for arm in ("left", "right")]
     assert contents(both).attachments["parameters.yaml"] == len(bag_of_both.attachments["parameters.yaml"])
-    part = cut(both, tmp_path / "part", Cut(0, 10, None))
-    assert read(part).attachments == bag_of_both.attachments

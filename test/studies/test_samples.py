@@ -13,7 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from wam_bag.bag import read
-from wam_bag.cut import CUT
+from wam_bag.losses import CUT
 from wam_cli.main import main
 from wam_description.parameters import ParameterError
 from wam_sim.replay import replay

@@ -10,7 +10,7 @@ bounds          what the evaluations allow
 rows            a result: predicted and measured quantities, curves, tables
 page            the result on a page of the documentation
 claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
-samples         the sample bags and their index
+samples         the sample bags and their index; cutting makes them of recordings
 sweeping        an experiment with many parameter sets
 
 step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wam_bag.bag import BagError
-from wam_bag.cut import CUT
+from wam_bag.losses import CUT
 from wam_description.event import Code
 from wam_description.parameters import ParameterError
 from wam_studies.thesis.definition import Experiment, Run

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, TableColumns, WrenchColumns, read
-from wam_bag.cut import CUT
+from wam_bag.losses import CUT
 from wam_description.arm import Shared
 from wam_sim.recorded_parameters import RecordedParameters
 from wam_sim.recording import recorded_run

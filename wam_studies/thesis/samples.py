@@ -14,8 +14,8 @@ import yaml
 
 from wam_analysis.table import markdown
 from wam_bag.contents import contents
-from wam_bag.cut import Cut, cut
 from wam_description.parameters import require
+from wam_studies.thesis.cutting import Cut, cut
 from wam_studies.thesis.definition import Experiment
 from wam_studies.thesis.evaluation import evaluate_sample
 from wam_studies.thesis.recording import recording
