@@ -10,7 +10,6 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
@@ -35,9 +34,6 @@ COMMANDS = {
     "model": "print the arm as URDF or MJCF, or its scorecard",
 }
 
-# libraries of the system that wheels need and a small container has not, and their packages in Debian
-LIBRARIES = {"libgomp.so.1": "libgomp1"}
-FILES = ("scenario", "task", "json", "directory", "to")  # options that take a file, apart from those of another type
 COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on
 # the extras of setup.py, and the modules that come with them
 EXTRAS = {
@@ -118,30 +114,8 @@ def _ended_by(error: BaseException, command: str, parser: argparse.ArgumentParse
 def _complete() -> None:
     """Answer a shell that asks how a line may go on, and end."""
     import argcomplete
-    from argcomplete.completers import SuppressCompleter
 
-    line = os.environ.get("COMP_LINE", "")
-    parser = _parser(_command(line.split()[1:]))
-    _offer_files(parser)
-    argcomplete.autocomplete(parser, default_completer=SuppressCompleter())
-
-
-def _offer_files(parser: argparse.ArgumentParser) -> None:
-    """Offer files where a file is wanted, and the names of what is installed; nothing for a name or a number."""
-    from argcomplete.completers import FilesCompleter
-
-    from wam_cli.options import OutputFile
-    from wam_description.configuration import packaged_names
-
-    files = FilesCompleter()
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for below in action.choices.values():
-                _offer_files(below)
-        elif action.dest == "config":
-            action.completer = lambda prefix, **_: [*packaged_names(), *files(prefix)]  # type: ignore[attr-defined]
-        elif action.type is Path or isinstance(action.type, OutputFile) or action.dest in FILES:
-            action.completer = files  # type: ignore[attr-defined]
+    argcomplete.autocomplete(_parser(_command(os.environ.get("COMP_LINE", "").split()[1:])))
 
 
 class _Printable:
@@ -177,7 +151,7 @@ def _command(words: list[str]) -> Any:
     except ModuleNotFoundError as error:
         sys.exit(_missing(words[0], error))
     except ImportError as error:
-        sys.exit(_without_library(words[0], error))
+        sys.exit(f"wam {words[0]}: {error}; install what is missing by the package manager of the system")
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:
@@ -189,15 +163,6 @@ def _missing(command: str, error: ModuleNotFoundError) -> int:
     needs = f"it needs '{module}', which is not installed; install it with: pip install 'wam_stack[{extra}]'"
     sys.stderr.write(f"wam {command}: {needs}\n")
     return 1
-
-
-def _without_library(command: str, error: ImportError) -> str:
-    """State which library of the system is missing, as in a container with little in it."""
-    library, _, is_missing = str(error).partition(": cannot open shared object file")
-    if not is_missing:
-        raise error
-    package = LIBRARIES.get(library, "the package of the system that has it")
-    return f"wam {command}: {error}; install it with: apt install {package}"
 
 
 def _version() -> str:

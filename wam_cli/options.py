@@ -97,13 +97,11 @@ class OutputFile:
     kind : what is written, as messages have it.
     suffixes : that it may have, in lower case.
     heading : how those begin that this program wrote; others are not written over.  '' where any may be.
-    advice : what was meant by a YAML file in the place of another kind.
     """
 
     kind: str
     suffixes: tuple[str, ...]
     heading: str = ""
-    advice: str = ""
 
     def __call__(self, text: str) -> Path:
         """The file; the reason where it is refused."""
@@ -115,9 +113,8 @@ class OutputFile:
     def _obstacle(self, file: Path) -> str:
         folder, suffix = file.parent, file.suffix.lower()
         if suffix not in self.suffixes:
-            advice = f"; {self.advice}" * bool(self.advice and suffix in YAML_SUFFIXES)
             allowed = ", ".join(filter(None, self.suffixes))
-            return f"{file} would be {self.kind}; give a file that ends in {allowed}{advice}"
+            return f"{file} would be {self.kind}; give a file that ends in {allowed}"
         why = ""
         if file.is_dir():
             why = "it is a directory"

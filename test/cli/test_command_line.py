@@ -183,7 +183,7 @@ def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     assert "started" not in out
 
 
-def test_a_library_of_the_system_that_is_missing_is_named_with_its_package(
+def test_a_library_of_the_system_that_is_missing_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fail(name: str) -> None:
@@ -193,7 +193,6 @@ def test_a_library_of_the_system_that_is_missing_is_named_with_its_package(
     with pytest.raises(SystemExit) as end:
         main(["demo"])
     assert str(end.value).startswith("wam demo: libgomp.so.1: cannot open shared object file")
-    assert str(end.value).endswith("apt install libgomp1")
     assert not capsys.readouterr().out
 
 
@@ -279,14 +278,7 @@ def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
     assert completed("wam ana", tmp_path) == ["analyse"]
     assert completed("wam demo --no", tmp_path) == ["--no-live"]
     assert {"reset", "resume", "reset_fault"} == set(completed("wam call re", tmp_path))
-
-
-@pytest.mark.slow
-def test_files_are_offered_where_a_file_is_asked_for_and_names_where_a_name_is(tmp_path: Path) -> None:
-    pytest.importorskip("argcomplete")
-    assert set(completed("wam demo --config barrett", tmp_path)) >= {"barrett-wam4", "barrett-wam7"}
     assert f"{ROOT}/README.md" in completed(f"wam live {ROOT}/READ", tmp_path)
-    assert completed(f"wam demo --name {ROOT}/READ", tmp_path) == []
 
 
 def requests_of(parser: argparse.ArgumentParser, *before: str) -> Iterator[tuple[str, ...]]:

@@ -38,7 +38,7 @@ REFUSED = [
     ("evaluate figures --to file", "argument --to: cannot write into file: file is no directory"),
     ("experiment creep --directory file/in", "cannot write into file/in: file is no directory; give another"),
     ("evaluate contact --write none/x.md", "argument --write: cannot write none/x.md: none is no directory"),
-    ("sweep own.yaml --vary arm.payload=0,0.5", "ends in .csv, .tsv, .txt, .dat; give the scenario with --scenario"),
+    ("sweep own.yaml --vary arm.payload=0,0.5", "ends in .csv, .tsv, .txt, .dat"),
     ("analyse bag --json own.yaml", "own.yaml would be JSON; give a file that ends in .json, .txt"),
     ("evaluate soak --write own.yaml", "own.yaml would be a page of the documentation; give a file that"),
     ("experiment creep --write own.yaml", "own.yaml would be a page of the documentation; give a file that"),

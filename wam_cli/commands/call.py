@@ -6,8 +6,7 @@ import math
 import re
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any, Final
 
@@ -18,7 +17,7 @@ from wam_control.task.scenario import Push
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
-from wam_description.signals import NodeStatus, Wrench
+from wam_description.signals import Wrench
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
@@ -164,13 +163,27 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 
 
 def _echo(given: argparse.Namespace, stack: StackClient) -> int:
-    silence = math.inf if given.timeout is None else given.timeout
+    """Print messages; report once that none comes and why, and end after a silence that is too long."""
     stack.follow_statuses()
-    is_published = partial(stack.is_published, given.topic)
-    waiting = Waiting(given.topic, given.count, silence, stack.statuses, is_published)
+    taken, since, is_reported = 0, time.monotonic(), False
+
+    def check() -> None:
+        nonlocal is_reported
+        silent = time.monotonic() - since
+        of = f" of {given.count}" if given.count is not None else ""
+        waits = f"waits for message {taken + 1}{of} of {given.topic}"
+        if given.timeout is not None and silent > given.timeout:
+            raise TimeoutError(f"{waits}; none for {given.timeout:g} s (--timeout){_hint(given.topic, stack)}")
+        if not is_reported and silent > CALL_LIMITS.silence:
+            is_reported = True
+            row = BY_NAME.get(given.topic)
+            seldom = ", which is published only when it changes" * bool(row and row.latched)
+            ends = "Ctrl-C ends, --timeout S after S seconds"
+            print(f"{waits}{seldom}{_hint(given.topic, stack)}; {ends}", file=sys.stderr, flush=True)
+
     try:
-        for message in islice(stack.messages(given.topic, check=waiting.check), given.count):
-            waiting.take()
+        for message in islice(stack.messages(given.topic, check=check), given.count):
+            taken, since, is_reported = taken + 1, time.monotonic(), False
             print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
             sys.stdout.flush()
     except TimeoutError as error:
@@ -179,70 +192,13 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     return 0
 
 
-class Waiting:
-    """Reports once that no message comes, for which one it waits and why none may come, and ends the waiting.
-
-    Parameters
-    ----------
-    topic, count : as given.
-    timeout : s without a message, from now on, after which the waiting ends.
-    statuses : of the nodes by name, kept up to date by somebody else.
-    is_published : whether a node publishes the topic at present.
-
-    Attributes
-    ----------
-    text : what is waited for.
-    """
-
-    def __init__(
-        self,
-        topic: str,
-        count: int | None,
-        timeout: float,
-        statuses: Mapping[str, NodeStatus],
-        is_published: Callable[[], bool],
-    ) -> None:
-        self._topic, self._count, self._timeout, self._statuses = topic, count, timeout, statuses
-        self._is_published = is_published
-        self._taken, self._since, self._is_reported = 0, time.monotonic(), False
-
-    @property
-    def text(self) -> str:
-        """What is waited for."""
-        of = f" of {self._count}" if self._count is not None else ""
-        return f"waits for message {self._taken + 1}{of} of {self._topic}"
-
-    def take(self) -> None:
-        """A message has come."""
-        self._taken, self._since, self._is_reported = self._taken + 1, time.monotonic(), False
-
-    def check(self) -> None:
-        """No message has come in a while.
-
-        Raises
-        ------
-        TimeoutError
-            where none came for as long as was given.
-        """
-        silent = time.monotonic() - self._since
-        if silent > self._timeout:
-            raise TimeoutError(f"{self.text}; none for {self._timeout:g} s (--timeout){self._hint}")
-        if not self._is_reported and silent > CALL_LIMITS.silence:
-            self._is_reported = True
-            row = BY_NAME.get(self._topic)
-            seldom = ", which is published only when it changes" * bool(row and row.latched)
-            ends = "Ctrl-C ends, --timeout S after S seconds"
-            print(f"{self.text}{seldom}{self._hint}; {ends}", file=sys.stderr, flush=True)
-
-    @property
-    def _hint(self) -> str:
-        """Why no message may come, '' where that is not known."""
-        driver = self._statuses.get("driver")
-        if driver is None:
-            return f"; no driver was found: {START}"
-        if PAUSED in driver.facts:
-            return "; the arm is paused, and continues after 'wam call resume'"
-        return "" if self._is_published() else "; no node publishes it now"
+def _hint(topic: str, stack: StackClient) -> str:
+    """Why no message of a topic may come, '' where that is not known."""
+    if "driver" not in stack.statuses:
+        return f"; no driver was found: {START}"
+    if PAUSED in stack.statuses["driver"].facts:
+        return "; the arm is paused, and continues after 'wam call resume'"
+    return "" if stack.is_published(topic) else "; no node publishes it now"
 
 
 def _push(given: argparse.Namespace, stack: StackClient) -> int:

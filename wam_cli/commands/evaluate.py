@@ -25,10 +25,6 @@ from wam_description.configuration import option_values
 from wam_studies.harness import STUDIES, Measurement, Study, chosen_cases, evaluate, load
 from wam_studies.page import block, report, with_section
 
-OTHERS = {
-    "figures": (figures, "draw the figures of chapters 3 to 6 with the simulated plant"),
-}
-
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
@@ -36,13 +32,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name in STUDIES:
         kind = load(name)
         study_arguments(parts.add_parser(name, help=kind.title), name, kind)
-    for name, (module, text) in OTHERS.items():
-        module.arguments(parts.add_parser(name, help=text))
+    figures.arguments(parts.add_parser("figures", help="draw the figures of chapters 3 to 6 with the simulated plant"))
 
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate; 1 if a required value is missed."""
-    return run_study(given) if given.part in STUDIES else OTHERS[given.part][0].run(given)
+    return run_study(given) if given.part in STUDIES else figures.run(given)
 
 
 def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study[Any, Any]]) -> None:

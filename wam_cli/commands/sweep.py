@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +36,12 @@ from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_studies.thesis import definition, sweeping
 
 SCENARIO = "demo_scenario"
-SWEPT = replace(TABLE, advice="give the scenario with --scenario")
 ENDS = r"[-+.\de]+"  # a number, or what may be meant as one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("file", type=SWEPT, help="table to write, for example sweep.csv")
+    parser.add_argument("file", type=TABLE, help="table to write, for example sweep.csv")
     take_configuration(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
