@@ -175,6 +175,14 @@ def test_torques_that_change_after_the_force_has_settled_are_reported_with_as_mu
     assert pressed.last(0.2) == []
 
 
+def test_torques_that_change_with_the_pose_alone_are_those_of_the_force() -> None:
+    pressed = Pressed()
+    assert pressed.last(1.0) == []
+    pressed.axis = axis_at(POSES[1], FORCE)
+    assert pressed.axis.sensed is not None
+    assert pressed.last(1.0, torques=-FORCE * pressed.axis.sensed.press) == []
+
+
 @pytest.mark.parametrize(("axis", "chi2", "holds"), [(AXIS, 20.0, True), (AXIS, 1.0, False), (UNPINNED, 1.0, True)])
 def test_another_link_that_is_touched_ends_the_force_until_the_command_ends(
     axis: CommandedAxis, chi2: float, holds: bool

@@ -154,7 +154,7 @@ class ForceWatch:
         self._off, self._strange, self._doubt, self._other, self._changed, self._right = (Lasting() for _ in range(6))
         self._is_refused, self._is_decided, self._has_settled = True, False, False
         self._desired, self._travel = math.nan, 0.0
-        self._pattern: Array | None = None  # m, torques per force as it has settled
+        self._pattern: Array | None = None  # m, torques per force that it did not explain as it settled
 
     def step(self, axis: CommandedAxis, seen: Seen, torques: Array, own: ForceLoopParameters, dt: float) -> list[Event]:
         """The events of one period.
@@ -171,6 +171,7 @@ class ForceWatch:
         error = desired - known.force
         if not abs(desired - self._desired) <= FORCE.faint_swing * known.tolerance:  # the force turns with its command
             self._has_settled, self._pattern, self._desired = False, None, desired
+            self._changed = Lasting()
             self.oscillation.rest()
         events = self._decide(axis, known, error, own, dt)
         if self._is_refused:
@@ -249,7 +250,7 @@ class ForceWatch:
         if self._strange.step(is_strange, lasting, lasting, dt):
             return [warning(Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=FORCE.unexplained)]
         if self._right.step(is_reached, FORCE.quarter * lasting, dt, dt) and self._pattern is None:
-            self._pattern = torques / known.force
+            self._pattern = torques / known.force + axis.sensed.press
         if not self.touch.is_there or self._pattern is None:
             return []
         change = axis.sensed.changed(torques - known.force * self._pattern)
