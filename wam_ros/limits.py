@@ -44,6 +44,8 @@ class ProcessLimits:
     recorder_end: float = 30.0  # s without any sign of work, before a recorder that does not end is killed
     recorder_reports: float = 2.0  # s between two lines about a recorder that is still writing
     processors: int = 3  # processors, of which the driver may have one to itself in realtime
+    load_look: float = 0.05  # s, in which the idlest processor is found
+    load_steps: int = 10  # of load; within one of them it is chance which processor is the idlest
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,10 @@ def test_what_concerns_one_process_or_changes_while_nodes_run_may_differ() -> No
         assert disagreement("gravity", OWN, started_with({name: value})) == "", name
 
 
+def test_zero_is_zero_whatever_its_sign() -> None:
+    assert disagreement("gravity", started_with({"arm.payload": 0.0}), started_with({"arm.payload": -0.0})) == ""
+
+
 def test_every_other_shared_parameter_is_compared() -> None:
     compared = [field.name for field in fields(Shared) if field.name not in {*OF_ONE_PROCESS, *values(SERVO, "servo.")}]
     assert len(OWN) == 3 * (1 + len(compared))
@@ -72,6 +76,10 @@ def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> 
     assert disagreement("gravity", OWN, text) == (
         "gravity was started with another version of wam_stack than the driver; start all nodes with the same version"
     )
+
+
+def test_a_node_without_digests_is_not_compared() -> None:
+    assert disagreement("gravity", OWN, "") == ""
 
 
 def test_live_values_in_a_status_are_read_bit_for_bit() -> None:
@@ -180,6 +188,14 @@ def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_th
     stack.set("velocity_loop", servo__proportional_gain=SOFT)
     ros.wait(lambda: stack.driver.safety.mode is Mode.FAULT, what="a fault")
     assert stack.fault.startswith("force_loop: velocity_loop uses servo.* that are not accepted here: ")
+
+
+def test_a_follower_tries_the_gains_again_when_its_own_parameters_change(ros: Network, tmp_path: Path) -> None:
+    stack = Apart(ros, tmp_path, {"velocity_loop": {"servo__proportional_gain": SOFT}})
+    ros.wait(stack.problem, what="gains that are not accepted")
+    stack.set("force_loop", guard__mode="warn")
+    assert stack.force_servo().proportional_gain == tuple(SOFT)
+    assert stack.problem() == ""
 
 
 def test_a_follower_that_is_started_again_takes_the_live_gains(ros: Network, tmp_path: Path) -> None:

@@ -178,6 +178,15 @@ def strict(ros: Any, tmp_path: Path) -> Hand:
     return Hand(ros, tmp_path, "realtime", **{"driver:late_periods": 0.05})
 
 
+def test_driver_starts_braked_and_lets_no_current_through(hand: Hand) -> None:
+    before = hand.driver.plant.theta
+    hand.currents = [2.0] * 4
+    hand.wait_periods(100)
+    assert hand.driver.safety.mode is Mode.BRAKED
+    assert hand.driver.currents == [0.0] * 4
+    assert hand.driver.plant.theta == pytest.approx(before, abs=1e-6)
+
+
 def test_enable_lets_currents_flow_and_disable_stops_them(hand: Hand) -> None:
     hand.enable()
     assert hand.driver.safety.mode is Mode.ENABLED
@@ -272,6 +281,18 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
     live.enable()
 
 
+def test_a_command_of_the_second_publisher_never_reaches_the_motors(live: Hand) -> None:
+    live.enable()
+    other = live.ros.node("intruder")
+    second = other.create_publisher(JointState, "motor_current_command", qos(BY_NAME["motor_current_command"]))
+    live.ros.wait(lambda: second.get_subscription_count() and live.driver.safety.mode is Mode.FAULT)
+    for _ in range(20):
+        second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
+    live.wait_periods(20)
+    assert all(max(map(abs, sample.actual)) < 2.0 for sample in live.driver.recent)
+    assert live.driver.currents == [0.0] * 4
+
+
 def test_enable_with_a_latched_fault_is_refused_until_it_is_reset(hand: Hand) -> None:
     hand.enable()
     answer = hand.ask("estop")
@@ -321,6 +342,17 @@ def test_where_many_periods_are_late_a_fault_names_the_computer(is_reported: boo
     assert is_reported or "; check that velocity_loop runs; " in strict.driver.safety.fault
 
 
+def test_where_many_periods_are_late_the_brakes_stay_on(strict: Hand) -> None:
+    strict.ros.wait(lambda: strict.node.health.is_ready, what="a driver that is connected")
+    for _ in range(200):
+        strict._clock.advance()
+        strict.wait_periods(2)
+    answer = strict.ask("enable", True)
+    assert not answer.success
+    assert "% of the newest periods were late, allowed 5 %: this computer is too" in answer.message
+    assert strict.driver.safety.mode is Mode.BRAKED
+
+
 def test_in_realtime_the_driver_is_connected_when_its_computer_has_kept_the_periods(strict: Hand) -> None:
     connected: list[int] = []
 
@@ -331,6 +363,24 @@ def test_in_realtime_the_driver_is_connected_when_its_computer_has_kept_the_peri
     strict.node.create_timer(0.001, note)
     strict.ros.wait(lambda: connected, what="a driver that is connected")
     assert connected[0] >= 1000 * MS
+
+
+def test_a_command_that_answers_an_old_state_again_and_again_is_stale_too(live: Hand) -> None:
+    live.enable()
+    live.stamp = repeated = live.last
+    live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="the watchdog")
+    live.wait_periods(20)
+    assert last_flow_after(live, repeated) <= 50 * MS
+    assert "command stale" in live.driver.safety.fault
+
+
+def test_what_was_commanded_before_enable_is_discarded(live: Hand) -> None:
+    live.currents = [2.0] * 4
+    live.wait_periods(20)
+    live.is_answering = False
+    assert live.ask("enable", True).success
+    live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="the watchdog")
+    assert not any(any(sample.actual) for sample in live.driver.recent)
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])

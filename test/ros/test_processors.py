@@ -15,11 +15,40 @@ from wam_ros import processors
 from wam_ros.bring_up import Processes
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.priority import fifo_is_granted
-from wam_ros.processors import PROCESSORS, keep_to_processors, placed_groups
+from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors, placed_groups
 from wam_ros.run import PARENT
 
 OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
+
+
+def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest() -> None:
+    assert divided({0: 0.1, 3: 0.9, 5: 0.4}) == ({3}, {0, 5})
+
+
+def test_where_only_one_is_permitted_all_have_it() -> None:
+    assert divided({2: 0.0}) == ({2}, {2})
+
+
+def test_among_processors_that_are_idle_alike_two_arms_choose_by_chance() -> None:
+    chosen = {next(iter(divided({0: 1.0, 1: 0.99, 2: 0.5})[0])) for _ in range(100)}
+    assert chosen == {0, 1}
+
+
+def test_every_permitted_processor_is_looked_at() -> None:
+    permitted = os.sched_getaffinity(0)
+    parts = idle_parts(permitted)
+    assert set(parts) == permitted
+    assert all(0.0 <= part <= 1.0 for part in parts.values())
+
+
+def test_a_system_that_shows_no_times_has_no_idle_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    permitted = os.sched_getaffinity(0)
+    for file, text in (("none", None), ("another", "cpu 1 2\ncpu9999 1 2 3 4 5\nintr 5 4\n\n")):
+        if text is not None:
+            (tmp_path / file).write_text(text)
+        monkeypatch.setattr(processors, "TIMES", tmp_path / file)
+        assert idle_parts(permitted) == dict.fromkeys(permitted, 0.0)
 
 
 @pytest.mark.parametrize("given", ["", "x", "-1", "99999999999", "9999"])
@@ -29,6 +58,7 @@ def test_processors_that_do_not_exist_are_none(given: str) -> None:
     keep_to_processors(environment)
     assert environment == {}
     assert os.sched_getaffinity(0) == permitted
+    assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
 def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
@@ -42,6 +72,24 @@ def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
     }
 
 
+def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> None:
+    permitted = os.sched_getaffinity(0)
+    configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": ENTRIES})
+    with Processes(configuration) as processes:
+        end = time.monotonic() + LONG
+        while {policy for threads in placed(processes).values() for policy, _ in threads} != {os.SCHED_BATCH}:
+            assert time.monotonic() < end, "threads keep another policy"
+            time.sleep(0.02)
+        found = placed(processes)
+    driver, velocity_loop, contact_estimator = ({where for _, where in found[name]} for name in ENTRIES)
+    assert driver == velocity_loop
+    (inner,) = driver
+    assert len(inner) == 1
+    assert contact_estimator == {frozenset(permitted - inner or permitted)}
+    assert os.sched_getaffinity(0) == permitted
+    assert os.sched_getscheduler(0) != os.SCHED_BATCH
+
+
 REALTIME = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES})
 
 
@@ -50,15 +98,12 @@ def places(
     permitted: set[int],
     granted: bool = True,
     how: str = EACH,
-    mode: str = "realtime",
+    configured: Configuration = REALTIME,
 ) -> dict[str, str]:
     """Processors of each process, where the system permits these, and grants SCHED_FIFO or not."""
     monkeypatch.setattr(processors.os, "sched_getaffinity", lambda _: permitted)
     monkeypatch.setattr(processors, "fifo_is_granted", lambda fifo: granted and fifo > 0)
-    return {
-        " ".join(group): place.get(PROCESSORS, "")
-        for group, place in placed_groups(REALTIME.with_values({"timing.mode": mode}).shared, how)
-    }
+    return {" ".join(group): place.get(PROCESSORS, "") for group, place in placed_groups(configured.shared, how)}
 
 
 @pytest.mark.parametrize(("how", "count"), [(EACH, 2), (GROUPED, 1)])
@@ -70,14 +115,24 @@ def test_in_realtime_the_driver_s_process_has_a_processor_and_all_others_the_res
     assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * count
 
 
-@pytest.mark.parametrize(
-    ("permitted", "granted", "mode"),
-    [({0, 1, 2, 3}, False, "realtime"), ({0, 1}, True, "realtime"), ({0, 1, 2}, True, "lockstep")],
-)
-def test_without_priority_or_a_third_processor_or_in_lockstep_they_may_be_anywhere(
-    permitted: set[int], granted: bool, mode: str, monkeypatch: pytest.MonkeyPatch
+def test_in_lockstep_what_exchanges_most_messages_shares_the_driver_s_processor(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert set(places(monkeypatch, permitted, granted, mode=mode).values()) == {""}
+    entries = ["driver", "transform", "velocity_loop", "gravity", "force_loop", "recorder"]
+    configured = REALTIME.with_values({"timing.mode": "lockstep", "nodes": entries})
+    of = places(monkeypatch, {0, 1}, how=EACH, configured=configured)
+    assert len({of[name] for name in ("driver", "transform", "velocity_loop", "gravity")}) == 1
+    assert len({of["force_loop"], of["recorder"], of["driver"]}) == 2
+    inner, *others = places(monkeypatch, {0, 1}, how=GROUPED, configured=configured).values()
+    assert others == [others[0]] * 2
+    assert {inner, others[0]} == {"0 batch", "1 batch"}
+
+
+@pytest.mark.parametrize(("permitted", "granted"), [({0, 1, 2, 3}, False), ({0, 1}, True)])
+def test_without_priority_or_a_third_processor_they_may_be_anywhere(
+    permitted: set[int], granted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert set(places(monkeypatch, permitted, granted).values()) == {""}
 
 
 def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_id: int) -> None:
@@ -98,7 +153,8 @@ def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_i
         (alone,) = driver
         assert len(alone) == 1
         assert others == [{permitted - alone}] * 2
-    assert os.sched_getscheduler(0) != os.SCHED_FIFO, "to look does not change it"
+    assert os.SCHED_BATCH not in {policy for of in found.values() for policy, _ in of}
+    assert os.sched_getscheduler(0) not in {os.SCHED_FIFO, os.SCHED_BATCH}, "to look does not change it"
 
 
 def priority(process: int) -> tuple[int, int]:

@@ -22,8 +22,11 @@ from geometry_msgs.msg import WrenchStamped
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
@@ -43,6 +46,7 @@ from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
+from wam_ros.testing import Network, RunningArm
 from wam_ros.topics import header, qos
 
 CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
@@ -205,7 +209,11 @@ def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any
     assert message.data == "<robot/>"
 
 
-def test_what_has_arrived_when_it_is_stopped_is_recorded(ros: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_single_threaded", [True, False])
+def test_what_has_arrived_when_it_is_stopped_is_recorded(is_single_threaded: bool, ros: Any, tmp_path: Path) -> None:
+    if is_single_threaded:
+        ros.executor.shutdown()
+        ros.executor = SingleThreadedExecutor(context=ros.context)
     node = recorder(ros, tmp_path)
     sending(ros, 200)
     ros.remove(node)
@@ -410,6 +418,13 @@ def test_a_recorder_to_which_nothing_came_ends_with_the_reason(ros: Any, tmp_pat
     )
 
 
+def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) -> None:
+    ros.remove(recorder(ros, tmp_path, name=""))
+    (path,) = tmp_path.glob("wam_2*")
+    assert (path / f"{path.name}_0.mcap").is_file()
+    assert (path / "metadata.yaml").is_file()
+
+
 @pytest.mark.parametrize(
     ("numbers", "received", "dropped", "missed"),
     [
@@ -441,6 +456,24 @@ def test_a_gap_where_there_is_another_publisher_is_no_drop() -> None:
     for number in (14, 16):
         numbering.add(number)
     assert (numbering.received, numbering.dropped, numbering.missed) == (8, 2 + 2 + 1, 8)
+
+
+def test_what_a_restarted_node_published_before_it_was_connected_is_not_lost(ros: Any, tmp_path: Path) -> None:
+    node = by_hand(ros, tmp_path, mode="lockstep")
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    gravity = diagnostic_status(NodeStatus(Level.OK, "ready", "gravity"), "wam")
+    for life, sent in ((1, 4), (2, 8)):
+        with contextlib.closing(Network(ros.domain_id)) as another_process:
+            status = publisher(another_process.node("gravity"), "status")
+            for _ in range(sent):
+                status.publish(gravity)  # the newest alone is kept for a recorder that does not know this publisher yet
+            ros.wait(matched(status), what="a connection")
+            ros.wait(lambda status=status: status.wait_for_all_acked(Duration()), what="the newest status")
+            states.publish(state(life, 0.0))
+            ros.wait(lambda life=life: received(node, "/wam/motor_states") == life, what="what came before this state")
+    (found,) = (count for count in node.recorder.counts() if count.topic == "/wam/status")
+    assert (found.received + found.missed, found.dropped) == (4 + 8, 0)
 
 
 def diagnostics(name: str, stamp: int) -> bytes:
@@ -597,6 +630,10 @@ def test_losses_are_those_of_each_life_of_a_node(
     assert (found.dropped, found.missed, found.lacking()) == (dropped, missed, lacking)
 
 
+def test_a_gap_of_a_second_life_is_not_closed_by_numbers_of_the_first() -> None:
+    assert lives((ALL, 100), ([*range(1, 11), *range(102, 151)], 150)).dropped == 91
+
+
 def test_what_was_sent_before_the_recorder_started_is_not_lost_at_the_end(tmp_path: Path) -> None:
     """The stack runs on while the recorder stops: the last total is older than the last messages."""
     name = "/wam/motor_states"
@@ -678,6 +715,29 @@ def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: P
     assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
 
 
+def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, monkeypatch: pytest.MonkeyPatch) -> None:
+    published: Counter[str] = Counter()
+    publish = Publisher.publish
+
+    def counting(self: Any, message: Any) -> None:
+        published[self.topic_name] += 1
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, "publish", counting)
+    bag = arm.play([{"name": "speak", "seconds": 0.3}])
+    recorded = {name: topic.messages for name, topic in contents(bag.path).topics.items()}
+    assert published["/wam/motor_states"] == 301
+    assert {name: published[name] for name in recorded} == recorded
+
+
+def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
+    found = machine(tmp_path, "/wam/motor_states", "/wam/sim/disturbance")
+    found.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
+    found.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
+    found.finish()
+    assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
+
+
 @pytest.mark.parametrize(("number", "begin"), [(1, 0), (6001, 6_000_000_000)])
 def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
     number: int, begin: int, tmp_path: Path
@@ -697,9 +757,10 @@ def test_a_recording_in_lockstep_that_begins_late_has_no_time_from_before_it(
     assert contents(tmp_path / "bag").first == begin
 
 
-def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
-    found = machine(tmp_path, "/wam/motor_states", "/wam/sim/disturbance")
-    found.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
-    found.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
+def test_a_run_without_a_stamp_is_recorded_at_its_start(tmp_path: Path) -> None:
+    found = machine(tmp_path, "/wam/status", "/wam/motor_states")
+    for number in range(1, 2001):  # the arm is paused
+        found.receive("/wam/status", serialize_message(DiagnosticStatus(name="gravity")), 1, 1, number)
     found.finish()
-    assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
+    assert set(read(tmp_path / "bag").topics["/wam/status"].log_time_ns.tolist()) == {0}
+    assert contents(tmp_path / "bag").topics["/wam/status"].messages == 2000
