@@ -250,7 +250,7 @@ class ForceWatch:
         if self._strange.step(is_strange, lasting, lasting, dt):
             return [warning(Code.UNEXPLAINED, "torques_differ", **where, chi2=known.chi2, allowed=FORCE.unexplained)]
         if self._right.step(is_reached, FORCE.quarter * lasting, dt, dt) and self._pattern is None:
-            # with the pose the torques of the force change, too; an estimated place moves with what else pushes
+            # with the pose the torques of the force change, too; what is estimated moves with whatever else pushes
             self._pattern = torques / known.force + axis.sensed.press * axis.place.is_pinned
         if not self.touch.is_there or self._pattern is None:
             return []
