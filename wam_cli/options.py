@@ -160,8 +160,8 @@ def take_configuration(parser: argparse.ArgumentParser, default: str | None = BA
 def configuration_of(given: argparse.Namespace) -> Configuration:
     """The configuration that --config names, with the values of --set; prints what a file of your own changes."""
     file = configuration_file(given)
-    print(*(f"{line}\n" for line in differences(file)), sep="", end="", file=sys.stderr, flush=True)
     loaded = Configuration.load(file)
+    print(*(f"{line}\n" for line in differences(file, loaded)), sep="", end="", file=sys.stderr, flush=True)
     return loaded.with_values(option_values(given.values)) if given.values else loaded
 
 

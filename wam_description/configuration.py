@@ -234,23 +234,17 @@ def files_of(path: str | Path) -> list[Path]:
     return found
 
 
-def differences(path: str | Path) -> list[str]:
+def differences(path: Path, loaded: Configuration) -> list[str]:
     """What a file of your own changes in the packaged configuration that it is based on, as lines for people.
 
     Parameters
     ----------
     path : of the configuration; of a packaged one, or one without a base, there are no lines.
-
-    Raises
-    ------
-    ParameterError
-        as `Configuration.load`.
+    loaded : from it.
     """
-    files = files_of(path)
-    first, last = files[0], files[-1]
-    if first is last or first.resolve().parent in _present_folders():
+    if path.resolve().parent in _present_folders() or (last := files_of(path)[-1]) == path:
         return []
-    own, base = Configuration.load(first).sections, Configuration.load(last).sections
+    own, base = loaded.sections, Configuration.load(last).sections
     changed = {
         key if section == SHARED else f"{section}:{key}": (base.get(section, {}).get(key), value)
         for section, flat in own.items()
@@ -262,7 +256,7 @@ def differences(path: str | Path) -> list[str]:
     lengths = [name for name in LENGTHS if name in changed]
     is_open = lengths and not any(name in changed for name in MASSES)
     question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
-    return [f"{first} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_open else [])]
+    return [f"{path} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_open else [])]
 
 
 def _changes(name: str, old: Any, new: Any) -> list[str]:
