@@ -72,7 +72,7 @@ def test_the_demonstration_without_ros_says_so_and_reports(played: tuple[Path, s
     assert out.count("ROS is not installed") == 1
     assert "pip install 'wam_stack[ros,live]'" in out
     assert "right link: YES" in out
-    assert out.index("Result") < out.index("Estimated contacts")
+    assert out.index("Verdict") < out.index("right link: YES") < out.index("position along the link")
 
 
 @pytest.mark.slow
