@@ -34,6 +34,12 @@ def message(frame: Frame) -> can.Message:
     return can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
 
 
+def drain(bus: can.BusABC) -> None:
+    """Drop what a bus has received."""
+    while bus.recv(0.0):
+        pass
+
+
 def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
     """Processor time of a cycle of four controllers, us, and of the bare loop; their answers are sent before."""
     host, arm = (can.Bus(interface=interface, channel=channel) for _ in range(2))
@@ -62,7 +68,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
         driver.exchange()
     clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
-    line = CanLine(host, lambda: at[0], time.sleep, 64 * (interface == "udp_multicast"))
+    line = CanLine(host, lambda: at[0], time.sleep, interface == "udp_multicast")
     own = driver._host
     own.line, own.receive, own.now = line, line.receive, line.now
 
@@ -83,8 +89,8 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
                 begin = time.thread_time_ns()
                 loop(tick)
                 times[-1] += time.thread_time_ns() - begin
-                while arm.recv(0.0) or (loop is bare and host.recv(0.0)):
-                    pass
+                drain(arm)
+            drain(host if loop is bare else arm)  # of the echo of the last torques
     if driver.fault:
         raise SystemExit(driver.fault)
     host.shutdown()

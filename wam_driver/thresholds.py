@@ -66,7 +66,6 @@ class BusThresholds:
     poll: float = 0.02  # s, between two questions for the modes of safety module and controllers
     collect: float = 0.6  # of a period, in which the positions have to come
     most_frames: int = 40  # taken in one period: one of 2 ms has no more
-    echoes: int = 64  # newest own frames that are dropped where a bus gives them back
     stray: int = 3  # frames that none of ours sends, before there is a fault: one may be left over in a queue
     jump: float = 0.25  # turn of a motor within `silent`, 157 rad/s, above which a position is dropped
     gain_ratio: float = (

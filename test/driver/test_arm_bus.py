@@ -39,9 +39,8 @@ class Served(CanLine):
 
     def __init__(self, bus: SimulatedBus, interface: str, channel: str) -> None:
         own, other = (can.Bus(interface=interface, channel=channel) for _ in range(2))
-        echoes = 64 * (interface == "udp_multicast")
-        super().__init__(own, bus.now, bus.sleep, echoes)
-        self._arm = ServedArm(CanLine(other, lambda: 0.0, bus.sleep, echoes), bus)
+        super().__init__(own, bus.now, bus.sleep, has_echo=interface == "udp_multicast")
+        self._arm = ServedArm(CanLine(other, lambda: 0.0, bus.sleep), bus)
         self.let_pass, self._end = bus.let_pass, other
 
     def send(self, frame: Frame) -> bool:
@@ -148,8 +147,9 @@ def test_velocities_are_those_of_the_motors() -> None:
 
 
 def test_a_late_period_is_no_jump_of_a_motor_that_moves() -> None:
-    track = MotorTrack(4096)
-    assert [track.take(count, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))] == [True, True, False]
+    track = MotorTrack(1, 4096)
+    answers = [(frames.position(1, count).data, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))]
+    assert [track.take(answer, time) for answer, time in answers] == [True, True, False]
     assert track.velocity == pytest.approx(math.tau * 1400 / 4096 / 0.1)
 
 
@@ -240,8 +240,8 @@ def doubled(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
 def jumping(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
     def pass_on(frame: Frame) -> list[Frame]:
         found = frames.read(frame)
-        if isinstance(found, frames.Position) and found.node == chosen:
-            return [frames.position(chosen, found.counts + 5000)]
+        if found and found.number is None and found.node == chosen:
+            return [frames.position(chosen, found.value + 5000)]
         return [frame]
 
     return pass_on

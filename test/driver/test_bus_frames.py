@@ -5,7 +5,7 @@ import random
 import pytest
 
 from wam_driver.bus import frames, properties
-from wam_driver.bus.frames import Bit, Frame, Position, Value
+from wam_driver.bus.frames import Bit, Frame, Value
 from wam_driver.bus.safety_module import WATCHED, Button, Pendant
 
 COUNT = 100_000
@@ -45,7 +45,7 @@ def test_every_frame_is_read_by_the_independent_decoder() -> None:
         differing += [shown[:2], number(shown[2:])] != ["00", motor]
         differing += frames.read_torques(packed) != counts
         with_joint = Frame(place.identifier, place.data + draw.randbytes(3))
-        differing += [frames.read(one) for one in (place, with_joint)] != [Position(node, motor)] * 2
+        differing += [frames.read(one) for one in (place, with_joint)] != [Value(node, None, motor)] * 2
         differing += frames.read(frames.reply(node, prop, value)) != Value(node, prop, value)
     assert differing == 0
 

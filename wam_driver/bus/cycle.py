@@ -1,11 +1,11 @@
 """What is sent and taken in each period once the arm is started."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from wam_driver.bus import frames
 from wam_driver.bus.bus_fault import BusFault, Trouble
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame, Value
+from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
 from wam_driver.bus.host import Host
 from wam_driver.bus.motor_track import MotorTrack
 from wam_driver.bus.safety_module import Pendant, SafetyMode
@@ -33,12 +33,13 @@ class Cycle:
 
     def __init__(self, host: Host, settings: Settings, torque_constant: Sequence[float], period: float) -> None:
         self._host, self._limit, self._period = host, settings.limit, period
+        self._patience = BUS.collect * period
         self._gain = [gain * k for gain, k in zip(settings.gain, torque_constant, strict=True)]  # counts/A
-        self.motors = [MotorTrack(counts) for counts in settings.counts]
+        self.motors = [MotorTrack(node, turn) for node, turn in enumerate(settings.counts, 1)]
         self.safety_mode = SafetyMode.IDLE
         self.trouble: Trouble | None = None
         self._strays: Counter[BusFault] = Counter()
-        self._awaited: set[int] = set()  # motors whose position has not come in this period
+        self._by_answer = {frames.position(motor.node, 0).identifier: motor for motor in self.motors}
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
         self._torque, self._mode = host.number(1, "T"), host.number(1, "MODE")
         self._requests = [  # the pendant first: it states why the mode changes
@@ -78,14 +79,18 @@ class Cycle:
         if host.now() >= self._poll_at:
             self._poll()
         host.send(self._requests[-1])
-        requested, patience = host.now(), BUS.collect * self._period
-        self._awaited = set(range(1, len(self.motors) + 1))
+        requested, awaited = host.now(), self._by_answer.copy()
         for _ in range(BUS.most_frames):
-            if not self._awaited or (frame := host.receive(patience)) is None:
+            if not awaited or (frame := host.receive(self._patience)) is None:
                 break
-            self._take(frame, requested)
-        if self._awaited:
-            self._judge()
+            identifier, data = frame
+            motor = awaited.pop(identifier, None)
+            if motor is None:
+                self._take(frame)
+            elif not motor.take(data, requested):
+                awaited[identifier] = motor
+        if awaited:
+            self._judge(awaited.values())
 
     def _poll(self) -> None:
         """Ask for the modes; that there was no answer to the last requests is a fault."""
@@ -96,7 +101,7 @@ class Cycle:
         for request in self._requests[:-1]:
             self._host.send(request)
 
-    def _take(self, frame: Frame, requested: float) -> None:
+    def _take(self, frame: Frame) -> None:
         found = frames.read(frame)
         if found is None:
             self._host.counts["other frames"] += 1
@@ -104,19 +109,16 @@ class Cycle:
                 self._stray(BusFault.FOREIGN)
         elif found.node == BusNode.SAFETY_MODULE:
             self._is_answered = True
-            if found[1] != self._mode:
-                self._pendant = found[-1]
-            elif 0 <= found[-1] <= SafetyMode.ACTIVE:
-                self._take_safety_mode(SafetyMode(found[-1]))
+            if found.number != self._mode:
+                self._pendant = found.value
+            elif 0 <= found.value <= SafetyMode.ACTIVE:
+                self._take_safety_mode(SafetyMode(found.value))
         elif found.node > len(self.motors):
             self._host.counts["other frames"] += 1
-        elif isinstance(found, Value):
-            if found.number == self._mode:
-                self._take_mode(found.node, found.value)
-        elif found.node not in self._awaited:
+        elif found.number is None:
             self._stray(BusFault.DOUBLED, found.node)
-        elif self.motors[found.node - 1].take(found.counts, requested):
-            self._awaited.remove(found.node)
+        elif found.number == self._mode:
+            self._take_mode(found.node, found.value)
 
     def _take_safety_mode(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
@@ -129,12 +131,12 @@ class Cycle:
         elif not self.is_released and mode != BUS.idle_mode:  # as after Shift-Activate
             self.set_released(False)
 
-    def _judge(self) -> None:
+    def _judge(self, awaited: Collection[MotorTrack]) -> None:
         """Look for motors whose positions have not come for too long."""
-        self._host.counts["lost replies"] += len(self._awaited)
-        for node in self._awaited:
-            self.motors[node - 1].missed += 1
-        silent = [node for node in self._awaited if self.motors[node - 1].missed * self._period >= BUS.silent]
+        self._host.counts["lost replies"] += len(awaited)
+        for motor in awaited:
+            motor.missed += 1
+        silent = [motor for motor in awaited if motor.missed * self._period >= BUS.silent]
         if not silent or self.trouble:
             return
         if self._host.refused:
@@ -145,11 +147,11 @@ class Cycle:
                 self._fault(BusFault.NO_POWER)
             else:
                 self._fault(BusFault.ESTOP if mode == SafetyMode.ESTOP else BusFault.ALL_SILENT)
-        elif self.motors[silent[0] - 1].has_jumped:
-            self._fault(BusFault.JUMP, silent[0])
+        elif silent[0].has_jumped:
+            self._fault(BusFault.JUMP, silent[0].node)
         else:
-            is_reset = self._host.ask(silent[0], "STAT", 1) == 0
-            self._fault(BusFault.RESET if is_reset else BusFault.NO_REPLY, silent[0])
+            is_reset = self._host.ask(silent[0].node, "STAT", 1) == 0
+            self._fault(BusFault.RESET if is_reset else BusFault.NO_REPLY, silent[0].node)
 
     def _stray(self, fault: BusFault, node: int = 0) -> None:
         """Count a frame that nobody may send; more than some are a fault."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from wam_description.arm import Shared
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.frames import Bit, BusNode, Frame, Position, Value
+from wam_driver.bus.frames import Bit, BusNode, Frame
 from wam_driver.bus.host import Host
 from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import Line
@@ -73,9 +73,9 @@ def in_words(frame: Frame, version: int) -> str:
     """A frame: who sends it to whom, and what; the names of properties are those of a version of the firmware."""
     start = f"{frame.identifier:03x} {frame.data.hex(' '):24}{_node(frame.sender)}"
     found = frames.read(frame)
-    if isinstance(found, Position):
-        return f"{start} is at {found.counts} counts"
-    if isinstance(found, Value):
+    if found and found.number is None:
+        return f"{start} is at {found.value} counts"
+    if found and found.number is not None:
         return f"{start} has {_name(found.number, version, found.node)} = {found.value}"
     if not frame.data:
         return f"{start}: no data"

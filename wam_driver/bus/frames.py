@@ -60,18 +60,11 @@ class Frame(NamedTuple):
 
 
 class Value(NamedTuple):
-    """A property of a node, as it was read, or as it is to be written."""
+    """What a node has answered: a property by its number, or, without one, the counts of its motor encoder."""
 
     node: int
-    number: int
+    number: int | None
     value: int
-
-
-class Position(NamedTuple):
-    """Motor encoder of a controller."""
-
-    node: int
-    counts: int
 
 
 def get(receiver: int, number: int, group: int = 0) -> Frame:
@@ -94,11 +87,11 @@ def reply(node: int, number: int, value: int) -> Frame:
     return put(BusGroup.VALUES, number, value, Bit.GROUP | node << 5)
 
 
-def torques(group: int, number: int, counts: Sequence[int]) -> Frame:
+def torques(group: int, number: int, values: Sequence[int]) -> Frame:
     """Torques of up to four controllers in counts of 14 bits; `number` of the property T."""
     packed = Bit.WRITE | number
-    for count in (*counts, 0, 0, 0)[:4]:
-        packed = packed << 14 | count & 0x3FFF
+    for value in (*values, 0, 0, 0)[:4]:
+        packed = packed << 14 | value & 0x3FFF
     return Frame(Bit.GROUP | group, packed.to_bytes(8, "big"))
 
 
@@ -108,17 +101,22 @@ def read_torques(frame: Frame) -> list[int]:
     return [_signed(packed >> shift, 14) for shift in (42, 28, 14, 0)]
 
 
-def position(node: int, counts: int) -> Frame:
+def position(node: int, count: int) -> Frame:
     """The answer of a controller to `get` of its position."""
-    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, (counts & 0x3FFFFF).to_bytes(3, "big"))
+    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, (count & 0x3FFFFF).to_bytes(3, "big"))
 
 
-def read(frame: Frame) -> Value | Position | None:
+def counts(data: bytes) -> int:
+    """Counts of the motor encoder in the answer of a controller; those of a joint encoder may come after them."""
+    return _signed(int.from_bytes(data[:3], "big"), 22)
+
+
+def read(frame: Frame) -> Value | None:
     """What a node has answered; None for any other frame."""
     identifier, data = frame
     to = identifier & RECEIVER
-    if to == POSITION_REPLY and len(data) in (3, 6):  # with a joint encoder, which comes second
-        return Position(identifier >> 5 & 31, _signed(int.from_bytes(data[:3], "big"), 22))
+    if to == POSITION_REPLY and len(data) in (3, 6):
+        return Value(frame.sender, None, counts(data))
     if to == VALUE_REPLY and len(data) in (4, 6) and data[0] & Bit.WRITE:
         return Value(frame.sender, data[0] & ~Bit.WRITE, written(frame))
     return None

@@ -47,13 +47,14 @@ class Host:
     def ask(self, node: int, name: str, attempts: int = BUS.attempts) -> int | None:
         """A property of a node, of the position its counts; None where it does not answer."""
         number = self.number(node, name)
+        answer = node, None if name == "P" else number
         for _ in range(attempts):
             self.send(frames.get(node, number))
             end = self.now() + BUS.reply
             while (left := end - self.now()) > 0.0 and (frame := self.receive(left)) is not None:
                 found = frames.read(frame)
-                if found and found[:-1] == ((node,) if name == "P" else (node, number)):
-                    return found[-1]
+                if found and found[:-1] == answer:
+                    return found.value
         return None
 
     def demand(self, node: int, name: str) -> int:

@@ -1,15 +1,14 @@
 """The line to the bus: one of python-can and a clock, or the simulated one."""
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
-from wam_driver.bus.frames import Frame
+from wam_driver.bus.frames import BusNode, Frame
 from wam_driver.bus.interface import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
-from wam_driver.thresholds import BUS
 
 
 class CanLine:
@@ -19,18 +18,20 @@ class CanLine:
     ----------
     bus : `can.Bus` of any interface.
     now, sleep : the steady clock, s.
-    echoes : how many of its newest own frames it looks for, where the interface gives them back; they are dropped.
+    has_echo : whether the interface gives own frames back, so that all frames of a host are dropped.
 
     Attributes
     ----------
     counts : of errors.
     """
 
-    def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], echoes: int = 0) -> None:
+    def __init__(
+        self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], has_echo: bool = False
+    ) -> None:
         import can
 
-        self._bus, self._message, self._errors = bus, can.Message, (can.CanError, OSError)
-        self._echoes = deque[Frame](maxlen=echoes)
+        self._bus, self._errors, self._has_echo = bus, (can.CanError, OSError), has_echo
+        self._message: Any = can.Message(is_extended_id=False)  # to be sent, again and again
         self.now, self.sleep, self.close = now, sleep, bus.shutdown
         self.counts: Counter[str] = Counter()
 
@@ -39,11 +40,13 @@ class CanLine:
 
     def send(self, frame: Frame) -> bool:
         """Send a frame without waiting for a place in the queue; whether the adapter took it."""
+        message = self._message
+        message.arbitration_id, message.data = frame
+        message.dlc = len(frame.data)
         try:
-            self._bus.send(self._message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False), 0.0)
+            self._bus.send(message, 0.0)
         except self._errors:
             return False
-        self._echoes.append(frame)
         return True
 
     def receive(self, timeout: float) -> Frame | None:
@@ -59,10 +62,7 @@ class CanLine:
             self.counts["bus errors"] += 1
             return None
         frame = Frame(message.arbitration_id, bytes(message.data))
-        if frame not in self._echoes:
-            return frame
-        self._echoes.remove(frame)
-        return self.receive(timeout)
+        return self.receive(timeout) if self._has_echo and frame.sender == BusNode.HOST else frame
 
 
 Line = CanLine | SimulatedBus
@@ -86,7 +86,7 @@ def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep:
         raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
     except (can.CanError, OSError, ValueError) as error:
         raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, now, sleep, BUS.echoes if own.interface == "udp_multicast" else 0)
+    return CanLine(bus, now, sleep, own.interface == "udp_multicast")
 
 
 class ServedArm:
@@ -97,7 +97,9 @@ class ServedArm:
 
     def answer(self, timeout: float) -> None:
         """Answer the next frame, if one comes in time, s."""
-        frame, now = self._line.receive(timeout), self._line.now()
+        while (frame := self._line.receive(timeout)) is not None and frame.sender != BusNode.HOST:
+            pass  # an echo
+        now = self._line.now()
         self._arm.let_pass(now - self._passed)
         self._passed = now
         if frame is not None:

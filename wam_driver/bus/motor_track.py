@@ -2,6 +2,7 @@
 
 import math
 
+from wam_driver.bus.frames import counts
 from wam_driver.thresholds import BUS
 
 
@@ -10,7 +11,8 @@ class MotorTrack:
 
     Parameters
     ----------
-    counts : per turn.
+    node : its controller.
+    turn : counts per turn.
 
     Attributes
     ----------
@@ -19,18 +21,19 @@ class MotorTrack:
     has_jumped : whether one was dropped since then.
     """
 
-    def __init__(self, counts: int) -> None:
+    def __init__(self, node: int, turn: int) -> None:
+        self.node, self._step = node, math.tau / turn
         self.position = self.velocity = 0.0
         self.missed, self.has_jumped = 0, False
-        self._step = math.tau / counts
+        self._jump = BUS.jump * math.tau
         self._time = math.nan  # s, of the last position
 
-    def take(self, count: int, time: float) -> bool:
-        """Take a position of a time, s, unless the motor cannot be there."""
-        position = count * self._step
+    def take(self, answer: bytes, time: float) -> bool:
+        """Take the answer of the controller at a time, s, unless the motor cannot be there."""
+        position = counts(answer) * self._step
         moved, dt = position - self.position, time - self._time
         if dt > 0.0:
-            if abs(moved) > BUS.jump * math.tau * max(1.0, dt / BUS.silent):
+            if abs(moved) > self._jump and abs(moved) > self._jump * dt / BUS.silent:
                 self.has_jumped = True
                 return False
             self.velocity = moved / dt
