@@ -13,7 +13,7 @@ from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
+from wam_driver.bus.frames import BusGroup, BusNode, Frame
 from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import CanLine
 from wam_driver.bus.safety_module import SafetyMode
@@ -43,12 +43,12 @@ def drain(bus: can.BusABC) -> None:
 def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
     """Processor time of a cycle of four controllers, us, and of the bare loop; their answers are sent before."""
     host, arm = (can.Bus(interface=interface, channel=channel) for _ in range(2))
-    numbers = {name: properties.number(name, FIRMWARE) for name in ("P", "T", "MODE")}
+    numbers = properties.numbers(FIRMWARE)
     positions = [message(frames.position(node, 1000 * node)) for node in range(1, 5)]
     modes = [message(frames.reply(BusNode.SAFETY_MODULE, numbers["MODE"], SafetyMode.ACTIVE))]
     modes += [message(frames.reply(node, numbers["MODE"], 2)) for node in range(1, 5)]
-    modes.append(message(frames.reply(BusNode.SAFETY_MODULE, properties.number("PEN", FIRMWARE, True), 3 << 26)))
-    request = frames.get(BusGroup.MOTORS, numbers["P"], Bit.GROUP)
+    modes.append(message(frames.reply(BusNode.SAFETY_MODULE, properties.numbers(FIRMWARE, True)["PEN"], 3 << 26)))
+    request = frames.get(BusGroup.MOTORS, numbers["P"])
     torques = frames.torques(BusGroup.ARM, numbers["T"], [100, -100, 100, -100])
     questions = [frames.get(node, numbers["MODE"]) for node in range(3)]
 
@@ -62,7 +62,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
             missing -= bool(found and found.arbitration_id & SENDER)  # not an echo
         host.send(message(torques), 0.0)
 
-    arm_of_start = SimulatedBus.of(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
+    arm_of_start = SimulatedBus(CONFIGURATION.shared, CONFIGURATION.node("driver", BusParameters), FIRMWARE)
     driver = ArmBus(arm_of_start, CONFIGURATION.shared.arm, PERIOD)
     while not driver.is_running:
         driver.exchange()

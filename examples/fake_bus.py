@@ -1,7 +1,9 @@
-"""A motor bus that is none: what `bus_driver.py` needs of yours, `wam_driver.bus.bus_driver_node.Hardware`."""
+"""A motor bus that is none: what `bus_driver.py` needs of yours, the methods and attributes of this class."""
 
 from collections import Counter
 from collections.abc import Sequence
+
+from wam_description.signals import State
 
 
 class FakeBus:
@@ -10,7 +12,7 @@ class FakeBus:
     Attributes
     ----------
     position, velocity, current : of the motors, rad, rad/s, A, as measured.
-    is_running : whether they are known.
+    is_running : whether they are known; until then `exchange` starts the motors.
     advice : what a person has to do before the motors may be released, '' where nothing.
     fault : why they were braked, '' where there is no reason.
     counts : of errors that are no fault, for the diagnostics.
@@ -24,6 +26,11 @@ class FakeBus:
         self.position, self.velocity, self.current = ([0.0] * len(torque_constant) for _ in range(3))
         self._is_released = False
         self.counts = Counter[str]()
+
+    @property
+    def state(self) -> State:
+        """Position, velocity and current."""
+        return State(self.position, self.velocity, self.current)
 
     def exchange(self, periods: int) -> None:
         """Take the state of the motors; here they also move, by some periods."""

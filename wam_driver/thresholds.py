@@ -56,7 +56,6 @@ class BusThresholds:
 
     reply: float = 0.005  # s, for a reply at the start; fast computers that waited for 1 ms missed controllers
     attempts: int = 3  # at a reply at the start, since a frame may be lost
-    last_node: int = 31  # of the bus
     between_writes: float = 0.01  # s, between two writes to the safety module, and between two wake-ups
     silence: float = 1.0  # s after the wake-up, in which a frame would drive the controllers off the bus
     look: float = 0.05  # s, between two looks at what a person has to do
@@ -67,7 +66,7 @@ class BusThresholds:
     collect: float = 0.6  # of a period, in which the positions have to come
     most_frames: int = 40  # taken in one period: one of 2 ms has no more
     stray: int = 3  # frames that none of ours sends, before there is a fault: one may be left over in a queue
-    jump: float = 0.25  # turn of a motor within `silent`, 157 rad/s, above which a position is dropped
+    jump: float = 1.5708  # rad, a quarter of a turn of a motor within `silent`, above which a position is dropped
     gain_ratio: float = (
         1.5  # of a controller's counts per N m and the nominal ones, either way; real ones differ by 1.3
     )
@@ -77,13 +76,11 @@ class BusThresholds:
     ready: int = 2  # STAT of a controller that is awake
     idle_mode: int = 0  # MODE of a controller that brakes
     torque_mode: int = 2  # MODE of a controller that follows torques
-    wrist_poles: int = 6  # of motor 7; gimbals have 8 and other ratios
+    motors: int = 7  # numbers that controllers of motors may have; the last has other poles where there are gimbals
+    motor_roles: range = range(0, 1 << 16, 32)  # ROLE of the controller of a motor, with any flags above its five bits
     encoders: tuple[int, ...] = (4096, 40960)  # counts per turn, magnetic and optical
-    gain: tuple[int, ...] = (2700, 2700, 2700, 2700, 6500, 6500, 17474)  # counts per N m, the defaults of btutil
-    cable_limit: tuple[int, ...] = (4860, 4860, 4860, 4320, 3900, 3900, 1600)  # counts, at which controllers clip
     largest_torque: int = 8191  # counts, of 14 bits
     # of the simulated bus
-    second: int = 10**9  # ns
     winding: float = 2.5  # ohm, by which an idle motor brakes; assumed
     heartbeat: float = 0.1  # s without positions, after which the safety module stops an active arm; not published
     waking: float = 0.5  # s; assumed

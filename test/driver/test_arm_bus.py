@@ -15,9 +15,9 @@ from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.bus_fault import BusFault
 from wam_driver.bus.frames import Frame
 from wam_driver.bus.line import CanLine, Line, ServedArm
-from wam_driver.bus.motor_track import MotorTrack
-from wam_driver.bus.safety_module import Button
-from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.bus.motor import Motor
+from wam_driver.bus.safety_module import SafetyMode
+from wam_driver.bus.simulator import SimulatedBus, SimulatedController
 from wam_driver.bus.start_up import Wait
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
@@ -28,10 +28,10 @@ NEW, OLD, OLDEST = 200, 60, 40
 
 
 @cache
-def loaded(name: str) -> tuple[Shared, Plant]:
+def loaded(name: str) -> tuple[Shared, DriverParameters, Plant]:
     configuration = Configuration.load(packaged(name)).with_values({"timing.period": PERIOD, "timing.substeps": 4})
     shared, own = configuration.shared, configuration.node("driver", DriverParameters)
-    return shared, Plant(shared.arm, own.world, own.effects, shared.timing.substep, own.friction)
+    return shared, own, Plant(shared.arm, own.world, own.effects, shared.timing.substep, own.friction)
 
 
 class Served(CanLine):
@@ -62,13 +62,12 @@ class Rig:
         self,
         name: str = "barrett-wam4",
         version: int = NEW,
-        is_homed: bool = True,
         via: Callable[[SimulatedBus], Line] = lambda bus: bus,
     ) -> None:
-        self.shared, self.plant = loaded(name)
+        self.shared, own, self.plant = loaded(name)
         self.plant.reset()
         arm = self.shared.arm
-        self.bus = SimulatedBus(arm, self.plant, self.shared.timing.substep, version, is_homed)
+        self.bus = SimulatedBus(self.shared, own, version, self.plant)
         self.arm = ArmBus(via(self.bus), arm, PERIOD)
         self.currents = [0.1 + 0.05 * at for at in range(len(arm.motors.names))]
 
@@ -117,12 +116,12 @@ def test_the_arm_starts_wakes_and_follows_torques_with_any_firmware(name: str, v
     motors = rig.shared.arm.motors
     torque = [i * k for i, k in zip(rig.currents, motors.torque_constant, strict=True)]
     assert rig.bus.torque == pytest.approx(torque, abs=1.0 / 2700)
-    assert rig.arm.current == pytest.approx(rig.currents, abs=1.0 / 1000)
+    assert rig.arm.state.effort == pytest.approx(rig.currents, abs=1.0 / 1000)
     rig.arm.brake()
     assert not any(rig.bus.commanded)
     rig.run(0.1)
-    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
-    assert not any(rig.arm.current)
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
+    assert not any(rig.arm.state.effort)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +133,7 @@ def test_the_arm_is_reached_over_a_bus_of_python_can(interface: str, channel: st
     rig.run(0.05)
     rig.arm.close()
     assert rig.arm.trouble is None
-    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.2)
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.2)
     assert rig.arm.counts["lost replies"] == rig.arm.counts["other frames"] == 0
 
 
@@ -143,34 +142,35 @@ def test_velocities_are_those_of_the_motors() -> None:
     rig.enable()
     rig.run(0.1)
     assert max(map(abs, rig.plant.thetad)) > 2.0
-    assert rig.arm.velocity == pytest.approx(rig.plant.thetad, abs=0.2 * max(map(abs, rig.plant.thetad)))
+    assert rig.arm.state.velocity == pytest.approx(rig.plant.thetad, abs=0.2 * max(map(abs, rig.plant.thetad)))
 
 
 def test_a_late_period_is_no_jump_of_a_motor_that_moves() -> None:
-    track = MotorTrack(1, 4096)
+    motor = Motor(1, 4096, 1.0, 1)
     answers = [(frames.position(1, count).data, time) for count, time in ((0, 0.0), (1400, 0.1), (2800, 0.102))]
-    assert [track.take(answer, time) for answer, time in answers] == [True, True, False]
-    assert track.velocity == pytest.approx(math.tau * 1400 / 4096 / 0.1)
+    assert [motor.take(answer, time) for answer, time in answers] == [True, True, False]
+    assert motor.velocity == pytest.approx(math.tau * 1400 / 4096 / 0.1)
 
 
 def test_an_arm_without_a_zero_waits_for_a_person_at_home() -> None:
-    rig = Rig(is_homed=False)
+    rig = Rig()
+    rig.bus.press(SafetyMode.ESTOP)
     rig.plant.brake(True)  # the person holds it
     assert rig.start(3.0)[-1] is Wait.HOME
     assert not rig.arm.is_running
     assert rig.arm.confirm_home()
     assert rig.start()[-1] is Wait.ACTIVATE
     rig.run(0.1)
-    assert rig.arm.position == pytest.approx(rig.plant.theta, abs=0.05)
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
     assert not rig.arm.confirm_home()
 
 
 def test_in_estop_the_start_waits_for_shift_idle() -> None:
     rig = Rig()
     rig.bus.is_attended = False
-    rig.bus.press(Button.ESTOP)
+    rig.bus.press(SafetyMode.ESTOP)
     assert rig.start(1.0) == [Wait.IDLE]
-    rig.bus.press(Button.IDLE)
+    rig.bus.press(SafetyMode.IDLE)
     assert rig.start(3.0)[-1] is Wait.HOME
 
 
@@ -266,16 +266,16 @@ def refused(seconds: float) -> Inject:
 
 
 def power_off(rig: Rig, draw: random.Random) -> None:
-    rig.bus.press(Button.ESTOP)
+    rig.bus.press(SafetyMode.ESTOP)
     rig.bus.is_attended = False
     rig.bus.on_line = lambda frame: [] if frame.sender else [frame]
 
 
 def extra_motor(rig: Rig, draw: random.Random) -> None:
-    rig.bus.controllers[5] = type(rig.bus.controllers[1])(5, NEW, dict(rig.bus.controllers[1].values))
+    rig.bus.controllers[5] = SimulatedController(5, NEW)
 
 
-def press(button: Button) -> Inject:
+def press(button: SafetyMode) -> Inject:
     def inject(rig: Rig, draw: random.Random) -> None:
         rig.bus.is_attended = False
         rig.bus.press(button)
@@ -290,8 +290,7 @@ def remove(choose: Callable[[Rig, random.Random], int]) -> Inject:
 def firmware(version: int) -> Inject:
     def inject(rig: Rig, draw: random.Random) -> None:
         at = draw.randint(2, len(rig.currents))
-        rig.bus.controllers[at] = type(rig.bus.controllers[at])(at, version, dict(rig.bus.controllers[at].values))
-        rig.bus.controllers[at].values["VERS"] = version
+        rig.bus.controllers[at] = SimulatedController(at, version)
 
     return inject
 
@@ -317,8 +316,8 @@ RUNNING: dict[str, tuple[Inject, BusFault]] = {
     "reset controller": (setting(0, "STAT", "MODE", "T"), BusFault.RESET),
     "cut bus": (silence(lambda node: node <= 7), BusFault.ALL_SILENT),
     "power loss": (power_off, BusFault.NO_POWER),
-    "E-stop": (press(Button.ESTOP), BusFault.ESTOP),
-    "idle by the person": (press(Button.IDLE), BusFault.SAFETY_IDLE),
+    "E-stop": (press(SafetyMode.ESTOP), BusFault.ESTOP),
+    "idle by the person": (press(SafetyMode.IDLE), BusFault.SAFETY_IDLE),
     "torque limit": (setting(1, "TL2", node=10), BusFault.SAFETY_IDLE),
     "velocity limit": (setting(1, "VL2", node=10), BusFault.SAFETY_IDLE),
     "silent safety module": (silence(lambda node: node == 10), BusFault.SAFETY_SILENT),
@@ -362,7 +361,7 @@ def test_a_fault_of_the_bus_is_named_and_ends_the_torque(kind: str, seed: int) -
     assert rig.arm.trouble is not None
     assert rig.arm.trouble.fault is fault, rig.arm.fault
     assert last - begun <= STOP
-    assert not any(rig.arm.current)
+    assert not any(rig.arm.state.effort)
     if "limit" in kind:
         assert f"fault of the {kind.split()[0]}" in rig.arm.fault
 

@@ -26,9 +26,9 @@ MORE = 0.03  # of the commanded force, by which the true force may be further of
 class PlantOnBus:
     """A plant whose motors are reached over the bus only; a person holds it until it is enabled."""
 
-    def __init__(self, plant: Plant, shared: Shared) -> None:
+    def __init__(self, plant: Plant, shared: Shared, own: DriverParameters) -> None:
         self._plant, self._constant, self._is_braked = plant, shared.arm.motors.torque_constant, True
-        self._arm = ArmBus(SimulatedBus(shared.arm, plant, shared.timing.substep), shared.arm, shared.timing.period)
+        self._arm = ArmBus(SimulatedBus(shared, own, plant=plant), shared.arm, shared.timing.period)
         plant.brake(True)
         while self._arm.wait is not Wait.NOTHING:
             self._exchange()
@@ -38,11 +38,11 @@ class PlantOnBus:
 
     @property
     def theta(self) -> list[float]:
-        return self._arm.position
+        return self._arm.state.position
 
     @property
     def thetad(self) -> list[float]:
-        return self._arm.velocity
+        return self._arm.state.velocity
 
     def brake(self, on: bool) -> None:
         if on != self._is_braked:
@@ -62,7 +62,7 @@ class PlantOnBus:
 class DriverOnBus(Driver):
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         super().__init__(shared, parameters)
-        self.plant = PlantOnBus(self.plant, shared)  # type: ignore[assignment]
+        self.plant = PlantOnBus(self.plant, shared, parameters)  # type: ignore[assignment]
         self._measure()
 
 

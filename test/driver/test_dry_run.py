@@ -9,7 +9,7 @@ import pytest
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames
 from wam_driver.bus.dry_run import heard, in_words, sent
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
+from wam_driver.bus.frames import BusGroup, BusNode, Frame
 from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import line_of
 
@@ -29,7 +29,7 @@ def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
         found = list(heard(line, 0.1))
         assert other.recv(0.0) is None
         line.close()
-    assert [re.sub(" +", " ", text).strip() for text in found] == ["3 443 00 01 2c controller 2 is at 300 counts"]
+    assert [re.sub(" +", " ", text).strip() for text in found] == ["3 443 00 01 2c controller 2 has P = 300"]
 
 
 def test_a_silent_bus_is_no_fault() -> None:
@@ -60,7 +60,7 @@ def test_what_would_be_sent_has_every_step_of_the_start_and_no_torque(version: i
         (frames.put(BusNode.SAFETY_MODULE, 8, 1), "host to safety module: set MODE to 1"),
         (frames.reply(1, 5, 2), "controller 1 has STAT = 2"),
         (frames.torques(BusGroup.ARM, 42, [1, -2, 3, -4]), "host to group 1: torques [1, -2, 3, -4] counts"),
-        (Frame(Bit.GROUP | BusGroup.MOTORS, b""), "host: no data"),
+        (Frame(BusGroup.MOTORS, b""), "host: no data"),
         (frames.get(3, 127), "host to controller 3: get property 127"),
     ],
 )

@@ -123,7 +123,7 @@ def _serve(configuration: Configuration, version: int) -> None:
     set_priority(configuration.shared.timing.fifo_priority, configuration.shared.timing.niceness)
     own = configuration.node("driver", BusParameters)
     line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
-    arm = ServedArm(line, SimulatedBus.of(configuration.shared, own, version))
+    arm = ServedArm(line, SimulatedBus(configuration.shared, own, version))
     while True:
         arm.answer(configuration.shared.timing.period)
 

@@ -7,7 +7,7 @@
 - line: python-can and a clock, or the simulated bus; the simulated arm on a bus of python-can
 - host: the computer's end of the line, with questions and answers
 - start_up: finds, wakes, checks and zeroes the controllers
-- motor_track, cycle: what is sent and taken in each period
+- motor, cycle: what is sent and taken in each period
 - arm_bus: the driver, one call per period
 - interface, bus_driver_node: the node, also for a bus of your own
 - dry_run: what is on the bus, and what would be sent

@@ -1,8 +1,9 @@
 """The driver of the arm on its bus, one call per period, without ROS; its clock is that of the line."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from wam_description.arm import Arm
+from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.cycle import Cycle
@@ -23,34 +24,29 @@ class ArmBus:
 
     Attributes
     ----------
-    position, velocity, current : of the motors, rad, rad/s, A; no current is measured: it is the commanded one.
     wait : what a person has to do, or what the start waits for.
-    trouble : the first fault since `begin` or `clear`.
     counts : lost replies, frames that were not sent, and other things that are no fault if they are rare.
     """
 
     def __init__(self, line: Line, arm: Arm, period: float) -> None:
         self._host, self._constant, self._period = Host(line), arm.motors.torque_constant, period
         self._home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        self.position, self.velocity, self.current = ([0.0] * len(self._home) for _ in range(3))
         self.counts = self._host.counts
         self.begin()
 
     def begin(self) -> None:
         """Begin the start-up, also once more."""
-        self.trouble: Trouble | None = None
-        self._start = StartUp(self._host, self._home)
-        self._steps: Iterator[Wait] = self._start.steps()
+        self._host.trouble = None
+        self._start = StartUp(self._host, self._home, self._constant)
+        self._steps = self._start.steps()
         self._cycle: Cycle | None = None
         self.wait = Wait.POWER
 
     def clear(self) -> None:
         """Forget a fault; the start-up is repeated where controllers or their zero may be lost."""
-        if self._is_lost:
+        if self.trouble and self.trouble.fault.loses_controllers:
             self.begin()
-        self.trouble = None
-        if self._cycle is not None:
-            self._cycle.trouble = None
+        self._host.trouble = None
 
     def confirm_home(self) -> bool:
         """A person states that the arm is at its home pose; whether that was requested."""
@@ -63,53 +59,49 @@ class ArmBus:
         return self._cycle is not None
 
     @property
-    def _is_lost(self) -> bool:
-        """Whether the start has to be repeated."""
-        return self.trouble is not None and self.trouble.fault.loses_controllers
+    def state(self) -> State:
+        """Of the motors, rad, rad/s, and A; no current is measured: it is the commanded one."""
+        motors = self._cycle.motors if self._cycle else ()
+        return State(
+            [motor.position for motor in motors],
+            [motor.velocity for motor in motors],
+            [motor.current for motor in motors],
+        )
 
-    def _go_on(self) -> None:
-        """Take a step of the start-up."""
-        try:
-            self.wait = next(self._steps)
-        except StopIteration as end:
-            settings, self.wait = end.value, Wait.ACTIVATE
-            self._cycle = Cycle(self._host, settings, self._constant, self._period)
-        except Trouble as trouble:
-            self.trouble = trouble
-        if refused := self._host.refused:
-            self.trouble = Trouble(BusFault.NOT_SENT, 0, f"{refused} frames")
+    @property
+    def trouble(self) -> Trouble | None:
+        """The first fault since `begin` or `clear`."""
+        return self._host.trouble
 
-    def release(self) -> None:
-        """Let the motors follow their torques."""
-        if self._cycle is not None:
-            self._cycle.set_released(True)
-
-    def brake(self) -> None:
-        """Command zero torque and let the windings brake; this arm has no brakes, it sinks."""
-        self.current = [0.0] * len(self._home)
-        if self._cycle is not None:
-            self._cycle.set_released(False)
-
-    def stop(self) -> None:
-        """Brake, and let the safety module go to idle where its firmware takes that from the host."""
-        self.brake()
-        if self._cycle is not None:
-            self._cycle.stop()
-
-    def command(self, currents: Sequence[float]) -> None:
-        """Send torques at once, A each, clipped; nothing unless the motors are released."""
-        if self._cycle is not None and self._cycle.is_released:
-            self.current = self._cycle.command(currents)
+    @property
+    def fault(self) -> str:
+        """The trouble, in words; '' where there is none."""
+        return str(self.trouble or "")
 
     @property
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
         return self.wait.value
 
-    @property
-    def fault(self) -> str:
-        """The trouble, in words; '' where there is none."""
-        return str(self.trouble) if self.trouble else ""
+    def release(self) -> None:
+        """Let the motors follow their torques."""
+        if self._cycle:
+            self._cycle.set_released(True)
+
+    def brake(self) -> None:
+        """Command zero torque and let the windings brake; this arm has no brakes, it sinks."""
+        if self._cycle:
+            self._cycle.set_released(False)
+
+    def stop(self) -> None:
+        """Brake, and let the safety module go to idle where its firmware takes that from the host."""
+        if self._cycle:
+            self._cycle.stop()
+
+    def command(self, currents: Sequence[float]) -> None:
+        """Send torques at once, A each, clipped; nothing unless the motors are released."""
+        if self._cycle and self._cycle.is_released:
+            self._cycle.command(currents)
 
     def close(self) -> None:
         """Brake, and end the connection."""
@@ -121,19 +113,20 @@ class ArmBus:
 
         Before `is_running` a step of the start-up, which may last some hundredths of a second.
         """
-        cycle = self._cycle
-        if cycle is None:
-            if self.trouble is None:
-                self._go_on()
-            return
-        self._host.line.let_pass(periods * self._period)
-        if self._is_lost:
-            cycle.set_released(False)  # until the start is repeated
-            return
-        cycle.exchange()
-        self.position = [motor.position for motor in cycle.motors]
-        self.velocity = [motor.velocity for motor in cycle.motors]
-        self.wait = Wait.NOTHING if cycle.safety_mode is SafetyMode.ACTIVE else Wait.ACTIVATE
-        if cycle.trouble is not None and self.trouble is None:
-            self.trouble = cycle.trouble
-            self.brake()
+        if self._cycle:
+            self._host.line.let_pass(periods * self._period)
+            self._cycle.exchange()
+            self.wait = Wait.NOTHING if self._cycle.safety_mode == SafetyMode.ACTIVE else Wait.ACTIVATE
+        elif self.trouble is None:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """Take a step of the start-up."""
+        try:
+            self.wait = next(self._steps)
+        except StopIteration as end:
+            self._cycle, self.wait = Cycle(self._host, end.value, self._period), Wait.ACTIVATE
+        except Trouble as trouble:
+            self._host.trouble = trouble
+        if self._host.refused:
+            self._host.trouble = Trouble(BusFault.NOT_SENT, 0, self._host.refused)

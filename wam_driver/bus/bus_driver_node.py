@@ -1,9 +1,7 @@
 """Node `driver` of a real arm: the contract of docs/driver.md around a motor bus."""
 
 import time
-from collections import Counter
-from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
@@ -21,60 +19,10 @@ from wam_driver.safety import Mode, Safety
 from wam_driver.thresholds import DRIVER
 
 
-class Hardware(Protocol):
-    """Motors of an arm: `ArmBus`, or a bus of your own.
-
-    Attributes
-    ----------
-    position, velocity, current : of the motors, rad, rad/s, A, (n,).
-    is_running : whether they are known.
-    advice : what a person has to do before the motors may be released, '' where nothing.
-    fault : why they were braked, '' where there is no reason.
-    counts : of errors that are no fault, for the diagnostics.
-    """
-
-    position: list[float]
-    velocity: list[float]
-    current: list[float]
-
-    @property
-    def is_running(self) -> bool: ...  # noqa: D102 - an attribute
-    @property
-    def advice(self) -> str: ...  # noqa: D102 - an attribute
-    @property
-    def fault(self) -> str: ...  # noqa: D102 - an attribute
-    @property
-    def counts(self) -> Counter[str]: ...  # noqa: D102 - an attribute
-
-    def exchange(self, periods: int) -> None:
-        """Take the state, some periods after the last one; until `is_running` a step of the start."""
-
-    def command(self, currents: Sequence[float]) -> None:
-        """Send currents, A, at once; nothing unless released."""
-
-    def release(self) -> None:
-        """Let the motors follow commands, zero first."""
-
-    def brake(self) -> None:
-        """No current, at once."""
-
-    def stop(self) -> None:
-        """Brake as safely as the hardware can."""
-
-    def clear(self) -> None:
-        """Forget a fault; the motors stay braked."""
-
-    def confirm_home(self) -> bool:
-        """A person states that the arm is at its home pose; whether that was requested."""
-
-    def close(self) -> None:
-        """End the connection."""
-
-
 class BusDriver(ArmDriver):
     """Publishes the state of the hardware in every period and sends it each command, while that is safe.
 
-    A driver of your own replaces `entry`, its declaration, and `make_hardware`.
+    A driver of your own replaces `entry`, its declaration, and `make_hardware`; its hardware is used as `ArmBus` is.
     """
 
     entry = "wam_driver.bus.interface:BusInterface"
@@ -84,7 +32,8 @@ class BusDriver(ArmDriver):
         if self.shared.timing.mode != "realtime":
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
         self._watchdog, self._constant = self.own.watchdog, self.shared.arm.motors.torque_constant
-        self.hardware, self.safety = self.make_hardware(self.shared, self.own), Safety()
+        self.hardware: ArmBus = self.make_hardware(self.shared, self.own)
+        self.safety = Safety()
         self._take_advice()
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
@@ -93,7 +42,7 @@ class BusDriver(ArmDriver):
         self.create_timer(self.shared.timing.period, self._run, clock=steady)
         self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
 
-    def make_hardware(self, shared: Shared, own: Any) -> Hardware:
+    def make_hardware(self, shared: Shared, own: Any) -> Any:
         """The motors: those of the production WAM on its bus."""
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
@@ -136,14 +85,15 @@ class BusDriver(ArmDriver):
     def _publish(self, due: int) -> None:
         """The state; where periods were left out, also the outer ones among them."""
         hardware, timing, publish = self.hardware, self.shared.timing, self.outlets.publish
-        torque = [i * k for i, k in zip(hardware.current, self._constant, strict=True)]
+        position, velocity, current = hardware.state
+        torque = [i * k for i, k in zip(current, self._constant, strict=True)]
         for stamp in range(self.stamp - (due - 1) * timing.period_ns, self.stamp + 1, timing.period_ns):
             is_outer = timing.is_outer(stamp)
             if stamp == self.stamp or is_outer:
-                publish("motor_states", stamp, State(hardware.position, hardware.velocity, torque))
+                publish("motor_states", stamp, State(position, velocity, torque))
             if is_outer:
                 publish("/clock", stamp, None)
-                publish("motor_currents", stamp, State([], [], hardware.current))
+                publish("motor_currents", stamp, State([], [], current))
         self.health.counts["steps"] += 1
         self.health.counts |= hardware.counts
         self.diagnostics.report(self.stamp)

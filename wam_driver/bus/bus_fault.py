@@ -18,7 +18,7 @@ class BusFault(Enum):
     COUNTS = "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960"
     GAIN = "motor controller {node} has {detail} counts per N m, too far from those of the maker"
     LIMIT = "motor controller {node} has the largest torque {detail}, which is none"
-    INDEX = "motor controller {node} takes the wrong torque of a packed frame: {detail}"
+    INDEX = "motor controller {node} has index or group {detail}, with which it takes the torque of another motor"
     NOT_ZEROED = "motor controller {node} is {detail} counts away from the home pose; it did not take its zero"
     # later
     NO_REPLY = "motor controller {node} sends no position"
@@ -32,7 +32,7 @@ class BusFault(Enum):
     CONTROLLER_IDLE = "motor controller {node} left the torque mode: {detail}"
     FOREIGN = "another computer sends on this bus; end its program"
     DOUBLED = "two nodes have the number {node}"
-    NOT_SENT = "the adapter does not take frames: {detail}"
+    NOT_SENT = "the adapter does not take frames: {detail} were refused"
 
     @property
     def loses_controllers(self) -> bool:

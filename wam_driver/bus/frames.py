@@ -6,7 +6,7 @@ only.
 
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class BusNode(IntEnum):
@@ -17,24 +17,17 @@ class BusNode(IntEnum):
 
 
 class BusGroup(IntEnum):
-    """Groups of nodes that take a frame."""
+    """Groups of nodes that take a frame, with the bit of groups."""
 
-    ARM = 1  # torques of the controllers 1 to 4
-    WRIST = 2  # torques of the controllers 5 to 7
-    POSITIONS = 3  # replies
-    MOTORS = 4
-    VALUES = 6  # replies
-
-
-class Bit(IntEnum):
-    """Bits of an identifier, and of the first byte."""
-
-    GROUP = 0x400
-    WRITE = 0x80
+    ANY = 0x400
+    ARM = 0x401  # torques of the controllers 1 to 4
+    WRIST = 0x402  # torques of the controllers 5 to 7
+    POSITIONS = 0x403  # replies
+    MOTORS = 0x404
+    VALUES = 0x406  # replies
 
 
-POSITION_REPLY, VALUE_REPLY = Bit.GROUP | BusGroup.POSITIONS, Bit.GROUP | BusGroup.VALUES
-RECEIVER = Bit.GROUP | 31
+WRITE: Final = 0x80  # bit of the first byte
 
 
 class Frame(NamedTuple):
@@ -50,13 +43,8 @@ class Frame(NamedTuple):
 
     @property
     def receiver(self) -> int:
-        """Node or, with the group bit, group that takes it."""
-        return self.identifier & 31
-
-    @property
-    def is_to_group(self) -> bool:
-        """Whether the receiver is a group."""
-        return bool(self.identifier & Bit.GROUP)
+        """Node or group that takes it."""
+        return self.identifier & 0x41F
 
 
 class Value(NamedTuple):
@@ -67,14 +55,14 @@ class Value(NamedTuple):
     value: int
 
 
-def get(receiver: int, number: int, group: int = 0) -> Frame:
-    """Ask a node for a property, or all nodes of a group with `group=Bit.GROUP`."""
-    return Frame(group | receiver, bytes([number]))
+def get(receiver: int, number: int) -> Frame:
+    """Ask a node, or all nodes of a group, for a property."""
+    return Frame(receiver, bytes([number]))
 
 
-def put(receiver: int, number: int, value: int, group: int = 0) -> Frame:
-    """Write a property of a node, signed 32 bits; nobody acknowledges it."""
-    return Frame(group | receiver, bytes([Bit.WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
+def put(receiver: int, number: int, value: int) -> Frame:
+    """Write a property of a node or of a group, signed 32 bits; nobody acknowledges it."""
+    return Frame(receiver, bytes([WRITE | number, 0]) + value.to_bytes(4, "little", signed=True))
 
 
 def written(frame: Frame) -> int:
@@ -84,15 +72,15 @@ def written(frame: Frame) -> int:
 
 def reply(node: int, number: int, value: int) -> Frame:
     """The answer of a node to `get`."""
-    return put(BusGroup.VALUES, number, value, Bit.GROUP | node << 5)
+    return put(BusGroup.VALUES | node << 5, number, value)
 
 
 def torques(group: int, number: int, values: Sequence[int]) -> Frame:
     """Torques of up to four controllers in counts of 14 bits; `number` of the property T."""
-    packed = Bit.WRITE | number
+    packed = WRITE | number
     for value in (*values, 0, 0, 0)[:4]:
         packed = packed << 14 | value & 0x3FFF
-    return Frame(Bit.GROUP | group, packed.to_bytes(8, "big"))
+    return Frame(group, packed.to_bytes(8, "big"))
 
 
 def read_torques(frame: Frame) -> list[int]:
@@ -103,7 +91,7 @@ def read_torques(frame: Frame) -> list[int]:
 
 def position(node: int, count: int) -> Frame:
     """The answer of a controller to `get` of its position."""
-    return Frame(Bit.GROUP | node << 5 | BusGroup.POSITIONS, (count & 0x3FFFFF).to_bytes(3, "big"))
+    return Frame(BusGroup.POSITIONS | node << 5, (count & 0x3FFFFF).to_bytes(3, "big"))
 
 
 def counts(data: bytes) -> int:
@@ -113,12 +101,11 @@ def counts(data: bytes) -> int:
 
 def read(frame: Frame) -> Value | None:
     """What a node has answered; None for any other frame."""
-    identifier, data = frame
-    to = identifier & RECEIVER
-    if to == POSITION_REPLY and len(data) in (3, 6):
+    to, data = frame.receiver, frame.data
+    if to == BusGroup.POSITIONS and len(data) in (3, 6):
         return Value(frame.sender, None, counts(data))
-    if to == VALUE_REPLY and len(data) in (4, 6) and data[0] & Bit.WRITE:
-        return Value(frame.sender, data[0] & ~Bit.WRITE, written(frame))
+    if to == BusGroup.VALUES and len(data) in (4, 6) and data[0] & WRITE:
+        return Value(frame.sender, data[0] & ~WRITE, written(frame))
     return None
 
 

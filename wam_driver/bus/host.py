@@ -1,5 +1,7 @@
 """The computer on the bus: it sends and receives frames, and asks nodes for their properties."""
 
+from collections.abc import Container
+
 from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.frames import BusNode, Frame
@@ -14,6 +16,7 @@ class Host:
     ----------
     versions : of the firmware, by node, of those that are known.
     refused : frames in a row that the adapter has not taken.
+    trouble : the first fault, None where there is none.
     counts : errors, lost replies and other things that are no fault if they are rare.
     """
 
@@ -21,6 +24,7 @@ class Host:
         self.line, self.now, self.sleep, self.receive = line, line.now, line.sleep, line.receive
         self.versions: dict[int, int] = {}
         self.refused = 0
+        self.trouble: Trouble | None = None
         self.counts = line.counts
 
     def send(self, frame: Frame) -> None:
@@ -39,10 +43,11 @@ class Host:
         Trouble
             where its firmware has none.
         """
-        try:
-            return properties.number(name, self.versions.get(node, 0), node == BusNode.SAFETY_MODULE)
-        except KeyError as error:
-            raise Trouble(BusFault.FIRMWARE, node, error.args[0]) from error
+        version = self.versions.get(node, 0)
+        found = properties.numbers(version, node == BusNode.SAFETY_MODULE).get(name)
+        if found is None:
+            raise Trouble(BusFault.FIRMWARE, node, f"firmware {version} has no property {name}")
+        return found
 
     def ask(self, node: int, name: str, attempts: int = BUS.attempts) -> int | None:
         """A property of a node, of the position its counts; None where it does not answer."""
@@ -57,17 +62,21 @@ class Host:
                     return found.value
         return None
 
-    def demand(self, node: int, name: str) -> int:
-        """A property of a node that has to answer.
+    def demand(
+        self, node: int, name: str, allowed: Container[int] | None = None, fault: BusFault = BusFault.MISSING
+    ) -> int:
+        """A property of a node that has to answer, and to be one of some values.
 
         Raises
         ------
         Trouble
-            where it does not.
+            where it does not, or is not.
         """
         found = self.ask(node, name)
         if found is None:
             raise Trouble(BusFault.NO_SAFETY_MODULE if node == BusNode.SAFETY_MODULE else BusFault.MISSING, node)
+        if allowed is not None and found not in allowed:
+            raise Trouble(fault, node, found)
         return found
 
     def write(self, node: int, name: str, value: int) -> None:

@@ -77,7 +77,7 @@ def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep:
         where python-can is not installed, or cannot open the bus.
     """
     if own.interface == SIMULATED:
-        return SimulatedBus.of(shared, own, int(own.channel))
+        return SimulatedBus(shared, own, int(own.channel))
     try:
         import can
 

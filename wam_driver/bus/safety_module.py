@@ -1,7 +1,7 @@
 """The safety module of the arm: its mode, and what its pendant shows.  Source: libbarrett, `safety_module.{h,cpp}`."""
 
 from enum import IntEnum
-from typing import Final, NamedTuple
+from typing import Final
 
 WATCHED: Final = ("velocity", "torque", "voltage", "heartbeat", "other")  # three bits each, from bit 0
 
@@ -21,35 +21,12 @@ class SafetyMode(IntEnum):
     ACTIVE = 2  # they follow their torques
 
 
-class Button(IntEnum):
-    """Button of the pendant that is pressed."""
-
-    ESTOP = 0
-    ACTIVATE = 1
-    IDLE = 2
-    NONE = 3
+def faults(pendant: int) -> list[str]:
+    """Watched quantities whose lamp shows a fault, by the property PEN."""
+    return [name for at, name in enumerate(WATCHED) if pendant >> 3 * at & Lamp.FAULT]
 
 
-class Pendant(NamedTuple):
-    """What the pendant shows.
-
-    Attributes
-    ----------
-    button : that is pressed.
-    faults : watched quantities whose lamp shows a fault.
-    """
-
-    button: Button
-    faults: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, value: int) -> "Pendant":
-        """From the property PEN."""
-        lit = tuple(name for at, name in enumerate(WATCHED) if value >> 3 * at & Lamp.FAULT)
-        return cls(Button(value >> 26 & 3), lit)
-
-    @property
-    def value(self) -> int:
-        """As the property PEN, without segments, warnings and the lamps of the buttons."""
-        lamps = (Lamp.FAULT if name in self.faults else Lamp.SAFE for name in WATCHED)
-        return int(self.button) << 26 | sum(lamp << 3 * at for at, lamp in enumerate(lamps))
+def pendant_of(*faulty: str) -> int:
+    """The property PEN with lamps of faults, without buttons, segments and warnings."""
+    lamps = (Lamp.FAULT if name in faulty else Lamp.SAFE for name in WATCHED)
+    return 3 << 26 | sum(lamp << 3 * at for at, lamp in enumerate(lamps))

@@ -5,24 +5,18 @@ Bus time passes with the bits of each frame, with waiting, and to the next perio
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
-from wam_description.arm import Arm, Shared
+from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_driver.bus import frames, properties
-from wam_driver.bus.frames import Bit, BusGroup, BusNode, Frame
-from wam_driver.bus.safety_module import Button, Pendant, SafetyMode
+from wam_driver.bus.frames import BusGroup, BusNode, Frame
+from wam_driver.bus.safety_module import SafetyMode, faults, pendant_of
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_driver.thresholds import BUS
 
-SAFETY_VALUES = {"ROLE": 2, "STAT": 2, "ZERO": 0, "VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204, "IFAULT": 0}
 WHILE_ASLEEP = ("VERS", "ROLE", "SN", "ID", "ERROR", "STAT", "ADDR")
-
-
-def nanoseconds(seconds: float) -> int:
-    """Time as the simulated bus counts it."""
-    return round(seconds * 1e9)
 
 
 class SimulatedController:
@@ -32,45 +26,47 @@ class SimulatedController:
     ----------
     node : on the bus.
     version : of the firmware.
-    values : of the properties by name; torque in counts under "T", counts at the angle zero under "P".
     count : of the motor, from the angle zero.
 
     Attributes
     ----------
-    values : to be changed by tests.
-    deaf_until : bus time at which it is awake, ns.
+    values : of the properties by name, to be changed by tests; counts of torque under "T", at the angle zero under "P".
+    deaf_until : bus time at which it is awake, s.
     """
 
-    def __init__(
-        self, node: int, version: int, values: Mapping[str, int], count: Callable[[], int] = lambda: 0
-    ) -> None:
+    def __init__(self, node: int, version: int, count: Callable[[], int] = lambda: 0) -> None:
         self.node, self._count = node, count
-        self.values: dict[str, int] = {"VERS": version, "MODE": 0, **values}
-        self.deaf_until = 0
+        self.values = {"VERS": version, **properties.ARM[node]}
+        self.deaf_until = 0.0
         self._names = properties.names(version, node == BusNode.SAFETY_MODULE)
 
     def is_addressed(self, frame: Frame) -> bool:
         """Whether it takes a frame."""
-        if not frame.is_to_group:
-            return frame.receiver == self.node
-        return frame.receiver in [self.values.get(name) for name in ("GRPA", "GRPB", "GRPC")]
+        groups = [BusGroup.ANY | self.values[name] for name in ("GRPA", "GRPB", "GRPC") if name in self.values]
+        return frame.receiver in (self.node, *groups)
 
-    def take(self, frame: Frame, time: int) -> Frame | None:
-        """Obey a frame at a time, ns; what it answers."""
-        values, name = self.values, self._names.get(frame.data[0] & ~Bit.WRITE, "")
+    def take(self, frame: Frame, time: float) -> Frame | None:
+        """Obey a frame at a time, s; what it answers."""
+        values, name = self.values, self._names.get(frame.data[0] & ~frames.WRITE, "")
         if values["STAT"] == 0 and name not in WHILE_ASLEEP:
             return None
-        if not frame.data[0] & Bit.WRITE:
+        if not frame.data[0] & frames.WRITE:
             if name == "P":
                 return frames.position(self.node, values["P"] + self._count())
             return frames.reply(self.node, frame.data[0], values[name]) if name in values else None
-        if name == "T" and frame.is_to_group:
+        if name == "T" and frame.receiver != self.node:
             values["T"] = frames.read_torques(frame)[values["PIDX"] - 1]
             return None
         if name == "STAT" and values["STAT"] == 0:
-            self.deaf_until = time + nanoseconds(BUS.waking)
+            self.deaf_until = time + BUS.waking
+        if name == "MODE" and self.node == BusNode.SAFETY_MODULE and not self._may_set(frames.written(frame)):
+            return None
         values[name] = frames.written(frame) - (self._count() if name == "P" else 0)
         return None
+
+    def _may_set(self, mode: int) -> bool:
+        """Whether the host may set a mode of the safety module; only a person goes upwards."""
+        return mode < self.values["MODE"] and self.values["VERS"] >= BUS.settable_version
 
 
 class SimulatedBus:
@@ -78,11 +74,9 @@ class SimulatedBus:
 
     Parameters
     ----------
-    arm : in the plant.
-    plant : behind the controllers.
-    substep : of the plant, s.
+    shared, own : parameters of the arm and of its plant.
     version : of all firmware.
-    is_homed : whether the zero is known at the start.
+    plant : behind the controllers; by default one of these parameters.
 
     Attributes
     ----------
@@ -90,68 +84,44 @@ class SimulatedBus:
     is_attended : whether a person presses Idle and Activate where that is wanted.
     on_line : what becomes of each frame, for tests: lost, doubled, another one; None: the adapter refuses it.
     counts : of errors.
-    time : bus time, ns.
+    time : bus time, s.
     """
 
-    def __init__(self, arm: Arm, plant: Plant, substep: float, version: int = 200, is_homed: bool = True) -> None:
-        self._plant, self._body, self._step = plant, RigidBody(arm), nanoseconds(substep)
-        plant.brake(False)
-        self._constant = arm.motors.torque_constant
+    def __init__(self, shared: Shared, own: DriverParameters, version: int = 200, plant: Plant | None = None) -> None:
+        arm, substep = shared.arm, shared.timing.substep
+        self._plant = plant or Plant(arm, own.world, own.effects, substep, own.friction)
+        self._plant.brake(False)
+        self._body, self._step, self._constant = RigidBody(arm), substep, arm.motors.torque_constant
         self.is_attended = True
-        self._motors = [self._motor(at, version, is_homed) for at in range(len(self._constant))]
-        given = SAFETY_VALUES | {"MODE": SafetyMode.IDLE, "ZERO": int(is_homed)}
-        self._safety = SimulatedController(BusNode.SAFETY_MODULE, version, given)
-        self.controllers = {one.node: one for one in (*self._motors, self._safety)}
-        self._position_request = frames.get(BusGroup.MOTORS, properties.number("P", version), Bit.GROUP)
-        self._show(Pendant(Button.NONE))
+        self._motors = [self._motor(at, version) for at in range(len(self._constant))]
+        safety = SimulatedController(BusNode.SAFETY_MODULE, version)
+        self.controllers, self._safety = {one.node: one for one in (*self._motors, safety)}, safety.values
+        self._position_request = frames.get(BusGroup.MOTORS, properties.numbers(version)["P"])
+        self._mode, self._safety["PEN"] = self._safety["MODE"], pendant_of()
         self.on_line: Callable[[Frame], list[Frame] | None] = lambda frame: [frame]
         self.counts: Counter[str] = Counter()
         self._queue: deque[Frame] = deque()
-        self.time = self._reached = self._requested = self._pressed = self._passed = 0
+        self.time = self._reached = self._requested = self._pressed = self._passed = 0.0
 
-    @classmethod
-    def of(cls, shared: Shared, own: DriverParameters, version: int, is_homed: bool = True) -> "SimulatedBus":
-        """With the plant of a configuration."""
-        arm, substep = shared.arm, shared.timing.substep
-        return cls(arm, Plant(arm, own.world, own.effects, substep, own.friction), substep, version, is_homed)
-
-    def _motor(self, at: int, version: int, is_homed: bool) -> SimulatedController:
-        node = at + 1
-        values = {
-            "ROLE": 0,
-            "STAT": 0,
-            "T": 0,
-            "P": 0 if is_homed else 1000 * node,
-            "MT": BUS.cable_limit[at],
-            "IPNM": BUS.gain[at],
-            "CTS": BUS.encoders[0],
-            "PIDX": at % 4 + 1,
-            "POLES": BUS.wrist_poles if node == 7 else 12,
-            "GRPA": 0,
-            "GRPB": BusGroup.ARM if node <= 4 else BusGroup.WRIST,
-            "GRPC": BusGroup.MOTORS,
-        }
+    def _motor(self, at: int, version: int) -> SimulatedController:
         return SimulatedController(
-            node, version, values, lambda: math.floor(self._plant.theta[at] / math.tau * BUS.encoders[0])
+            at + 1, version, lambda: math.floor(self._plant.theta[at] / math.tau * BUS.encoders[0])
         )
 
     # the line
 
     def now(self) -> float:
         """Bus time, s."""
-        return self.time / 1e9
+        return self.time
 
     def sleep(self, seconds: float) -> None:
         """Let bus time pass."""
-        self._advance(self.time + nanoseconds(seconds))
+        self._advance(self.time + seconds)
 
     def let_pass(self, seconds: float) -> None:
         """A period of the host has passed, in which there may have been frames; the late part is no silence."""
-        late = max(0.0, seconds - BUS.silent)
-        self._requested += nanoseconds(late)
-        self._passed += nanoseconds(seconds)
-        if self._passed < self.time - nanoseconds(BUS.silent):  # as after the start
-            self._passed = self.time
+        self._requested += max(0.0, seconds - BUS.silent)
+        self._passed = max(self._passed, self.time - BUS.silent) + seconds
         self._advance(max(self.time, self._passed))
 
     def close(self) -> None:
@@ -175,23 +145,20 @@ class SimulatedBus:
         self._spend(frame)
         if frame == self._position_request:
             self._requested = self.time
-        mode = self._safety.values["MODE"]
         for one in self.controllers.values():
-            is_on = (one is self._safety or mode != SafetyMode.ESTOP) and self.time >= one.deaf_until
+            has_power = one.node == BusNode.SAFETY_MODULE or self._safety["MODE"] != SafetyMode.ESTOP
+            is_on = has_power and self.time >= one.deaf_until
             if is_on and one.is_addressed(frame) and (answer := one.take(frame, self.time)):
                 self._spend(answer)
                 self._queue += self.on_line(answer) or ()
-        wanted, self._safety.values["MODE"] = self._safety.values["MODE"], mode
-        if wanted < mode and self._safety.values["VERS"] >= BUS.settable_version:  # only a person goes upwards
-            self._set_mode(SafetyMode(wanted))
 
     def _spend(self, frame: Frame) -> None:
         """Let the bits of a frame pass, at 1 Mbit/s, one in ten of them stuffed."""
-        self._advance(self.time + (52 + 9 * len(frame.data)) * 1000)
+        self._advance(self.time + (52 + 9 * len(frame.data)) * 1e-6)
 
-    def _advance(self, until: int) -> None:
-        """Step the plant up to a time, ns."""
-        while self._reached + self._step <= until:
+    def _advance(self, until: float) -> None:
+        """Step the plant up to a time, s."""
+        while self._reached + self._step <= until + 1e-9:
             self._plant.step(self.torque, 1)
             self._reached += self._step
             self.time = max(self.time, self._reached)
@@ -201,7 +168,7 @@ class SimulatedBus:
     @property
     def commanded(self) -> list[int | None]:
         """Counts that the motors follow, None where they brake."""
-        is_active = self._safety.values["MODE"] == SafetyMode.ACTIVE
+        is_active = self._safety["MODE"] == SafetyMode.ACTIVE
         states = (one.values for one in self._motors)
         return [one["T"] if is_active and one["MODE"] == BUS.torque_mode else None for one in states]
 
@@ -219,34 +186,29 @@ class SimulatedBus:
 
     # safety module and person
 
-    def press(self, button: Button) -> None:
-        """Press a button of the pendant."""
-        modes = {Button.ESTOP: SafetyMode.ESTOP, Button.IDLE: SafetyMode.IDLE, Button.ACTIVATE: SafetyMode.ACTIVE}
-        if button is not Button.ACTIVATE or self._safety.values["MODE"] == SafetyMode.IDLE:
-            self._set_mode(modes[button])
-        self._show(Pendant(button))
-
-    def _set_mode(self, mode: SafetyMode) -> None:
-        if mode == self._safety.values["MODE"]:
-            return
-        self._safety.values["MODE"] = mode
-        self._requested = self._pressed = self.time
-        for one in self._motors:
-            one.values["MODE"] = BUS.torque_mode if mode is SafetyMode.ACTIVE else BUS.idle_mode
-            one.values["T"] = 0
-            if mode is SafetyMode.ESTOP:
-                one.values["STAT"], self._safety.values["ZERO"] = 0, 0
-
-    def _show(self, pendant: Pendant) -> None:
-        self._safety.values["PEN"] = pendant.value
+    def press(self, mode: SafetyMode) -> None:
+        """A person presses the button of a mode."""
+        if mode != SafetyMode.ACTIVE or self._safety["MODE"] == SafetyMode.IDLE:
+            self._safety["MODE"] = mode
+        self._safety["PEN"] = pendant_of()
 
     def _fault(self, quantity: str, mode: SafetyMode) -> None:
-        self._set_mode(mode)
-        self._show(Pendant(Button.NONE, (quantity,)))
+        self._safety |= {"MODE": mode, "PEN": pendant_of(quantity)}
+
+    def _follow(self, mode: int) -> None:
+        """What a new mode of the safety module does to the controllers."""
+        self._mode, self._requested, self._pressed = mode, self.time, self.time
+        for one in self._motors:
+            one.values |= {"MODE": BUS.torque_mode if mode == SafetyMode.ACTIVE else BUS.idle_mode, "T": 0}
+            if mode == SafetyMode.ESTOP:
+                one.values |= {"STAT": 0, "P": 1000 * one.node}  # the zero is lost
+                self._safety["ZERO"] = 0
 
     def _watch(self) -> None:
-        values = self._safety.values
-        is_requested = self.time - self._requested <= nanoseconds(BUS.heartbeat)
+        values = self._safety
+        if values["MODE"] != self._mode:
+            self._follow(values["MODE"])
+        is_requested = self.time - self._requested <= BUS.heartbeat
         if values["MODE"] == SafetyMode.ACTIVE:
             speeds = self._body.start_and_tool_speeds(self._plant.q, self._plant.qd)
             if max(abs(one.values["T"]) for one in self._motors) > values["TL2"]:
@@ -255,8 +217,8 @@ class SimulatedBus:
                 self._fault("velocity", SafetyMode.IDLE)
             elif not is_requested:
                 self._fault("heartbeat", SafetyMode.ESTOP)
-        elif self.is_attended and self.time - self._pressed > nanoseconds(BUS.attention):
-            if values["MODE"] == SafetyMode.ESTOP or Pendant.of(values["PEN"]).faults:
-                self.press(Button.IDLE)
+        elif self.is_attended and self.time - self._pressed > BUS.attention:
+            if values["MODE"] == SafetyMode.ESTOP or faults(values["PEN"]):
+                self.press(SafetyMode.IDLE)
             elif values["ZERO"] and is_requested:
-                self.press(Button.ACTIVATE)
+                self.press(SafetyMode.ACTIVE)

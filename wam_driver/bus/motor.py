@@ -1,0 +1,54 @@
+"""One motor, by what its controller sends and takes."""
+
+import math
+
+from wam_driver.bus.frames import counts
+from wam_driver.thresholds import BUS
+
+
+class Motor:
+    """Its angle and velocity, and the current that it is sent.
+
+    Parameters
+    ----------
+    node : its controller.
+    turn : counts per turn.
+    gain : counts of torque per ampere.
+    limit : largest torque, counts.
+
+    Attributes
+    ----------
+    position, velocity : rad, rad/s.
+    current : that was sent, A.
+    missed : periods since the last position, as the cycle counts them.
+    has_jumped : whether one was dropped since then.
+    """
+
+    def __init__(self, node: int, turn: int, gain: float, limit: int) -> None:
+        self.node, self._step, self._gain, self._limit = node, math.tau / turn, gain, limit
+        self.position = self.velocity = self.current = 0.0
+        self.missed, self.has_jumped = 0, False
+        self._time = math.nan  # s, of the last position
+
+    def count_at(self, angle: float) -> int:
+        """Counts at an angle, rad."""
+        return math.floor(angle / self._step)
+
+    def torque(self, current: float) -> int:
+        """Counts of torque for a current, A, clipped."""
+        count = max(-self._limit, min(self._limit, round(current * self._gain)))
+        self.current = count / self._gain
+        return count
+
+    def take(self, answer: bytes, time: float) -> bool:
+        """Take the position that its controller answers at a time, s, unless the motor cannot be there."""
+        position = counts(answer) * self._step
+        moved, dt = position - self.position, time - self._time
+        if dt > 0.0:
+            if abs(moved) > BUS.jump and abs(moved) > BUS.jump * dt / BUS.silent:
+                self.has_jumped = True
+                return False
+            self.velocity = moved / dt
+        self.position, self._time = position, time
+        self.missed, self.has_jumped = 0, False
+        return True
