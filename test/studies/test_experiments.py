@@ -33,7 +33,7 @@ from wam_studies.thesis import (
 )
 from wam_studies.thesis.definition import configured, load, names
 from wam_studies.thesis.evaluation import function_of
-from wam_studies.thesis.one_link import growth, one_link
+from wam_studies.thesis.one_link import growth, one_link, played
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result, markdown, plain
@@ -172,9 +172,10 @@ def test_verdict_on_a_step_follows_from_its_last_windows(tmp_path: Path) -> None
     for verdict, force in shapes.items():
         topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
         run = recorded(experiment, 2, topics, (step,), tmp_path)
-        shown = testbed.response(run, one_link(run), step)
-        assert testbed.measured_verdict(run, step, shown) == verdict
-        assert testbed.measured_verdict(run._replace(fault="cable", fault_time=2.0), step, shown) == "diverged"
+        shown = played(run, step)
+        assert shown.verdict == verdict
+        stopped = run._replace(fault="cable", fault_time=2.0)
+        assert shown._replace(run=stopped).verdict == "diverged"
 
 
 def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Path) -> None:
@@ -262,12 +263,17 @@ def test_step_response_of_an_exponential(tmp_path: Path) -> None:
     assert not largest.agrees
 
 
-def test_errors_at_rest_are_those_of_the_standstills() -> None:
+def test_errors_at_rest_are_those_of_the_standstills(tmp_path: Path) -> None:
     time = np.arange(0.0, 1.0, 1e-3)
     speed = np.where((time % 0.25) < 0.1, 0.0, 0.3)
     force = np.select([time < 0.25, time < 0.5, time < 0.75], [0.0, 8.0, 9.5], 9.9)
-    shown = step_response.MeasuredResponse(time, force, force, speed)
-    assert step_response.errors_at_rest(shown, 10.0) == pytest.approx([2.0, 0.5, 0.1])
+    topics = {
+        "joint_sensors": joints(time, -force * LEVER / STIFFNESS, -speed),
+        "motor_states": joints(time, 0.0),
+        "force_command": forces(time, (0.0, -10.0, 0.0)),
+    }
+    shown = played(recorded(load("step-response"), 0, topics, PRESS, tmp_path))
+    assert step_response.errors_at_rest(shown) == pytest.approx([2.0, 0.5, 0.1], rel=1e-3)
 
 
 def test_resonance_is_where_the_damped_response_has_it_without_damping() -> None:

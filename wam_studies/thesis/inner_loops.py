@@ -9,7 +9,7 @@ from wam_control.velocity.torque_loop import TorqueLoopParameters
 from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque, period_map
 from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import OneLink, growth, joint_stiffness, one_link, response
+from wam_studies.thesis.one_link import OneLink, Played, growth, joint_stiffness, played
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, near
 
@@ -36,9 +36,9 @@ def friction_left(runs: Runs) -> Result:
     """Half of the distance between the force on the way out and on the way back, where the command is the same."""
     rows, curves = [], []
     for name, run in runs.items():
-        link, label = one_link(run), name.replace("_", " ")
+        shown, label = played(run), name.replace("_", " ")
+        link, command = shown.link, _command(shown)
         friction = run.shared.arm.motors.dynamic_friction[0] * link.ratio / link.lever
-        command, shown = _command(run, link), response(run, link)
         there, again = (
             (shown.time >= step.begin) & (shown.time <= step.end) for step in (run.step("out"), run.step("back"))
         )
@@ -63,17 +63,17 @@ def torque_sample(runs: Runs) -> Result:
     return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
 
 
-def _command(run: Recording, link: OneLink) -> Numbers:
+def _command(shown: Played) -> Numbers:
     """Force, N, at the times of the sensors, of the commanded torque; of a position, that without friction."""
-    time = run.joints("joint_sensors").time
+    run, link = shown.run, shown.link
     if not _has(run, "position_loop"):
         command = run.joints("motor_effort_command")
-        return -np.interp(time, command.time, command.effort[:, 0]) * link.ratio / link.lever
+        return -np.interp(shown.time, command.time, command.effort[:, 0]) * link.ratio / link.lever
     command = run.joints("motor_velocity_command")
     turned = -np.cumsum(command.velocity[:, 0]) * run.shared.timing.period
     node, k = link.node, run.shared.servo.integral_gain[0] * link.ratio**2
     series = 1.0 / (1.0 / k + 1.0 / node.transmission_stiffness + 1.0 / node.contact_stiffness)
-    return np.interp(time, command.time, turned) / link.ratio * series / link.lever
+    return np.interp(shown.time, command.time, turned) / link.ratio * series / link.lever
 
 
 def _part_left(run: Recording, link: OneLink) -> float:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -12,10 +13,11 @@ from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop_parameters import AXES
 from wam_description.arm import Arm, seconds
 from wam_description.world import Springs
+from wam_studies.figures.panels import Line, Series, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
-from wam_theory.stick_slip import FrictionNode, IntegralLoop, Outcome, Verdict, assess
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Motion, Verdict, simulate
 
 Numbers = NDArray[np.float64]
 LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
@@ -50,11 +52,6 @@ class OneLink(NamedTuple):
         """(5.12)."""
         n = self.node
         return float(damping_ratio(n.inertia, n.damping, n.transmission_stiffness, n.contact_stiffness))
-
-    def state(self, shown: "MeasuredResponse") -> tuple[float, float, float]:
-        """x, v and x_m at the start of a response."""
-        x = float(shown.force[0]) * self.lever / self.node.contact_stiffness
-        return x, float(shown.speed[0]), float(shown.motor[0])
 
     def tip_gain(self, gain: float) -> float:
         """G_I at the tip, (m/s)/N, from that at the joint, (rad/s)/(N m)."""
@@ -125,51 +122,77 @@ def set_until(recording: Recording, step: Step) -> dict[str, Any]:
     return found
 
 
-class MeasuredResponse(NamedTuple):
-    """Contact force at the tip and motor at the joint over the time of a step."""
+class Played(NamedTuple):
+    """A step of a testbed's run, or all of the run: the loop in it, and what it did."""
 
+    run: Recording
+    step: Step | None
+    link: OneLink
     time: Numbers  # s
     force: Numbers  # N, of the arm on the spring
     motor: Numbers  # rad at the joint, positive as it presses
     speed: Numbers  # rad/s of the joint, positive as it presses
 
+    @property
+    def line(self) -> Series:
+        """The force over time."""
+        return measured(self.time, self.force)
 
-def response(recording: Recording, link: OneLink, step: Step | None = None) -> MeasuredResponse:
-    """Response in a step, or in the whole run."""
-    sensors, motors = recording.joints("joint_sensors"), recording.joints("motor_states")
+    @property
+    def desired(self) -> float:
+        """Commanded force at its begin, N."""
+        command = self.run.forces("force_command")
+        return float(np.linalg.norm(command.force[np.searchsorted(command.time, self.time[0] - 1e-9)]))
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """x, v and x_m at its begin."""
+        x = float(self.force[0]) * self.link.lever / self.link.node.contact_stiffness
+        return x, float(self.speed[0]), float(self.motor[0])
+
+    def exact(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0), is_sampled: bool = True) -> Motion:
+        """The exact motion at its times.
+
+        Parameters
+        ----------
+        start : x, v and x_m.
+        is_sampled : whether the loop is; otherwise it is continuous.
+        """
+        link, loop = self.link, self.link.loop if is_sampled else replace(self.link.loop, sample_period=0.0)
+        motion = simulate(link.node, loop, self.desired * link.lever, float(np.ptp(self.time)), start)
+        return motion.at(self.time - self.time[0])
+
+    def exact_line(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0), is_sampled: bool = True) -> Line:
+        """The exact force over time, named; arguments as of `exact`."""
+        return "exact", line_only(self.time, self.exact(start, is_sampled).contact_force / self.link.lever)
+
+    @property
+    def verdict(self) -> str:
+        """Settled, limit cycle or diverged, from the spans of the last two quarters.
+
+        It is diverged if the driver stopped the arm, or if the span still grows.
+        """
+        if self.step and self.step.begin <= self.run.fault_time <= self.step.end:
+            return str(Verdict.DIVERGED)
+        quarter = len(self.force) // 4
+        before, late = (float(np.ptp(part)) for part in (self.force[-2 * quarter : -quarter], self.force[-quarter:]))
+        size = max(float(np.ptp(self.force)), 1e-9)
+        if late < BOUNDS.settled_span * size or late < (1.0 - BOUNDS.steady_span) * before:
+            return str(Verdict.SETTLED)
+        return str(Verdict.DIVERGED if late > (1.0 + BOUNDS.steady_span) * before else Verdict.LIMIT_CYCLE)
+
+
+def played(run: Recording, step: Step | None = None) -> Played:
+    """What a run did in a step, or in all of it."""
+    link = one_link(run, set_until(run, step) if step else None)
+    sensors, motors = run.joints("joint_sensors"), run.joints("motor_states")
     begin, end = (step.begin, step.end) if step else (0.0, math.inf)
-    if not math.isnan(recording.fault_time):
-        end = min(end, recording.fault_time)
+    if not math.isnan(run.fault_time):
+        end = min(end, run.fault_time)
     chosen = (sensors.time >= begin - 1e-9) & (sensors.time <= end + 1e-9)
-    force = -link.node.contact_stiffness * sensors.position[chosen, 0] / link.lever
-    motor = -np.interp(sensors.time[chosen], motors.time, motors.position[:, 0]) / link.ratio
-    return MeasuredResponse(sensors.time[chosen], force, motor, -sensors.velocity[chosen, 0])
-
-
-def desired_force(recording: Recording, time: float) -> float:
-    """Commanded force at a time, N."""
-    command = recording.forces("force_command")
-    return float(np.linalg.norm(command.force[np.searchsorted(command.time, time - 1e-9)]))
-
-
-def measured_verdict(recording: Recording, step: Step, shown: MeasuredResponse) -> str:
-    """Verdict on a recorded step, settled, limit cycle or diverged, from the spans of its last two quarters.
-
-    It is diverged if the driver stopped the arm, or if the span still grows.
-    """
-    if step.begin <= recording.fault_time <= step.end:
-        return str(Verdict.DIVERGED)
-    quarter = len(shown.force) // 4
-    before, late = (float(np.ptp(part)) for part in (shown.force[-2 * quarter : -quarter], shown.force[-quarter:]))
-    size = max(float(np.ptp(shown.force)), 1e-9)
-    if late < BOUNDS.settled_span * size or late < (1.0 - BOUNDS.steady_span) * before:
-        return str(Verdict.SETTLED)
-    return str(Verdict.DIVERGED if late > (1.0 + BOUNDS.steady_span) * before else Verdict.LIMIT_CYCLE)
-
-
-def predicted_outcome(link: OneLink, shown: MeasuredResponse, force: float) -> Outcome:
-    """Verdict of the exact integrator from the initial state of a response, for a desired force, N."""
-    return assess(link.node, link.loop, force * link.lever, start=link.state(shown))
+    time, force = sensors.time[chosen], -link.node.contact_stiffness * sensors.position[chosen, 0] / link.lever
+    motor = -np.interp(time, motors.time, motors.position[:, 0]) / link.ratio
+    return Played(run, step, link, time, force, motor, -sensors.velocity[chosen, 0])
 
 
 class Growth(NamedTuple):

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from wam_studies.figures.panels import Numbers, Panel, line_only, measured
+from wam_studies.figures.panels import Numbers, Panel
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import MeasuredResponse, OneLink, desired_force, one_link, response
+from wam_studies.thesis.one_link import OneLink, Played, played
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
@@ -21,19 +21,12 @@ def responses(runs: Mapping[str, Recording]) -> Result:
     """The experiment `step-response`."""
     rows, panels = [], []
     for name, run in runs.items():
-        link = one_link(run)
-        shown = response(run, link, run.steps[-1])
-        force = desired_force(run, shown.time[0])
-        exact = simulate(link.node, link.loop, force * link.lever, float(np.ptp(shown.time)))
-        predicted = exact.at(shown.time - shown.time[0]).contact_force / link.lever
-        label = name.replace("_", " ")
-        rows += _first(label, link, shown, force)
-        largest = float(np.abs(shown.force - predicted).max()) / force
+        shown = played(run, run.steps[-1])
+        link, label, exact = shown.link, name.replace("_", " "), shown.exact_line()
+        rows += _first(label, shown)
+        largest = float(np.abs(shown.force - exact[1].y).max()) / shown.desired
         rows.append(below(f"{label}, largest difference from the exact response", largest, "of step", BOUNDS.within))
-        curves = [
-            ("measured", measured(shown.time, shown.force)),
-            ("exact", line_only(shown.time, predicted)),
-        ]
+        curves = [("measured", shown.line), exact]
         panels.append(Panel(f"{label}, gamma {link.gamma:.2f}: {domain(link)}", "time [s]", "force [N]", curves))
     return Result(rows, panels)
 
@@ -42,35 +35,28 @@ def domain(link: OneLink) -> str:
     """Kind of the response by gamma (the ranges between gamma_a, gamma_b and 1)."""
     if not link.node.static_friction:
         return "linear"
-    low, high = float(gamma_a(link.zeta)), float(gamma_b(link.zeta))
-    if link.gamma < low:
-        return "one slip"
-    return (
-        "stairs from one side"
-        if link.gamma < high
-        else "domain I, overshoots"
-        if link.gamma < 1.0
-        else "domain II, III"
-    )
+    kinds = {"one slip": float(gamma_a(link.zeta)), "stairs from one side": float(gamma_b(link.zeta))}
+    kinds |= {"domain I, overshoots": 1.0, "domain II, III": math.inf}
+    return next(kind for kind, bound in kinds.items() if link.gamma < bound)
 
 
-def _first(label: str, link: OneLink, shown: MeasuredResponse, force: float) -> list[Comparison]:
+def _first(label: str, shown: Played) -> list[Comparison]:
     """Quantities with a closed form: time constant, delay, and ratio of the first two errors at rest."""
-    node, gain = link.node, link.loop.gain
-    stiffness = node.transmission_stiffness, node.contact_stiffness
+    link, node, gain, force = shown.link, shown.link.node, shown.link.loop.gain, shown.desired
     if not node.static_friction:
-        constant = float(integral_time_constant(gain, series_stiffness(*stiffness)))
-        return [near(f"{label}, time constant", constant, time_constant(shown, force), "s", "(5.2)")]
+        stiffness = series_stiffness(node.transmission_stiffness, node.contact_stiffness)
+        constant = integral_time_constant(gain, stiffness)
+        return [near(f"{label}, time constant", constant, time_constant(shown), "s", "(5.2)")]
     delay = float(breakaway_delay(gain, node.transmission_stiffness, node.static_friction, force * link.lever))
     moves = shown.time[np.flatnonzero(np.abs(shown.speed) > BOUNDS.stuck_speed)[0]] - shown.time[0]
     rows = [Comparison(f"{label}, delay", delay, float(moves), "s", BOUNDS.slip_delay, "(5.3)", True)]
-    errors = errors_at_rest(shown, force)
+    errors = errors_at_rest(shown)
     if link.gamma > float(gamma_a(link.zeta)) and len(errors) > 1:
-        ratio = float(-psi(link.gamma, link.zeta))
-        exact = exact_ratio(link, force)
-        quantity = f"{label}, error at the second rest over the first"
-        rows.append(near(quantity, ratio, errors[1] / errors[0], "", "(5.18)", BOUNDS.sample_and_hold))
-        rows.append(near(f"{quantity}, sampled", exact, errors[1] / errors[0], "", "integrator"))
+        ratio, quantity = errors[1] / errors[0], f"{label}, error at the second rest over the first"
+        rows += [
+            near(quantity, -psi(link.gamma, link.zeta), ratio, "", "(5.18)", BOUNDS.sample_and_hold),
+            near(f"{quantity}, sampled", exact_ratio(link, force), ratio, "", "integrator"),
+        ]
     return rows
 
 
@@ -81,22 +67,21 @@ def exact_ratio(link: OneLink, force: float) -> float:
     return rests[1] / rests[0]
 
 
-def time_constant(shown: MeasuredResponse, force: float) -> float:
+def time_constant(shown: Played) -> float:
     """1/e time of the error, s, from a line through its logarithm between 0.8 and 0.1 of the step."""
-    left = 1.0 - shown.force / force
+    left = 1.0 - shown.force / shown.desired
     part = (left < 0.8) & (left > 0.1)
     if part.sum() < 3:
         return math.nan
     return float(-1.0 / np.polyfit(shown.time[part], np.log(left[part]), 1)[0])
 
 
-def errors_at_rest(shown: MeasuredResponse, force: float) -> Numbers:
+def errors_at_rest(shown: Played) -> Numbers:
     """Error, N, in each standstill after the first slip."""
-    resting = np.abs(shown.speed) < BOUNDS.stuck_speed
+    resting, desired = np.abs(shown.speed) < BOUNDS.stuck_speed, shown.desired
     edges = np.flatnonzero(np.diff(resting.astype(int)))
-    bounds = [0, *(edges + 1).tolist(), len(resting)]
     found = []
-    for begin, end in pairwise(bounds):
-        if resting[begin] and begin > 0 and shown.time[end - 1] - shown.time[begin] > BOUNDS.shortest_standstill:
-            found.append(force - float(np.median(shown.force[begin:end])))
+    for begin, end in pairwise([*(edges + 1).tolist(), len(resting)]):
+        if resting[begin] and shown.time[end - 1] - shown.time[begin] > BOUNDS.shortest_standstill:
+            found.append(desired - float(np.median(shown.force[begin:end])))
     return np.array(found)

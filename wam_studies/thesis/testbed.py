@@ -1,7 +1,7 @@
 """Section 5.6: effect of friction, step size, saturation and delay on the stable gain."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,34 +10,25 @@ from wam_analysis.measures.limit_cycle import last_cycle
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_description.arm import Servo
-from wam_studies.figures.panels import Line, Panel, line_only, measured
+from wam_studies.figures.panels import Panel
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import (
-    ACROSS,
-    Growth,
-    OneLink,
-    desired_force,
-    growth,
-    measured_verdict,
-    one_link,
-    predicted_outcome,
-    response,
-    set_until,
-)
+from wam_studies.thesis.one_link import ACROSS, Growth, OneLink, growth, played
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result, near
 from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
-from wam_theory.stick_slip import Verdict, simulate
+from wam_theory.stick_slip import Verdict, assess
+
+Runs = Mapping[str, Recording]
+AXES = "time [s]", "force by deflection [N]"
+SAMPLED = "wam_control.force.sampled_loop"
 
 
-def section_5_6(runs: Mapping[str, Recording]) -> Result:
+def section_5_6(runs: Runs) -> Result:
     """Every run of the experiment `testbed-5.6`."""
     rows = margin(runs["below_the_margin"], runs["above_the_margin"], "without delay")
-    for name in ("rod", "large_step", "large_step_saturated"):
-        rows += verdicts(runs[name], name.replace("_", " "))
+    rows += _verdicts(runs, ("rod", "large_step", "large_step_saturated"))
     rows += margin(runs["delayed_below_the_margin"], runs["delayed_above_the_margin"], "one sample of delay")
-    for name in ("delayed_with_rod_at_0.8", "delayed_with_rod_at_0.9"):
-        rows += verdicts(runs[name], name.replace("_", " "))
+    rows += _verdicts(runs, ("delayed_with_rod_at_0.8", "delayed_with_rod_at_0.9"))
     panels = [
         _panel(runs, ("below_the_margin", "above_the_margin"), "0.95 and 1.05 of the margin"),
         _panel(runs, ("rod",), "1.5 of the margin, with rod, removed at the end"),
@@ -47,27 +38,24 @@ def section_5_6(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, panels)
 
 
-def as_described(runs: Mapping[str, Recording]) -> Result:
+def as_described(runs: Runs) -> Result:
     """The experiment `testbed-5.6-as-described`: verdict on every step and push, and the margin with the rod."""
-    rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
-    below, above = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
-    link, gains = below[0], [one.loop.gain for one, _ in (below, above)]
-    gain = gains[0] + (gains[1] - gains[0]) * (1.0 - below[1]) / (above[1] - below[1])
+    (link, low), (other, high) = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
+    gain = link.loop.gain + (other.loop.gain - link.loop.gain) * (1.0 - low) / (high - low)
     expected = friction_margin(link, BOUNDS.small_step)
-    rows += [
+    rows = [
+        *_verdicts(runs, runs),
         near("marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", "integrator"),
         near("over that without", expected / link.margin.gain, gain / link.margin.gain, "", "5.6"),
     ]
-    panels = [_panel(runs, (name,), name.replace("_", " ")) for name in runs]
-    return Result(rows, panels)
+    return Result(rows, [_panel(runs, (name,), name.replace("_", " ")) for name in runs])
 
 
 def _ratio_at_rest(run: Recording) -> tuple[OneLink, float]:
     """The loop of the last step, and the median ratio of the errors at successive standstills in it, Psi."""
-    step = run.steps[-1]
-    link = one_link(run, set_until(run, step))
-    errors = np.abs(errors_at_rest(response(run, link, step), desired_force(run, step.begin)))
-    return link, float(np.median(errors[1:] / errors[:-1]))
+    shown = played(run, run.steps[-1])
+    errors = np.abs(errors_at_rest(shown))
+    return shown.link, float(np.median(errors[1:] / errors[:-1]))
 
 
 def friction_margin(link: OneLink, step: float) -> float:
@@ -80,60 +68,40 @@ def friction_margin(link: OneLink, step: float) -> float:
     return low
 
 
-def large_step(runs: Mapping[str, Recording]) -> Result:
+def large_step(runs: Runs) -> Result:
     """The run with a large step only: its verdict."""
-    rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
-    return Result(rows, [_panel(runs, tuple(runs), "large step")])
+    return Result(_verdicts(runs, runs), [_panel(runs, runs, "large step")])
 
 
-def own_servo(runs: Mapping[str, Recording]) -> Result:
+def own_servo(runs: Runs) -> Result:
     """The experiment `testbed-own-servo`: the margin with the testbed's velocity loop instead of an ideal source."""
-    below, above = runs["below_the_margin"], runs["above_the_margin"]
-    ideal = margin(below, above, "")[0]
-    with_servo = margin_with_servo(below)
+    below, above = runs.values()
+    ideal, with_servo = margin(below, above, "")[0], margin_with_servo(below)
     rows = [
         ideal._replace(quantity="marginal gain, compared with that of an ideal velocity source", bound=math.nan),
-        ideal._replace(
-            quantity="marginal gain, with the velocity loop",
-            predicted=with_servo,
-            equation="wam_control.force.sampled_loop",
-        ),
+        ideal._replace(quantity="marginal gain, with the velocity loop", predicted=with_servo, equation=SAMPLED),
     ]
-    panel = Panel(
-        "either side of the margin",
-        "time [s]",
-        "force by deflection [N]",
-        [_last_step(name.replace("_", " "), run) for name, run in runs.items()],
-    )
-    return Result(rows, [panel])
+    return Result(rows, [_last_steps("either side of the margin", runs)])
 
 
-def own_servo_sample(runs: Mapping[str, Recording]) -> Result:
+def own_servo_sample(runs: Runs) -> Result:
     """One run of `testbed-own-servo`: growth or decay by the margin with the velocity loop."""
-    ((name, run),) = runs.items()
+    (run,) = runs.values()
     link, oscillation = _oscillation(run)
     fraction = link.tip_gain(link.loop.gain) / margin_with_servo(run)
-    row = _growth_row(fraction, oscillation, "with the velocity loop", "wam_control.force.sampled_loop")
-    shown = _last_step(name.replace("_", " "), run)
-    return Result([row], [Panel("above the margin", "time [s]", "force by deflection [N]", [shown])])
+    row = _growth_row(fraction, oscillation, "with the velocity loop", SAMPLED)
+    return Result([row], [_last_steps("above the margin", runs)])
 
 
 def _growth_row(fraction: float, oscillation: Growth, how: str, law: str) -> Comparison:
     """Growth or decay of an oscillation at this fraction of the marginal gain."""
-    expected = "decays" if fraction < 1.0 else "grows"
-    return Comparison(
-        f"at {fraction:.2f} of the margin, {how}",
-        expected,
-        "grows" if oscillation.rate > 0.0 else "decays",
-        "",
-        0.0,
-        law,
-    )
+    expected, found = (("decays", "grows")[grows] for grows in (fraction >= 1.0, oscillation.rate > 0.0))
+    return Comparison(f"at {fraction:.2f} of the margin, {how}", expected, found, equation=law)
 
 
-def _last_step(label: str, run: Recording) -> Line:
-    shown = response(run, one_link(run), run.steps[-1])
-    return (label, measured(shown.time, shown.force))
+def _last_steps(title: str, runs: Runs) -> Panel:
+    lines = [(name.replace("_", " "), played(run, run.steps[-1]).line) for name, run in runs.items()]
+    return Panel(title, *AXES, lines)
 
 
 def margin_with_servo(run: Recording) -> float:
@@ -166,36 +134,27 @@ def margin(below: Recording, above: Recording, how: str) -> list[Comparison]:
 
 def _oscillation(run: Recording) -> tuple[OneLink, Growth]:
     """The loop in the last step, and the growth of its oscillation after the transient."""
-    link = one_link(run, set_until(run, run.steps[-1]))
-    shown = response(run, link, run.steps[-1])
+    shown = played(run, run.steps[-1])
     late = shown.time > shown.time[0] + BOUNDS.mode_transient
-    return link, growth(shown.time[late], shown.force[late])
+    return shown.link, growth(shown.time[late], shown.force[late])
 
 
-def verdicts(run: Recording, name: str) -> list[Comparison]:
-    """Verdict on each step of a run, predicted from its initial state by the exact integrator."""
+def _verdicts(runs: Runs, names: Iterable[str]) -> list[Comparison]:
+    """Verdict on each step of these runs, predicted from its initial state by the exact integrator."""
     rows: list[Comparison] = []
-    for step in run.steps:
-        if _is_pushed(run, step):
+    for name, step in [(run, step) for run in names for step in runs[run].steps]:
+        if _is_pushed(runs[name], step):
             continue
-        link = one_link(run, set_until(run, step))
-        shown = response(run, link, step)
-        outcome = predicted_outcome(link, shown, desired_force(run, step.begin))
-        label, law = f"{name}, {step.name}", "(5.14)-(5.17)"
-        rows.append(Comparison(label, str(outcome.verdict), measured_verdict(run, step, shown), equation=law))
+        shown, label = played(runs[name], step), f"{name.replace('_', ' ')}, {step.name}"
+        link = shown.link
+        outcome = assess(link.node, link.loop, shown.desired * link.lever, start=shown.start)
+        rows.append(Comparison(label, str(outcome.verdict), shown.verdict, equation="(5.14)-(5.17)"))
         if outcome.verdict is Verdict.LIMIT_CYCLE:
-            found = last_cycle(shown.time, shown.force)
-            rows.append(
-                near(
-                    f"{label}, peak to peak",
-                    outcome.peak_to_peak / link.lever,
-                    found.peak_to_peak,
-                    "N",
-                    "",
-                    BOUNDS.long_cycle,
-                )
-            )
-            rows.append(near(f"{label}, period", outcome.period, found.period, "s", "", BOUNDS.long_cycle))
+            found, swing = last_cycle(shown.time, shown.force), outcome.peak_to_peak / link.lever
+            rows += [
+                near(f"{label}, peak to peak", swing, found.peak_to_peak, "N", within=BOUNDS.long_cycle),
+                near(f"{label}, period", outcome.period, found.period, "s", within=BOUNDS.long_cycle),
+            ]
     return rows
 
 
@@ -203,22 +162,14 @@ def _is_pushed(run: Recording, step: Step) -> bool:
     return bool(run.forces("sim/disturbance").during(step.begin, step.end - BOUNDS.rounding).force.any())
 
 
-def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> Panel:
+def _panel(runs: Runs, names: Iterable[str], title: str) -> Panel:
     """Forces over time, with the exact response of the last step if it starts at rest."""
     curves = []
     for name in names:
         run = runs[name]
-        step = run.steps[-1]
-        link = one_link(run, set_until(run, step))
         is_plain = len(run.steps) <= BOUNDS.plain_steps
-        last = response(run, link, step)
-        shown = last if is_plain else response(run, link)
-        curves.append((name.replace("_", " "), measured(shown.time, shown.force)))
+        shown = played(run, run.steps[-1] if is_plain else None)
+        curves.append((name.replace("_", " "), shown.line))
         if is_plain:
-            exact = simulate(
-                link.node, link.loop, desired_force(run, step.begin) * link.lever, np.ptp(last.time), link.state(last)
-            )
-            curves.append(
-                ("exact", line_only(last.time, exact.at(last.time - last.time[0]).contact_force / link.lever))
-            )
-    return Panel(title, "time [s]", "force by deflection [N]", curves)
+            curves.append(shown.exact_line(shown.start))
+    return Panel(title, *AXES, curves)
