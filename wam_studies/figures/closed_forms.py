@@ -4,8 +4,7 @@ import numpy as np
 
 from wam_studies.figures.panels import Mark, Panel, Panels, Series, line_only
 from wam_studies.plant.effects import efficiency_under_load, resonances
-from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
-from wam_theory.cable import efficiency, stage_loss
+from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, limiting_efficiency, link_inertia
 from wam_theory.requisites import largest_cylinder, secure_angle, useful_length
 from wam_theory.resonance import (
     best_contact_stiffness,
@@ -73,12 +72,8 @@ def breakpoints() -> Panels:
 
 def efficiencies() -> Panels:
     """Upper bound (6.15): the testbed over torque and the plant in slow motion; equal stages over the tension."""
-    cables, found = ideal_testbed().cables, efficiency_under_load()
-    torques = np.linspace(0.0, 7.5, 60)
-    line = [
-        efficiency(stage_loss(t, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
-        for t in torques
-    ]
+    arm, found, torques = ideal_testbed(), efficiency_under_load(), np.linspace(0.0, 7.5, 60)
+    line = [limiting_efficiency(arm, torque) for torque in torques]
     strain = np.linspace(0.0, 0.03, 60)
     equal = [(f"n = {n}", line_only(1e2 * strain, equal_stages_efficiency(strain, 1.0, float(n)))) for n in range(1, 7)]
     testbed, power = Series(torques, np.array(line), found.x, found.plant), "power out over power in [-]"

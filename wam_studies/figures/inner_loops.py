@@ -13,10 +13,17 @@ import numpy as np
 
 from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
-from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Numbers, Panel, Panels, Series
-from wam_studies.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
+from wam_studies.plant.ideal_testbed import (
+    RATIO,
+    against_spring,
+    amplitude,
+    ideal_testbed,
+    link_inertia,
+    released_plant,
+    stepped_map,
+)
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
 
@@ -80,17 +87,8 @@ def period_map(arm: Arm, contact: float = CASE.contact) -> tuple[Numbers, Number
 def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
     """The same by stepping the plant from each unit state and under a unit torque."""
     plant = released_plant(arm, against_spring(CASE.contact), CASE.period / CASE.substeps)
-    small, torque = 1e-6 * np.eye(4), 1e-3
-    columns = [_after(plant, state, 0.0) / 1e-6 for state in small]
-    return np.array(columns).T, _after(plant, np.zeros(4), torque)[:, None] / torque
-
-
-def _after(plant: Plant, state: Numbers, torque: float) -> Numbers:
-    plant.data.qpos[:], plant.data.qvel[:] = state[:2], state[2:]
-    for _ in range(CASE.substeps):
-        plant.step([torque])
-    found: Numbers = np.concatenate([plant.data.qpos, plant.data.qvel])
-    return found
+    state, inlet = stepped_map(plant, CASE.substeps)
+    return state, inlet[:, None]
 
 
 def largest_gain(maps: tuple[Numbers, Numbers], gain: Numbers) -> float:
@@ -102,10 +100,8 @@ def largest_gain(maps: tuple[Numbers, Numbers], gain: Numbers) -> float:
 def left_of_disturbance(maps: tuple[Numbers, Numbers], gain: Numbers, frequency: Numbers) -> Numbers:
     """Amplitude of F_c over that of a torque at the motor, held over each period, frequency in Hz."""
     state, inlet = maps
-    closed = state - inlet * gain
     z = np.exp(2j * np.pi * frequency * CASE.period)
-    found: Numbers = CASE.contact * np.abs([np.linalg.solve(v * np.eye(4) - closed, inlet[:, 0])[1] for v in z])
-    return found
+    return CASE.contact * amplitude(state - inlet * gain, inlet[:, 0], z, 1)
 
 
 def inner_loops() -> Panels:

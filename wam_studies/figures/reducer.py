@@ -12,10 +12,12 @@ from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     RATIO,
     STEP,
+    amplitude,
+    frequencies,
     ideal_testbed,
     link_inertia,
-    one_step_map,
     released_plant,
+    stepped_map,
 )
 from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import force_transfer, position_bandwidth
@@ -64,21 +66,13 @@ def static_stiffness(arm: Arm, torque: float = 5.0) -> float:
 
 def link_frequency(arm: Arm) -> float:
     """Frequency of the link behind a rotor that does not turn, rad/s, from the plant's one-step map."""
-    angles = np.angle(np.linalg.eigvals(one_step_map(released_plant(arm))))
-    return float(angles.max()) / STEP
+    return float(frequencies(released_plant(arm))[-1])
 
 
-def force_amplitude(arm: Arm, frequencies: Numbers) -> Numbers:
-    """Amplitude of F_c over that of the motor's torque, from the plant's steps out of rest; frequencies in rad/s."""
-    plant = loop_plant(arm, CASE.contact)
-    state = one_step_map(plant)
-    plant.data.qpos[:], plant.data.qvel[:] = 0.0, 0.0
-    plant.step([1e-3])
-    inlet = np.concatenate([plant.data.qpos, plant.data.qvel]) / 1e-3
-    z = np.exp(1j * frequencies * STEP)
-    found = np.array([np.linalg.solve(value * np.eye(4) - state, inlet)[1] for value in z])
-    amplitude: Numbers = CASE.contact * np.abs(found)
-    return amplitude
+def force_amplitude(arm: Arm, omega: Numbers) -> Numbers:
+    """Amplitude of F_c over that of the motor's torque, from the plant's steps out of rest, over rad/s."""
+    state, inlet = stepped_map(loop_plant(arm, CASE.contact))
+    return CASE.contact * amplitude(state, inlet, np.exp(1j * omega * STEP), 1)
 
 
 def reducer() -> Panels:

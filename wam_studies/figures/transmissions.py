@@ -18,8 +18,15 @@ from wam_driver.friction import FrictionParameters
 from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Panel, Panels, Series
-from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, against_spring, link_inertia, one_step_map
-from wam_theory.cable import efficiency, stage_loss
+from wam_studies.plant.ideal_testbed import (
+    EMPTY,
+    IMMOVABLE,
+    against_spring,
+    frequencies,
+    limiting_efficiency,
+    link_inertia,
+    power_ratio,
+)
 from wam_theory.resonance import force_resonances
 
 HZ = 0.5 / math.pi
@@ -128,19 +135,17 @@ def predicted(kind: str) -> TransmissionMeasures:
         "direct drive": CASE.coupling,
     }[kind]
     lower = float(force_resonances(rotor, link_inertia(it.arm), rigid / it.ratio**2, CASE.contact, it.ratio).lower)
-    losses = {
-        "cables": stage_loss(
-            motors.peak_torque[0], cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio
-        ),
-        "shaft and gears": np.array([CASE.gear_meshes * CASE.mesh_loss]),
-        "direct drive": np.zeros(1),
+    efficiency = {
+        "cables": limiting_efficiency(it.arm, motors.peak_torque[0]),
+        "shaft and gears": 1.0 - CASE.gear_meshes * CASE.mesh_loss,
+        "direct drive": 1.0,
     }[kind]
     factor = it.friction.joint_load_factor[0]
     return TransmissionMeasures(
         rigid,
         0.1e-3 / 36.83e-3 if kind == "shaft and gears" else 0.0,
         HZ * lower,
-        efficiency(losses),
+        efficiency,
         link_inertia(it.arm) + it.ratio**2 * rotor,
         joints.static_friction[0] + (1.0 + factor) * it.ratio * motors.static_friction[0],
         rotor / driven("cables").arm.motors.inertia[0],
@@ -182,8 +187,7 @@ def _deflection(it: Driven, torque: float) -> float:
 def bandwidth(it: Driven, contact: float) -> float:
     """Lower frequency of the plant without play, rad/s, on a spring at the joint, N m/rad."""
     smooth = it._replace(friction=driven("cables").friction)
-    angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(smooth.plant(world=against_spring(contact), play=False)))))
-    return float(np.sort(angles)[0]) / it.step
+    return float(frequencies(smooth.plant(world=against_spring(contact), play=False), it.step)[0])
 
 
 def _efficiency(it: Driven) -> float:
@@ -197,12 +201,7 @@ def _efficiency(it: Driven) -> float:
     count = round(1.0 / it.step)
     for _ in range(count // 2):
         plant.step([0.0])
-    begin, work = plant.q[0], 0.0
-    for _ in range(count):
-        before = plant.theta[0]
-        plant.step([0.0])
-        work += plant.circuit_torque[0] * (plant.theta[0] - before)
-    return load * (plant.q[0] - begin) / work
+    return power_ratio(plant, load, count)
 
 
 def _inertia(it: Driven, torque: float = 5.0, seconds: float = 2.0) -> float:

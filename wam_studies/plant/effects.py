@@ -22,13 +22,17 @@ from wam_studies.plant.ideal_testbed import (
     NOTHING,
     STEP,
     against_spring,
+    breakaway,
+    crept,
+    frequencies,
     ideal_testbed,
+    limiting_efficiency,
     link_inertia,
-    one_step_map,
+    power_ratio,
     released_plant,
 )
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
-from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
+from wam_theory.cable import circuit_torque, eccentric_ripple, play_torque
 from wam_theory.friction_model import IntegralLoop
 from wam_theory.stick_slip import simulate
 from wam_theory.tension_element import coulomb_like_torque
@@ -106,10 +110,8 @@ def creep_out_and_back(
         over the motor's absolute travel, rad; angles at the joint, rad.
     """
     plant = _loaded(torque, terminated)
-    arm = ideal_testbed()
     rest = plant.q[0] - plant.theta[0] / 14.0
-    travel, crept = [], []
-    done = 0.0
+    travel, found, done = [], [], 0.0
     for direction in (1.0, -1.0) * rounds:
         plant.data.qvel[:] = (direction * speed, direction * speed / 14.0)
         for _ in range(round(seconds / STEP / 40)):
@@ -117,11 +119,8 @@ def creep_out_and_back(
             _run(plant, 40 * STEP)
             done += abs(plant.theta[0] - before)
             travel.append(done)
-            crept.append(plant.q[0] - plant.theta[0] / 14.0 - rest)
-    at_motor = torque / 14.0
-    stages = zip(arm.cables.stage_ratio, arm.cables.stage_radius, arm.cables.stage_ea, strict=True)
-    expected = sum(n * creep(np.array(travel) / n, n * at_motor, r, ea) for n, r, ea in stages)
-    return PlantCurve(np.array(travel), np.array(crept), np.asarray(expected) / 14.0)
+            found.append(plant.q[0] - plant.theta[0] / 14.0 - rest)
+    return PlantCurve(np.array(travel), np.array(found), crept(ideal_testbed(), travel, torque))
 
 
 def _loaded(torque: float, terminated: bool = False) -> Plant:
@@ -142,17 +141,8 @@ def efficiency_under_load() -> PlantCurve:
         plant = _loaded(-14.0 * torque)
         plant.data.qvel[:] = (5.0, 5.0 / 14.0)
         _run(plant, 1.5)
-        q, work = plant.q[0], 0.0
-        for _ in range(round(1.0 / STEP)):
-            before = plant.theta[0]
-            plant.step([0.0])
-            work += plant.circuit_torque[0] * (plant.theta[0] - before)
-        efficiencies.append(14.0 * torque * (plant.q[0] - q) / work)
-    cables = ideal_testbed().cables
-    theory = [
-        efficiency(stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
-        for torque in torques
-    ]
+        efficiencies.append(power_ratio(plant, 14.0 * torque, round(1.0 / STEP)))
+    theory = [limiting_efficiency(ideal_testbed(), torque) for torque in torques]
     return PlantCurve(torques, np.array(efficiencies), np.array(theory))
 
 
@@ -207,11 +197,8 @@ def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
 
 def resonances(ratio: float, stiffness: Numbers) -> Numbers:
     """Both resonances of (4.4) from the plant's own one-step map, (2, k), rad/s, over k_c at the joint, N m/rad."""
-    arm, found = ideal_testbed(ratio), []
-    for k in stiffness:
-        angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, against_spring(k))))))
-        found.append(np.sort(angles)[[0, 2]] / STEP)
-    return np.array(found).T
+    arm = ideal_testbed(ratio)
+    return np.array([frequencies(released_plant(arm, against_spring(k)))[[0, 2]] for k in stiffness]).T
 
 
 def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
@@ -382,9 +369,5 @@ def pretension(coefficient: float = 1e-4) -> PlantCurve:
     for value in tension.tolist():
         less = replace(arm, cables=replace(arm.cables, pretension=(value,)))
         plant = released_plant(less, tension_friction=(coefficient,))
-        torque = 0.9 * coefficient * 2.0 * value
-        while abs(plant.thetad[0]) < 1e-5:
-            torque *= 1.00001
-            plant.step([torque])
-        found.append(torque)
+        found.append(breakaway(plant, 0.9 * coefficient * 2.0 * value))
     return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)

@@ -4,13 +4,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.plant import Plant
+from wam_theory import cable
 
 Numbers = NDArray[np.float64]
 STEP = 2.5e-4  # s
@@ -73,14 +74,60 @@ def link_inertia(arm: Arm) -> float:
     return arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
 
 
-def one_step_map(plant: Plant) -> Numbers:
-    """Matrix that takes angles and velocities over one step, by stepping from each unit state."""
-    size, small = plant.model.nv, 1e-6
-    columns = []
-    for i in range(2 * size):
-        state = np.zeros(2 * size)
-        state[i] = small
+def stepped_map(plant: Plant, steps: int = 1) -> tuple[Numbers, Numbers]:
+    """What takes angles and velocities, and a held torque of one motor, over some steps: by stepping from units."""
+    size, small, torque = plant.model.nv, 1e-6, 1e-3
+
+    def after(state: Numbers, torque: float) -> Numbers:
         plant.data.qpos[:], plant.data.qvel[:] = state[:size], state[size:]
+        for _ in range(steps):
+            plant.step([torque])
+        return np.concatenate([plant.data.qpos, plant.data.qvel])
+
+    columns = [after(state, 0.0) / small for state in small * np.eye(2 * size)]
+    return np.array(columns).T, after(np.zeros(2 * size), torque) / torque
+
+
+def amplitude(state: Numbers, inlet: Numbers, z: NDArray[np.complex128], row: int) -> Numbers:
+    """Amplitude of an element of the state over that of the input, at each z of a sampled map."""
+    found: Numbers = np.abs([np.linalg.solve(one * np.eye(len(state)) - state, inlet)[row] for one in z])
+    return found
+
+
+def frequencies(plant: Plant, step: float = STEP) -> Numbers:
+    """Undamped frequencies of the plant, each twice, the lowest first, rad/s, from its map over a step."""
+    found: Numbers = np.sort(np.abs(np.angle(np.linalg.eigvals(stepped_map(plant)[0])))) / step
+    return found
+
+
+def power_ratio(plant: Plant, load: float, steps: int) -> float:
+    """Work on a load at the joint, N m, over work of the motor, in so many steps of slow turning."""
+    q, work = plant.q[0], 0.0
+    for _ in range(steps):
+        before = plant.theta[0]
         plant.step([0.0])
-        columns.append(np.concatenate([plant.data.qpos, plant.data.qvel]) / small)
-    return np.array(columns).T
+        work += plant.circuit_torque[0] * (plant.theta[0] - before)
+    return load * (plant.q[0] - q) / work
+
+
+def breakaway(plant: Plant, torque: float) -> float:
+    """Torque of the motor, N m, slowly increased from this one, at which the rotor begins to turn."""
+    while plant.thetad[0] < 1e-5:
+        torque *= 1.00001
+        plant.step([torque])
+    return torque
+
+
+def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
+    """Creep at the joint, rad, under a load at the joint, N m, over the motor's travel, (6.19)."""
+    cables, ratio = arm.cables, arm.joint_from_motor[0]
+    stages = zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, cables.stage_circuits, strict=True)
+    total = sum(n * cable.creep(np.asarray(travel) / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
+    return np.asarray(total) * ratio
+
+
+def limiting_efficiency(arm: Arm, torque: float) -> float:
+    """Power out over power in, at most, (6.15), under a torque of the motor, N m."""
+    cables = arm.cables
+    losses = cable.stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio)
+    return cable.efficiency(losses)

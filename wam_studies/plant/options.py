@@ -11,7 +11,7 @@ from wam_driver.driver import DriverParameters
 from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_studies.plant.effects import PlantCurve, creep_out_and_back, surface
-from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, STEP, ideal_testbed, released_plant
+from wam_studies.plant.ideal_testbed import EMPTY, IMMOVABLE, STEP, breakaway, ideal_testbed, released_plant
 
 
 def terminated_creep() -> PlantCurve:
@@ -76,9 +76,5 @@ def warm_friction(drop: float = 0.3) -> PlantCurve:
         plant = Plant(arm, EMPTY, no_effects(arm), STEP, replace(COULOMB_STICTION, warm_drop=drop))
         plant.brake(False)
         plant.heat([w])
-        torque = 0.045 * (1.0 - drop * w)
-        while plant.thetad[0] < 1e-5:
-            torque *= 1.00001
-            plant.step([torque])
-        found.append(torque)
+        found.append(breakaway(plant, 0.045 * (1.0 - drop * w)))
     return PlantCurve(heat, np.array(found), 0.05 * (1.0 - drop * heat))

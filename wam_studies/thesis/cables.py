@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from wam_description.arm import Arm
-from wam_studies.figures.panels import Numbers, Panel, line_only, measured
+from wam_studies.figures.panels import Panel, line_only, measured
+from wam_studies.plant.ideal_testbed import crept, limiting_efficiency
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result, near
-from wam_theory import cable
 
 
 def efficiency(runs: Mapping[str, Recording]) -> Result:
@@ -22,7 +20,7 @@ def efficiency(runs: Mapping[str, Recording]) -> Result:
         if not step.name.startswith("lift"):
             continue
         torque, input_work, output_work = work(run, step, after)
-        predicted = 1.0 - cable.efficiency(_losses(arm, torque))
+        predicted = 1.0 - limiting_efficiency(arm, torque)
         lost = 1.0 - output_work / input_work
         rows.append(near(f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * lost, "%", "(6.15)"))
         torques.append(torque)
@@ -108,16 +106,3 @@ def corrected(runs: Mapping[str, Recording]) -> Result:
         )
         curves.append((label, measured(joints.time, 1e3 * error)))
     return Result(rows, [Panel("error of the joint angle, from motor angles", "time [s]", "error [mrad]", curves)])
-
-
-def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
-    """Creep at the joint, rad, under a load at the joint, N m, over the motor's travel, (6.19)."""
-    cables, ratio = arm.cables, arm.joint_from_motor[0]
-    stages = zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, cables.stage_circuits, strict=True)
-    total = sum(n * cable.creep(np.asarray(travel) / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
-    return np.asarray(total) * ratio
-
-
-def _losses(arm: Arm, torque: float) -> Numbers:
-    cables = arm.cables
-    return cable.stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import yaml
 
+from wam_control.task.scenario_values import known
 from wam_description import yaml_text
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, require
@@ -104,8 +105,8 @@ def load(name: str) -> Experiment:
         path = Path(name)
         require(path.is_file(), f"experiment {path} is not a file")
     else:
-        known = [*names(), *tasks()]
-        require(name in known, f"no experiment is named '{name}'; choose from {', '.join(known)}")
+        every = [*names(), *tasks()]
+        require(name in every, f"no experiment is named '{name}'; choose from {', '.join(every)}")
         path = packaged(f"{TASKS if name in tasks() else FOLDER}/{name}")
     experiment = _built(str(path), _tree(path), Experiment)
     require(bool(experiment.runs), f"{path}: 'runs' must be a list with at least one")
@@ -188,9 +189,5 @@ def _tree(path: Path) -> Any:
 def _built(where: str, body: Any, kind: type[T]) -> T:
     """A tuple of this kind with the fields that a mapping gives."""
     fields, optional = kind._fields, kind._field_defaults  # type: ignore[attr-defined]
-    require(isinstance(body, dict), f"{where} is {body!r}; it must be a mapping with {', '.join(fields)}")
-    for key in body:
-        require(key in fields, f"{where}: unknown key '{key}'; allowed: {', '.join(fields)}")
-    for key in fields:
-        require(key in body or key in optional, f"{where}: '{key}' is missing")
+    known(where, body, fields, [key for key in fields if key not in optional])
     return kind(**body)
