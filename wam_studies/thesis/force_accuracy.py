@@ -7,7 +7,7 @@ import numpy as np
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import Played, played, set_until
+from wam_studies.thesis.one_link import TestbedStep, played, set_until
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.stiction import play
@@ -64,7 +64,7 @@ def active_pretension(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
 
 
-def _last(shown: Played, step: Step) -> int:
+def _last(shown: TestbedStep, step: Step) -> int:
     return int(np.searchsorted(shown.time, step.end)) - 1
 
 
@@ -74,7 +74,7 @@ def _share(run: Recording, step: Step) -> float:
     return float(found[0])
 
 
-def _fed_forward(shown: Played) -> Numbers:
+def _fed_forward(shown: TestbedStep) -> Numbers:
     """F_des from the torque of the motor, N, at the times of the sensors."""
     motors = shown.run.joints("motor_states")
     torque = -np.interp(shown.time, motors.time, motors.effort[:, 0])
@@ -82,7 +82,7 @@ def _fed_forward(shown: Played) -> Numbers:
     return desired
 
 
-def _calibration(name: str, shown: Played) -> Comparison:
+def _calibration(name: str, shown: TestbedStep) -> Comparison:
     """Settled force of a loop that knows another stiffness of its spring: F_des k/k_known."""
     known = shown.run.node("force_loop", ForceLoopParameters).spring_stiffness[0]
     settled = shown.force[shown.time > shown.time[-1] - BOUNDS.settled_force]

@@ -9,7 +9,7 @@ from wam_control.velocity.torque_loop import TorqueLoopParameters
 from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque, period_map
 from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import OneLink, Played, growth, joint_stiffness, played
+from wam_studies.thesis.one_link import OneLink, TestbedStep, growth, joint_stiffness, played
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, near
 
@@ -63,7 +63,7 @@ def torque_sample(runs: Runs) -> Result:
     return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
 
 
-def _command(shown: Played) -> Numbers:
+def _command(shown: TestbedStep) -> Numbers:
     """Force, N, at the times of the sensors, of the commanded torque; of a position, that without friction."""
     run, link = shown.run, shown.link
     if not _has(run, "position_loop"):

@@ -8,7 +8,7 @@ import numpy as np
 from wam_analysis.measures.limit_cycle import CycleExtent, last_cycle
 from wam_studies.figures.panels import Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import OneLink, Played, played
+from wam_studies.thesis.one_link import OneLink, TestbedStep, played
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cycle_work
@@ -58,7 +58,7 @@ def _closed_form(link: OneLink, found: CycleExtent) -> tuple[list[Comparison], s
     return rows, f"(5.8) and (5.9) hold for (5.11) far below 1; here it is {number:.3f}"
 
 
-def _with_deadband(shown: Played, force: float) -> list[Comparison]:
+def _with_deadband(shown: TestbedStep, force: float) -> list[Comparison]:
     """The deadband of half the cycle, and the remaining motion in the last half of the run."""
     late = shown.force[len(shown.force) // 2 :]
     deadband = shown.link.loop.deadband / shown.link.lever
@@ -69,7 +69,7 @@ def _with_deadband(shown: Played, force: float) -> list[Comparison]:
     ]
 
 
-def _with_smaller_deadband(shown: Played, force: float) -> Comparison:
+def _with_smaller_deadband(shown: TestbedStep, force: float) -> Comparison:
     link = shown.link
     fraction = 2.0 * link.loop.deadband / link.lever / force
     predicted = assess(link.node, replace(link.loop, sample_period=0.0), shown.desired * link.lever).verdict
@@ -105,7 +105,7 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, panels, (remark,))
 
 
-def half_cycle_work(shown: Played) -> tuple[float, float, float, float]:
+def half_cycle_work(shown: TestbedStep) -> tuple[float, float, float, float]:
     """Work, N m, and power, W, of the actuator in the last whole half cycle; its error, N m, and duration, s.
 
     Positive work on the spring of the stuck node, by the cable force in excess of the contact force.  Returned work

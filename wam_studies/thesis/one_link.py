@@ -122,7 +122,7 @@ def set_until(recording: Recording, step: Step) -> dict[str, Any]:
     return found
 
 
-class Played(NamedTuple):
+class TestbedStep(NamedTuple):
     """A step of a testbed's run, or all of the run: the loop in it, and what it did."""
 
     run: Recording
@@ -140,13 +140,13 @@ class Played(NamedTuple):
 
     @property
     def desired(self) -> float:
-        """Commanded force at its begin, N."""
+        """Commanded force at its start, N."""
         command = self.run.forces("force_command")
         return float(np.linalg.norm(command.force[np.searchsorted(command.time, self.time[0] - 1e-9)]))
 
     @property
     def start(self) -> tuple[float, float, float]:
-        """x, v and x_m at its begin."""
+        """x, v and x_m at its start."""
         x = float(self.force[0]) * self.link.lever / self.link.node.contact_stiffness
         return x, float(self.speed[0]), float(self.motor[0])
 
@@ -182,7 +182,7 @@ class Played(NamedTuple):
         return str(Verdict.DIVERGED if late > (1.0 + BOUNDS.steady_span) * before else Verdict.LIMIT_CYCLE)
 
 
-def played(run: Recording, step: Step | None = None) -> Played:
+def played(run: Recording, step: Step | None = None) -> TestbedStep:
     """What a run did in a step, or in all of it."""
     link = one_link(run, set_until(run, step) if step else None)
     sensors, motors = run.joints("joint_sensors"), run.joints("motor_states")
@@ -192,7 +192,7 @@ def played(run: Recording, step: Step | None = None) -> Played:
     chosen = (sensors.time >= begin - 1e-9) & (sensors.time <= end + 1e-9)
     time, force = sensors.time[chosen], -link.node.contact_stiffness * sensors.position[chosen, 0] / link.lever
     motor = -np.interp(time, motors.time, motors.position[:, 0]) / link.ratio
-    return Played(run, step, link, time, force, motor, -sensors.velocity[chosen, 0])
+    return TestbedStep(run, step, link, time, force, motor, -sensors.velocity[chosen, 0])
 
 
 class Growth(NamedTuple):

@@ -9,7 +9,7 @@ from wam_analysis.measures.limit_cycle import last_cycle
 from wam_driver.driver import DriverParameters
 from wam_studies.figures.panels import Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import Played, one_link
+from wam_studies.thesis.one_link import TestbedStep, one_link
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
@@ -50,7 +50,7 @@ def sampled(runs: Runs) -> Result:
     return Result(_with_friction(shown), [_motors([("", shown)])])
 
 
-def _with_friction(shown: Played) -> list[Comparison]:
+def _with_friction(shown: TestbedStep) -> list[Comparison]:
     link, level, desired = shown.link, _level(shown), shown.desired
     there = shown.time > 0.4 * shown.time[-1]
     cycle, within = last_cycle(shown.time[there], shown.motor[there]), BOUNDS.neglected_delays
@@ -63,20 +63,20 @@ def _with_friction(shown: Played) -> list[Comparison]:
     ]
 
 
-def _motors(shown: Sequence[tuple[str, Played]]) -> Panel:
+def _motors(shown: Sequence[tuple[str, TestbedStep]]) -> Panel:
     lines = [(label, measured(each.time, each.motor)) for label, each in shown]
     return Panel("motor", "time [s]", "motor at the joint [rad]", lines)
 
 
-def _level(shown: Played) -> float:
+def _level(shown: TestbedStep) -> float:
     """A step of the measured force at the tip, N."""
     (resolution,) = shown.run.node("driver", DriverParameters).sensors.joint_encoder_resolution
     return resolution * shown.link.node.contact_stiffness / shown.link.lever
 
 
-def _true(run: Recording) -> Played:
+def _true(run: Recording) -> TestbedStep:
     """What a run did, by the simulator's truth."""
     truth, motors, link = run.joints("sim/joint_states"), run.joints("motor_states"), one_link(run)
     force = -link.node.contact_stiffness * truth.position[:, 0] / link.lever
     motor = -np.interp(truth.time, motors.time, motors.position[:, 0]) / link.ratio
-    return Played(run, None, link, truth.time, force, motor, -truth.velocity[:, 0])
+    return TestbedStep(run, None, link, truth.time, force, motor, -truth.velocity[:, 0])

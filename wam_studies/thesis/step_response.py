@@ -8,7 +8,7 @@ import numpy as np
 
 from wam_studies.figures.panels import Numbers, Panel
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import OneLink, Played, played
+from wam_studies.thesis.one_link import OneLink, TestbedStep, played
 from wam_studies.thesis.recording import Recording
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
@@ -40,7 +40,7 @@ def domain(link: OneLink) -> str:
     return next(kind for kind, bound in kinds.items() if link.gamma < bound)
 
 
-def _first(label: str, shown: Played) -> list[Comparison]:
+def _first(label: str, shown: TestbedStep) -> list[Comparison]:
     """Quantities with a closed form: time constant, delay, and ratio of the first two errors at rest."""
     link, node, gain, force = shown.link, shown.link.node, shown.link.loop.gain, shown.desired
     if not node.static_friction:
@@ -67,7 +67,7 @@ def exact_ratio(link: OneLink, force: float) -> float:
     return rests[1] / rests[0]
 
 
-def time_constant(shown: Played) -> float:
+def time_constant(shown: TestbedStep) -> float:
     """1/e time of the error, s, from a line through its logarithm between 0.8 and 0.1 of the step."""
     left = 1.0 - shown.force / shown.desired
     part = (left < 0.8) & (left > 0.1)
@@ -76,7 +76,7 @@ def time_constant(shown: Played) -> float:
     return float(-1.0 / np.polyfit(shown.time[part], np.log(left[part]), 1)[0])
 
 
-def errors_at_rest(shown: Played) -> Numbers:
+def errors_at_rest(shown: TestbedStep) -> Numbers:
     """Error, N, in each standstill after the first slip."""
     resting, desired = np.abs(shown.speed) < BOUNDS.stuck_speed, shown.desired
     edges = np.flatnonzero(np.diff(resting.astype(int)))
