@@ -26,7 +26,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from simulation import scenario, scenario_steps, seconds
 
-from wam_analysis.demo_summary import summarize
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
 from wam_bag.columns import JointColumns
 from wam_description.configuration import Configuration, packaged
@@ -403,8 +403,9 @@ MOVED = 1e-3  # rad, of a joint since the first message
 
 def kept(run: Run) -> float:
     """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended."""
-    loop = summarize(read(run.bag)).loop
-    return 100.0 * (1.0 - loop.missed / loop.periods) if loop.periods else 0.0
+    last = AnalysedRecording(read(run.bag)).loop[-1]
+    missed, periods = (float(last.get(name, 0)) for name in ("missed periods", "periods"))
+    return 100.0 * (1.0 - missed / periods) if periods else 0.0
 
 
 def first_motion(folder: Path, name: str, options: list[str]) -> float:

@@ -2,14 +2,16 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import (
+from wam_analysis.held_messages import held_rows
+from wam_analysis.measures.runs import runs
+from wam_analysis.thresholds import TOUCH
+from wam_analysis.traces import (
     HYPOTHESIS,
     NAN,
     ForceSignal,
@@ -20,9 +22,6 @@ from wam_analysis.demo_traces import (
     Traces,
     most_probable,
 )
-from wam_analysis.held_messages import held_rows
-from wam_analysis.measures.runs import runs
-from wam_analysis.thresholds import TOUCH
 from wam_description.event_text import REASONS
 from wam_sim.recording import RecordedRun, RecordedStep
 
@@ -32,12 +31,10 @@ NOT_PLACED = "not recorded (contact/point), so it is not known whether a force i
 NOT_ESTIMATED = "the estimated contact was not recorded"
 
 
-class CutBy(Enum):
-    """What cuts off a contact at one of its ends."""
-
-    NOTHING = ""
-    RECORDING = "recording"  # begins or ends there
-    GAP = "gap"  # the signal is missing there, and comes again
+CUT = (  # off by the recording, or where the signal is missing and comes again
+    ("it began before the recording", "the estimate is missing before it"),
+    ("it goes past the end of the recording", "the estimate is missing after it"),
+)
 
 
 class Estimate(NamedTuple):
@@ -74,7 +71,7 @@ class ListedContact(NamedTuple):
     ----------
     step : name of the step, '' outside of a scenario.
     begin, end : s of the arm's time; from the start of the recording where that is a system's clock.
-    before, after : what cuts it off there.
+    cut : what cuts it off there, '' for nothing.
     true : the true link, 'none' where nothing was touched, '' where the true contact was not recorded.
     true_position, true_force : m and N; of that link, in the same time.
     latency : s from the start of the true contact to this detection, below zero if the contact was reported before; NaN
@@ -84,8 +81,7 @@ class ListedContact(NamedTuple):
     step: str
     begin: float
     end: float
-    before: CutBy
-    after: CutBy
+    cut: tuple[str, str]
     estimate: Estimate
     true: str
     true_position: float
@@ -141,7 +137,7 @@ class TouchedLink(NamedTuple):
 Certainty = dict[str, Numbers]  # columns of `contact/hypotheses` at each instant; NaN where they are not known
 
 
-def certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
+def _certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
     """Of the estimated contact at each instant."""
     numbers = {name: np.full(len(traces.stamp), NAN) for name in HYPOTHESIS}
     if (hypotheses := most_probable(run)) is not None:
@@ -152,12 +148,10 @@ def certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
     return numbers
 
 
-def listed_contacts(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
-    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends.
-
-    Without a scenario they are cut where another commanded force begins that lasts.
-    """
-    bounds = [step.begin for step in steps] or _other_commands(traces)
+def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
+    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends."""
+    certainty = _certainty_of(run, traces)
+    bounds = [step.begin for step in steps]
     rows = cut_at(traces.stamp, contacts_by_link(traces.stamp, traces.estimated), bounds)
     detected = list(_detections(traces))
     listed = (_listed(traces, certainty, steps, begin, end) for begin, end in rows)
@@ -177,7 +171,7 @@ def _detections(traces: Traces) -> Iterator[tuple[int, float]]:
     for begin, end in contacts_by_link(traces.stamp, traces.true):
         before, last = last, end
         seen = np.flatnonzero(estimated.acts[begin:end])
-        if cut_ends(traces.true, begin, end)[0] is not CutBy.NOTHING or not len(seen):
+        if _cut(traces.true, begin, end)[0] or not len(seen):
             continue
         row = begin + int(seen[0])
         if row == begin:
@@ -232,20 +226,17 @@ def median(values: Numbers) -> float:
     return float(np.median(known)) if len(known) >= TOUCH.lasting * len(values) > 0 else NAN
 
 
-def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[CutBy, CutBy]:
-    """What cuts off a contact in the rows [begin, end) before and after it.
+def _cut(signal: ForceSignal, begin: int, end: int) -> tuple[str, str]:
+    """What cuts off a contact in the rows [begin, end) before and after it, '' for nothing.
 
     A part of a contact that is followed by another part of it is not cut there.
     """
     known = signal.is_known
-    return _cut_by(known[:begin][::-1]), _cut_by(known[end:])
-
-
-def _cut_by(known: Mask) -> CutBy:
-    """What cuts off a contact, from where its signal is known outside of it, the nearest instant first."""
-    if len(known) and known[0]:
-        return CutBy.NOTHING
-    return CutBy.GAP if np.any(known) else CutBy.RECORDING
+    before, after = (
+        "" if len(outside) and outside[0] else why[bool(np.any(outside))]
+        for outside, why in zip((known[:begin][::-1], known[end:]), CUT, strict=True)
+    )
+    return before, after
 
 
 def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]:
@@ -265,15 +256,6 @@ def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tupl
             starts.append(int(acting[first]))
         link = names[first]
     return list(pairwise([*starts, end]))
-
-
-def _other_commands(traces: Traces) -> list[int]:
-    """Stamps from which on the commanded force stays as it is for `plateau`, ns; a ramp belongs to what was before."""
-    force, stamp = np.nan_to_num(traces.commanded.force), traces.stamp
-    if not len(stamp):
-        return []
-    constant = _constant(np.any(force[1:] != force[:-1], axis=1))
-    return [int(stamp[first]) for first, after in constant if stamp[after - 1] - stamp[first] >= TOUCH.plateau]
 
 
 def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
@@ -303,7 +285,7 @@ def _listed(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep],
     there = acting[true.frame[acting] == touched]
     return ListedContact(
         *time_of(traces, steps, begin, end),
-        *cut_ends(estimated, begin, end),
+        _cut(estimated, begin, end),
         estimate(traces, certainty, rows),
         touched,
         median(true.position[there]),

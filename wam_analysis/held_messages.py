@@ -1,10 +1,14 @@
 """Messages at other times: which is held, where a topic has none, and joints in the order of some names."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
 from wam_bag.bag import JointColumns
+from wam_description.arm import Arm
+from wam_description.transmission_map import TransmissionMap
 from wam_sim.recording import RecordedRun
 
 Times = NDArray[np.int64]
@@ -54,12 +58,18 @@ def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> NDArr
     return values if order == list(range(values.shape[1])) else values[:, order]
 
 
-def lacking(run: RecordedRun, *names: str) -> tuple[str, ...]:
-    """Those of some topics that were not recorded; of what was refused that is known."""
-    refused = {one.topic for one in run.refused}
-    return tuple(
-        name
-        for name in names
-        if name not in refused
-        and not ((columns := run.bag.topics.get(f"{run.namespace}/{name}")) and len(columns.log_time_ns))
-    )
+def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, NDArray[np.float64]] | None:
+    """Stamps, (k,), ns, and angles of the joints, (k, n), rad, of the best topic that has them; None without any."""
+    for topic in ("sim/joint_states", "joint_sensors", "joint_states", "motor_states"):
+        columns, is_motors = run.joints(topic), topic == "motor_states"
+        names = arm.motors.names if is_motors else arm.joints.names
+        angles = None if columns is None else by_names(columns, "position", names)
+        if columns is not None and angles is not None and np.any(good := np.isfinite(angles).all(axis=1)):
+            found = angles[good]
+            return columns.stamp_ns[good], found @ TransmissionMap.of(arm).joint_from_motor.T if is_motors else found
+    return None
+
+
+def row_at(stamps: NDArray[Any], at: Any) -> Any:
+    """Row of the last of some rising stamps at or before each of some instants, 0 where there is none."""
+    return np.maximum(np.searchsorted(stamps, at, side="right") - 1, 0)

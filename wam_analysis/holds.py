@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import Traces
 from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.task_forces import TaskForce
 from wam_analysis.thresholds import HOLD
+from wam_analysis.traces import Traces
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recording import RecordedRun, RecordedStep
 

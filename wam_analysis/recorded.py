@@ -9,7 +9,7 @@ from wam_description.arm import Arm, Servo, Timing
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects
 from wam_description.parameters import build_part
-from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_description.world import World
 from wam_sim.recorded_parameters import RecordedParameters
 
 T = TypeVar("T")
@@ -28,7 +28,7 @@ class PredictionParameters(NamedTuple):
 
     Attributes
     ----------
-    springs : under the joints.
+    world : the surroundings.
     effects : of the simulated transmission.
     commutation : torque ripple of each simulated motor as a fraction of its torque, and its cycles per turn.
     force_loop : gains and limits.
@@ -37,8 +37,7 @@ class PredictionParameters(NamedTuple):
     """
 
     arm: Arm | None
-    obstacles: Obstacles | None
-    springs: Springs
+    world: World | None
     timing: Timing | None
     effects: Effects | None
     commutation: tuple[tuple[float, int], ...]
@@ -60,8 +59,7 @@ def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
 
     return PredictionParameters(
         arm=part(Arm, "driver", "arm."),
-        obstacles=part(Obstacles, "driver", "world.obstacles."),
-        springs=part(Springs, "driver", "world.springs.") or NO_SPRINGS,
+        world=part(World, "driver", "world."),
         timing=part(Timing, "driver", "timing."),
         effects=part(Effects, "driver", "effects."),
         commutation=_commutation(recorded.nodes.get("driver", {})),
@@ -77,16 +75,13 @@ def _commutation(driver: Mapping[str, Any]) -> tuple[tuple[float, int], ...]:
     return tuple(zip(fractions, cycles, strict=False))
 
 
-def recorded_arm(recorded: RecordedParameters) -> RecordedArm:
+def recorded_arm(recorded: PredictionParameters) -> RecordedArm:
     """The arm of the bag, or that of the packaged configuration 'wam' if the bag has none."""
-    try:
-        arm = recorded.part("driver", Arm, "arm.")
-        return RecordedArm(arm, recorded.part("driver", World, "world."), "")
-    except BagError as error:
-        reason = _reason(recorded, error)
+    if recorded.arm is not None and recorded.world is not None:
+        return RecordedArm(recorded.arm, recorded.world, "")
     configuration = Configuration.load(packaged("wam"))
     world = build_part(World, configuration.sections["driver"], "world.")
-    note = f"the arm in the picture is that of the packaged configuration 'wam': {reason}"
+    note = f"the arm in the picture is that of the packaged configuration 'wam': {recorded.note}"
     return RecordedArm(configuration.shared.arm, world, note)
 
 

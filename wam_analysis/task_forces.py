@@ -1,5 +1,6 @@
 """Forces that a task commands, each as long as it was commanded, and what was measured of it."""
 
+from collections.abc import Iterable
 from itertools import groupby
 from typing import NamedTuple
 
@@ -7,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.held_messages import rows_before_gaps
-from wam_bag.bag import BagError, TableColumns
 from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
@@ -17,6 +17,7 @@ from wam_sim.replay import tables
 
 Numbers = NDArray[np.float64]
 Times = NDArray[np.int64]
+RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns
 
 
 class TaskForce(NamedTuple):
@@ -41,23 +42,15 @@ class TaskForce(NamedTuple):
     force: Numbers
 
 
-def arm_of(run: RecordedRun) -> Arm | None:
-    """The arm of a run, None if its parameters are not in the bag."""
-    try:
-        return run.parameters.part("driver", Arm, "arm.")
-    except BagError:
-        return None
+def task_forces(tasks: Iterable[RecordedTask]) -> list[TaskForce]:
+    """The forces at points of links in some tasks, in the order of time."""
+    return [force for task, begin, end in tasks for force in _of(task, begin, end)]
 
 
-def task_forces(run: RecordedRun) -> list[TaskForce]:
-    """The forces at points of links in all tasks of a run, in the order of time; none if the arm is not known."""
-    return [force for task, begin, end in tasks_of(run) for force in _of(task, begin, end)]
-
-
-def tasks_of(run: RecordedRun) -> list[tuple[TaskCommand, int, int]]:
-    """Each task of a run with start and end, ns; none if the arm is not known."""
-    columns, arm = run.bag.topics.get(f"{run.namespace}/task_command"), arm_of(run)
-    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
+def tasks_of(run: RecordedRun, arm: Arm | None) -> list[RecordedTask]:
+    """Each task of a run; none if the arm is not known."""
+    columns = run.table("task_command")
+    if columns is None or arm is None:
         return []
     stamps = columns.stamp_ns.tolist()
     gaps = rows_before_gaps(columns.stamp_ns)
@@ -93,8 +86,8 @@ def _of(task: TaskCommand, begin: int, end: int) -> list[TaskForce]:
 
 def measured_force(run: RecordedRun, number: int, begin: int, end: int) -> tuple[Times, Numbers]:
     """Stamps, ns, and the force that was measured along an axis of a task, N, between two times."""
-    columns = run.bag.topics.get(f"{run.namespace}/task_axes")
-    if not isinstance(columns, TableColumns) or "measured" not in columns.columns:
+    columns = run.table("task_axes")
+    if columns is None or "measured" not in columns.columns:
         return np.empty(0, np.int64), np.empty(0)
     place = np.arange(len(columns.message)) - np.searchsorted(columns.message, columns.message)  # within its message
     stamps = columns.row_stamp_ns

@@ -73,7 +73,6 @@ class CycleThresholds:
     phase_samples: int = 8  # samples for each of them
     cycles: int = 3  # cycles that are needed
     shortest_period: float = 2.0  # samples; what repeats faster cannot be seen
-    gap: float = 2.5  # periods between two samples from which some are missing
     # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
     correlated: float = 0.9
     sure: float = 0.8  # confidence from which a limit cycle is reported as one
@@ -104,7 +103,6 @@ class CycleThresholds:
     # of a frequency: what remains so near to the first harmonics is the command with a changing size
     near_harmonic: float = 0.1
     lines: int = 3  # of a spectrum, that are reported
-    unsure: float = 0.02  # of the size of a cycle: a larger error is printed
     # of a size: a cycle whose second half has less of the first, or more, is reported as changing
     changing: float = 0.9
     # lines of a spectrum, frequency response
@@ -156,7 +154,6 @@ class TouchThresholds:
 
     # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
     bounce: int = 100_000_000
-    plateau: int = 500_000_000  # ns, for which a commanded force is the same
     lasting: float = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
     steady_link: float = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
     after_command: int = 100_000_000  # ns, for which the force of a push or a press may last after its command
@@ -230,8 +227,6 @@ class StreamThresholds:
     held: int = 100_000_000  # ns for which a message is held; after that the signal is unknown
     thinned: int = 2  # periods of a thinned topic for which a message is held
     fewest: int = 10  # messages of which the period of a topic is known
-    burst: float = 0.1  # of a period: messages that come so soon after the one before waited for their reader
-    lagged: float = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
     filled: float = 5.5  # periods of the longest gap that is filled by interpolation
     shown: int = 3  # messages of a topic that is shown
     transformed: int = 64  # messages of a topic whose spectrum is shown
@@ -274,7 +269,6 @@ class ReportLayout:
     column: int = 12  # width of a number in a table at least, columns
     stated: int = 3  # sentences of a line of the verdict
     changes: int = 4  # of parameters that are named
-    note: int = 160  # characters of a note on the parameters
     # pictures
     points: int = 6000  # points of a line
     digits: int = 6  # of a number

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.command_gaps import CommandGap
-from wam_analysis.demo_traces import NAN, Mask, Numbers, Times, Traces
+from wam_analysis.command_gaps import COMMANDS, CommandGap
 from wam_analysis.held_messages import held_rows
 from wam_analysis.thresholds import TOUCH
-from wam_bag.bag import BagError, TableColumns
+from wam_analysis.traces import NAN, Mask, Numbers, Traces
+from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
 from wam_sim.recording import RecordedRun, RecordedStep
@@ -72,8 +72,7 @@ def unplanned_contacts(
     """
     found: list[HardContact] = []
     unknown: list[str] = []
-    everywhere = _lacking(run)
-    is_planned, allowed = _planned(run, traces), _allowed(run, traces)
+    is_planned, allowed, unrecorded = _planned(run, traces), _allowed(run, traces), _unrecorded(run, traces, gaps)
     for name, begin, end in _parts(traces, steps):
         rows = begin + np.flatnonzero(~is_planned[begin:end])
         source, signal = "true", traces.true
@@ -83,35 +82,25 @@ def unplanned_contacts(
         if np.any(np.isnan(allowed[rows])):
             unknown.append(f"{LIMIT} of the force loop was not recorded, or cannot be read")
         rows = rows[signal.size[rows] > allowed[rows]]
-        for lacking, part in _by_what_is_lacking(traces.stamp[rows], everywhere, gaps):
-            if not np.any(part):
-                continue
-            hardest = int(rows[part][np.argmax(signal.size[rows[part]])])
-            seconds = (int(traces.stamp[hardest]) - traces.zero) / 1e9
-            hard = HardContact(name, seconds, float(signal.size[hardest]), float(allowed[hardest]), source)
-            if lacking:
-                unknown.append(f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded "
-                               f"({', '.join(lacking)})")  # fmt: skip
-            else:
-                found.append(hard)
+        doubtful = np.any([lacks[rows] for lacks in unrecorded.values()], axis=0)
+        if len(known := rows[~doubtful]):
+            row = known[np.argmax(signal.size[known])]
+            seconds = (int(traces.stamp[row]) - traces.zero) / 1e9
+            found.append(HardContact(name, seconds, float(signal.size[row]), float(allowed[row]), source))
+        if len(rows := rows[doubtful]):
+            lacking = ", ".join(topic for topic, lacks in unrecorded.items() if np.any(lacks[rows]))
+            unknown.append(f"one had {np.max(signal.size[rows]):.3g} N, and what may have been commanded then was not "
+                           f"recorded ({lacking})")  # fmt: skip
     return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
 
 
-def _lacking(run: RecordedRun) -> list[str]:
-    """Topics of commands that were not recorded; the arm itself has no disturbance."""
-    names = ["force_command", "task_command", *["sim/disturbance"][: run.is_simulated]]
-    return [name for name in names if f"{run.namespace}/{name}" not in run.bag.topics]
-
-
-def _by_what_is_lacking(
-    stamps: Times, everywhere: Sequence[str], gaps: Sequence[CommandGap]
-) -> list[tuple[list[str], Mask]]:
-    """Commands that were not recorded, and the stamps at which they were not; the last is where none is lacking."""
-    within = {topic: np.full(len(stamps), True) for topic in everywhere}
+def _unrecorded(run: RecordedRun, traces: Traces, gaps: Sequence[CommandGap]) -> dict[str, Mask]:
+    """When each command was not recorded, (k,), by topic; an arm that is not simulated has no disturbance."""
+    topics = COMMANDS if run.is_simulated else COMMANDS[:2]
+    found = {one: np.full(len(traces.stamp), f"{run.namespace}/{one}" not in run.bag.topics) for one in topics}
     for gap in gaps:
-        within[gap.topic] = within.get(gap.topic, np.full(len(stamps), False)) | gap.covers(stamps, TOUCH.after_command)
-    lacks = np.any([*within.values(), np.full(len(stamps), False)], axis=0)
-    return [([topic for topic, part in within.items() if np.any(part)], lacks), ([], ~lacks)]
+        found[gap.topic] |= gap.covers(traces.stamp, TOUCH.after_command)
+    return found
 
 
 def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int, int]]:
@@ -147,8 +136,8 @@ def _planned(run: RecordedRun, traces: Traces) -> Mask:
 
 def _of_task(run: RecordedRun, traces: Traces) -> Mask:
     """Whether a task is commanded, (k,): one with axes."""
-    columns = run.bag.topics.get(f"{run.namespace}/task_command")
-    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns):
+    columns = run.table("task_command")
+    if columns is None:
         return np.zeros(len(traces.stamp), bool)
     row, known = held_rows(columns.stamp_ns, traces.stamp)
     commanded: Mask = known & np.isin(row, columns.message)

@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import ForceSignal
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.held_messages import by_names
+from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.recorded import recorded_arm
-from wam_bag.bag import TableColumns
+from wam_analysis.recording import AnalysedRecording
+from wam_analysis.traces import ForceSignal
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
 from wam_live.object_meshes import ObjectMeshes, at_rest
@@ -40,38 +38,32 @@ class BagSource:
         if the bag has no joint states.
     """
 
-    def __init__(self, recording: AnalysedRun) -> None:
-        self.recorded = recorded_arm(recording.run.parameters)
-        self._stamps, self._angles = self._motion(recording)
-        self._traces = recording.summary.traces
+    def __init__(self, recording: AnalysedRecording) -> None:
+        self.recorded = recorded_arm(recording.parameters)
+        poses = joint_angles(recording.run, self.recorded.arm)
+        if poses is None:
+            raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
+        self._stamps, self._angles = poses
+        self._traces = recording.traces
         self._covers = self.recorded.arm.covers.names
         statuses = sorted(recording.run.stamped_statuses(), key=lambda one: one[0])
         self._statuses = [status for _, status in statuses]
         self._status_stamps = [stamp for stamp, _ in statuses]
-        columns = recording.bag.topics.get(f"{recording.namespace}/contact/hypotheses")
+        columns = recording.run.table("contact/hypotheses")
         self._likely: list[tuple[LikelyRange, ...]] = []
         self._estimated: list[Contact] = []
         self._likely_stamps: list[int] = []
-        if isinstance(columns, TableColumns):
+        if columns is not None:
             read = list(tables(columns))
             self._likely = [likely_of(table, self._covers) for table in read]
             self._estimated = [contact_of(table, self._covers) for table in read]
             self._likely_stamps = columns.stamp_ns.tolist()
-        self._objects = recording.bag.topics.get(f"{recording.namespace}/sim/objects")
+        self._objects = recording.run.table("sim/objects")
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
-
-    def _motion(self, recording: AnalysedRun) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Stamps, ns, and angles of the joints, rad, from the best topic in the bag."""
-        for name in ("sim/joint_states", "joint_sensors", "joint_states"):
-            columns = recording.run.joints(name)
-            angles = None if columns is None else by_names(columns, "position", self.recorded.arm.joints.names)
-            if columns is not None and angles is not None and np.any(good := np.all(np.isfinite(angles), axis=1)):
-                return columns.stamp_ns[good], angles[good]
-        raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
 
     def snapshot(self, stamp: int) -> Snapshot:
         """What there was at a time of the arm, ns."""
-        at = max(int(np.searchsorted(self._stamps, stamp, side="right")) - 1, 0)
+        at = row_at(self._stamps, stamp)
         traces, row = self._traces, int(np.searchsorted(self._traces.stamp, stamp, side="right")) - 1
         known = row >= 0
         estimate = bisect_right(self._likely_stamps, stamp) - 1
@@ -92,9 +84,9 @@ class BagSource:
     def _objects_at(self, stamp: int) -> tuple[ObjectState, ...]:
         """The objects of the world at a time of the arm, ns; none where they were not recorded."""
         found = self._objects
-        if not isinstance(found, TableColumns) or not found.columns:
+        if found is None or not found.columns:
             return ()
-        there = found.message == max(int(np.searchsorted(found.stamp_ns, stamp, side="right")) - 1, 0)
+        there = found.message == row_at(found.stamp_ns, stamp)
         return tuple(map(ObjectState._make, zip(*(found.columns[name][there] for name in ObjectState._fields))))  # noqa: B905 - columns of one table
 
     def past(self, stamp: int) -> Iterator[Snapshot]:
@@ -121,7 +113,7 @@ class BagSource:
 
 
 def play(
-    recording: AnalysedRun, port: int, at: float | None, until: Callable[[], bool], notify: Callable[[str], None]
+    recording: AnalysedRecording, port: int, at: float | None, until: Callable[[], bool], notify: Callable[[str], None]
 ) -> None:
     """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`.
 

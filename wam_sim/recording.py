@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
+from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_control.task.scenario import FORCE_LOOP
@@ -152,6 +152,12 @@ class RecordedRun(NamedTuple):
         pushed = [one for one in lasting(loop, end) if one.name is not Code.PUSHED or not is_braked(one.begin)]
         return tuple(sorted((*pushed, *lasting(faults, end)), key=lambda one: (one.begin, one.end, one.name)))
 
+    def lacking(self, *names: str) -> tuple[str, ...]:
+        """Those of some topics that were not recorded; of what was refused that is known."""
+        refused = {one.topic for one in self.refused}
+        found = {name: self.bag.topics.get(f"{self.namespace}/{name}") for name in names if name not in refused}
+        return tuple(name for name, columns in found.items() if columns is None or not len(columns.log_time_ns))
+
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
         columns = self.bag.topics.get(f"{self.namespace}/{topic}")
@@ -166,6 +172,11 @@ class RecordedRun(NamedTuple):
         """Columns of a PointStamped topic of the arm, None if nothing was recorded."""
         columns = self.bag.topics.get(f"{self.namespace}/{topic}")
         return columns if isinstance(columns, PointColumns) and len(columns.stamp_ns) else None
+
+    def table(self, topic: str) -> TableColumns | None:
+        """Columns of a topic of tables of the arm, None if nothing was recorded."""
+        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
+        return columns if isinstance(columns, TableColumns) and len(columns.stamp_ns) else None
 
     def messages(self, topic: str) -> Sequence[Any]:
         """Decoded messages of a topic that is no column, none if it was not recorded."""

@@ -165,7 +165,8 @@ def test_every_number_of_a_section_stands_in_its_tables_within_the_width(moving:
         for finding in section.findings:
             if math.isfinite(finding.measured):
                 number = bounded(shown(finding.measured), finding.is_lower_bound)
-                assert number + MARK * finding.deviates in found
+                error = f" +- {shown(finding.error)}" if math.isfinite(finding.error) else ""
+                assert number + error + MARK * finding.deviates in found
                 assert any(number in line.split() for line in lines)
             if math.isfinite(finding.predicted):
                 assert shown(finding.predicted) in found
@@ -214,7 +215,6 @@ def test_the_efficiency_is_that_of_the_friction_that_is_configured(moving: Recor
     assert 40.0 < found.measured < 95.0
     assert found.measured == pytest.approx(found.predicted, abs=5.0)
     assert "speeds and loads of this recording" in found.note
-    assert "at the speeds and loads of this recording" in " ".join(section_of(moving, "power").sentences)
 
 
 def test_missed_periods_are_counted_from_the_stamps(moving: Recorded) -> None:
@@ -231,21 +231,18 @@ def test_missed_periods_are_counted_from_the_stamps(moving: Recorded) -> None:
     assert moving.finding("motor_states: missed periods").measured == 0.0
 
 
-def test_latency_and_jitter_of_a_real_clock_come_from_the_times_of_reception(moving: Recorded) -> None:
-    """The lockstep bag as a clock would have received it: 20 us of jitter, answers after 300 us."""
+def test_jitter_of_a_real_clock_comes_from_the_times_of_reception(moving: Recorded) -> None:
+    """The lockstep bag as a clock would have received it: 20 us of jitter."""
     topics = dict(moving.bag.topics)
     jitter = np.random.default_rng(3).normal(0.0, 20_000.0, len(topics["/wam/motor_states"].log_time_ns))
-    for name, after in (("/wam/motor_states", 0), ("/wam/motor_current_command", 300_000)):
-        columns = topics[name]
-        assert isinstance(columns, JointColumns)
-        received = columns.stamp_ns + 10**18 + after + jitter[: len(columns.stamp_ns)].astype(np.int64)
-        topics[name] = columns._replace(log_time_ns=received)
+    columns = topics["/wam/motor_states"]
+    assert isinstance(columns, JointColumns)
+    received = columns.stamp_ns + 10**18 + jitter.astype(np.int64)
+    topics["/wam/motor_states"] = columns._replace(log_time_ns=received)
     metadata = {**moving.bag.metadata, "recording": {**moving.bag.metadata["recording"], "mode": "realtime"}}
     found = analyse_bag(moving.bag._replace(topics=topics, metadata=metadata), lambda doing: None)
     (timing,) = [section for section in found.sections if section.key == "timing"]
     numbers = {finding.name: finding.measured for finding in timing.findings}
-    assert numbers["latency, state to current at the recorder: median"] == pytest.approx(300.0, rel=0.01)
-    assert numbers["states without a command"] == 0.0
     assert numbers["motor_states: reception jitter"] == pytest.approx(0.02 * math.sqrt(2.0), rel=0.1)
     assert "motor_states: reception jitter" not in {f.name for s in moving.analysis.sections for f in s.findings}
 
@@ -539,11 +536,12 @@ def test_no_sample_has_a_number_that_cannot_be_or_that_was_not_measured(samples:
 def test_a_number_far_from_its_prediction_is_flagged(samples: dict[str, Analysis]) -> None:
     """In wam-touch the cables creep while motor2 turns: that is alike for long, and no viscous friction."""
     assert "More than 3 standard errors" not in verdict_of(samples["wam-touch"])
-    assert "viscous not identifiable (-5.00e-04 +- " in " ".join(text(samples["wam-touch"]).split())
     (friction,) = [section for section in samples["wam-touch"].sections if section.key == "friction"]
     (dry,) = [one for one in friction.findings if one.name == "motor3: dynamic friction"]
-    known = f"{shown(dry.measured)} +- {shown(dry.error, 'N m')}"  # one number, whether in a sentence or for a program
-    assert f"motor3: dry friction {known}, breakaway" in " ".join(friction.sentences)
+    known = f"{shown(dry.measured)} +- {shown(dry.error)}"  # one number, whether in a table or for a program
+    assert known in " ".join(text(samples["wam-touch"]).split())
+    (viscous,) = [one for one in friction.findings if one.name == "motor2: viscous friction"]
+    assert (math.isnan(viscous.measured), "not identifiable: " in viscous.note) == (True, True)
     assert deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),)) == (
         "More than 3 standard errors from the prediction: a 1 +- 0.05 N, predicted 1.2.",
     )

@@ -19,8 +19,8 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
-from wam_analysis.demo_summary import summarize
 from wam_analysis.findings.analysis import analyse_bag
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
 from wam_bag.contents import contents
@@ -209,7 +209,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     assert "recorded in lockstep mode, lost: 10 of those that were recorded" in info
     assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
     bag = read(tmp_path / "bag")
-    assert list(summarize(bag).lost) == lines[1:]
+    assert list(AnalysedRecording(bag).lost) == lines[1:]
     found = analyse_bag(bag, lambda doing: None)
     assert found.sections[1].wrong[:2] == tuple(info[:2])
     assert found.sections[0].sentences[1].startswith(f"Wrong: {info[0]}")
@@ -274,7 +274,7 @@ def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None
     assert lines[0].startswith("INCOMPLETE: bag_0.mcap had not been closed")
     assert lines[1].startswith("INCOMPLETE: The recorder wrote no counts")
     assert "recorded in realtime mode, lost: unknown, see above" in lines
-    assert summarize(read(tmp_path / "bag")).loop.mode == "realtime"
+    assert AnalysedRecording(read(tmp_path / "bag")).mode == "realtime"
 
 
 def test_a_bag_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:

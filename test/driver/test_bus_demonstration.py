@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wam_sim.simulation
-from wam_analysis.demo_summary import DemoSummary, summarize
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
 from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
@@ -79,16 +79,16 @@ def at_rates_of_the_bus(name: str) -> Configuration:
     return plain.with_values(changed)
 
 
-def played(configuration: Configuration, bag: Path) -> DemoSummary:
+def played(configuration: Configuration, bag: Path) -> AnalysedRecording:
     steps = load_for(configuration, str(configuration.sections["scenario"]["script"]))
     assert record(configuration, steps, bag) == ""
-    return summarize(read(bag))
+    return AnalysedRecording(read(bag))
 
 
-def force_errors(summary: DemoSummary) -> list[float]:
+def force_errors(recording: AnalysedRecording) -> list[float]:
     """Of the true force in the last second of each hold, as a part of what is commanded."""
-    traces, found = summary.traces, []
-    for hold in summary.holds:
+    traces, found = recording.traces, []
+    for hold in recording.holds:
         at = (traces.stamp > hold.end - 10**9) & (traces.stamp <= hold.end)
         found.append(abs(float(np.linalg.norm(traces.true.force[at].mean(axis=0))) / hold.commanded - 1.0))
     return found

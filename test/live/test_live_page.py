@@ -26,7 +26,7 @@ from bag_comparison import compare
 from browser import browser
 from conftest import LONG
 
-from wam_analysis.findings.analysed_run import analysed_run
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
 from wam_cli.commands.live import page_next_to
 from wam_cli.options import take_page
@@ -467,7 +467,7 @@ def test_a_page_changes_no_bit_of_a_run(alone: Path, domain_id: int, tmp_path: P
 
 def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     bag = read(alone)
-    source = BagSource(analysed_run(bag))
+    source = BagSource(AnalysedRecording(bag))
     truth = bag.topics["/wam/sim/joint_states"]
     for at in (0, 40, 100):
         shown = source.snapshot(int(truth.stamp_ns[at]))  # type: ignore[union-attr]
@@ -483,13 +483,13 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
 
 def test_of_a_bag_without_hypotheses_the_estimated_contact_is_played_from_its_own_topics(alone: Path) -> None:
     bag = read(alone)
-    whole = BagSource(analysed_run(bag)).snapshot(400_000_000).estimated
+    whole = BagSource(AnalysedRecording(bag)).snapshot(400_000_000).estimated
     topics = {name: columns for name, columns in bag.topics.items() if not name.endswith("contact/hypotheses")}
-    alike = BagSource(analysed_run(bag._replace(topics=topics))).snapshot(400_000_000).estimated
+    alike = BagSource(AnalysedRecording(bag._replace(topics=topics))).snapshot(400_000_000).estimated
     assert (alike.cover, alike.position, alike.force) == (whole.cover, whole.position, whole.force)
     assert alike.cover == "outer_link"
     topics = {name: columns for name, columns in topics.items() if not name.endswith("/contact/point")}
-    assert BagSource(analysed_run(bag._replace(topics=topics))).snapshot(400_000_000).estimated == NO_CONTACT
+    assert BagSource(AnalysedRecording(bag._replace(topics=topics))).snapshot(400_000_000).estimated == NO_CONTACT
 
 
 def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: Network) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.analysis import Analysis, analyse_bag
 from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.findings.steps import verdict
 from wam_analysis.findings.text import text
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, TableColumns, read
 from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
@@ -67,29 +67,29 @@ def recorded(folder: Path, steps: str, values: Mapping[str, Any] | None = None) 
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[AnalysedRun, Analysis]:
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[AnalysedRecording, Analysis]:
     bag = recorded(tmp_path_factory.mktemp("reactions"), STEPS)
-    return analysed_run(bag), analyse_bag(bag, lambda stage: None)
+    return AnalysedRecording(bag), analyse_bag(bag, lambda stage: None)
 
 
-def press(recording: AnalysedRun, name: str) -> HeldForce:
+def press(recording: AnalysedRecording, name: str) -> HeldForce:
     (one,) = (one for one in recording.held if one.hold.name == name)
     return one
 
 
 @pytest.mark.slow
 def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tmp_path: Path) -> None:
-    summary = analysed_run(recorded(tmp_path, TORQUES))
+    summary = AnalysedRecording(recorded(tmp_path, TORQUES))
     (answer,) = (one for one in verdict(summary) if one.result == "NO")
     assert str(answer) == "commands carried out: NO (1 refused, 1 not reached)"
     analysis = analyse_bag(read(tmp_path / "bag"), lambda stage: None)
     sections = {section.key: section for section in analysis.sections}
-    assert "NOT REACHED in the end: nothing there." in sections["force"].wrong
+    assert "NOT REACHED in the end: nothing there." in sections["steps"].wrong
 
 
 @pytest.mark.slow
 def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
-    summary = analysed_run(
+    summary = AnalysedRecording(
         recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0])
     )
     (answer,) = (one for one in verdict(summary) if "commands" in one.question)
@@ -102,7 +102,7 @@ def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) 
     """It ends the watch of the torque."""
     slow = TORQUES.replace("seconds: 3.0", "seconds: 3.0, set: {force_loop: {limits.settling_time: 60.0}}")
     bag = recorded(tmp_path, slow)
-    (answer,) = (one for one in verdict(analysed_run(bag)) if "commands" in one.question)
+    (answer,) = (one for one in verdict(AnalysedRecording(bag)) if "commands" in one.question)
     words = "not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 60 s"
     assert words in str(answer)
     assert "not reached" not in str(answer)
@@ -114,15 +114,15 @@ def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) 
 def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
     spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
     values = {f"driver:world.springs.{key}": value for key, value in spring.items()}
-    summary = analysed_run(recorded(tmp_path, "- {name: release, seconds: 0.4, request: enable}", values))
-    assert not summary.summary.missed
-    assert summary.summary.traces.true.is_known.all()
+    summary = AnalysedRecording(recorded(tmp_path, "- {name: release, seconds: 0.4, request: enable}", values))
+    assert not summary.missed
+    assert summary.traces.true.is_known.all()
 
 
 @pytest.mark.slow
-def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[AnalysedRun, Analysis]) -> None:
+def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[AnalysedRecording, Analysis]) -> None:
     summary, analysis = found
-    begins = {step.name: step.begin / 1e9 for step in summary.summary.steps}
+    begins = {step.name: step.begin / 1e9 for step in summary.steps}
     sections = {section.key: section for section in analysis.sections}
     (said,) = (line for line in sections["force"].wrong if line.startswith("REFUSED"))
     for name, (kind, reason) in REFUSED.items():
@@ -132,7 +132,9 @@ def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[A
 
 
 @pytest.mark.slow
-def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: tuple[AnalysedRun, Analysis]) -> None:
+def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(
+    found: tuple[AnalysedRecording, Analysis],
+) -> None:
     _, analysis = found
     sections = {section.key: section for section in analysis.sections}
     measured = {one.name for key in ("force", "stability") for one in sections[key].findings}
@@ -146,7 +148,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
 
 
 @pytest.mark.slow
-def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[AnalysedRun, Analysis]) -> None:
+def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[AnalysedRecording, Analysis]) -> None:
     told = " ".join(text(found[1]).split())
     assert "force within 10 %: NO (4 of 6 refused)" in told
     for name, (kind, _) in REFUSED.items():
@@ -154,7 +156,7 @@ def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[Analyse
 
 
 @pytest.mark.slow
-def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[AnalysedRun, Analysis]) -> None:
+def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[AnalysedRecording, Analysis]) -> None:
     summary, analysis = found
     one, other = press(summary, "press across"), press(summary, "press across by a task")
     assert one.hold.commanded == other.hold.commanded == pytest.approx(8.0)
@@ -169,7 +171,7 @@ def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[Anal
 def test_the_true_force_along_an_axis_of_the_base_is_that_of_the_arm_on_the_object() -> None:
     """The sample has the force on the tube in the base frame, without a link and its rotation."""
     bag = read(SAMPLES / "hold-tube")
-    (held,) = analysed_run(bag).held
+    (held,) = AnalysedRecording(bag).held
     objects = bag.topics["/wam/sim/objects"]
     assert isinstance(objects, TableColumns)
     stamps, columns = objects.row_stamp_ns, objects.columns

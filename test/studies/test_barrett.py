@@ -13,9 +13,9 @@ import pytest
 import yaml
 from arms import NOWHERE
 
-from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.identification.regressor import about_origin
+from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, JointColumns
 from wam_cli.main import main
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
@@ -259,8 +259,8 @@ def pressed(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
 
 @pytest.mark.slow
 def test_the_wrist_presses_within_ten_percent_while_the_elbow_moves(pressed: Bag) -> None:
-    recording = analysed_run(pressed)
-    found = recording.summary
+    recording = AnalysedRecording(pressed)
+    found = recording
     assert found.outcome == "done"
     assert found.loop.mode == "lockstep"
     assert [held.hold.name for held in recording.held] == ["press 5 N", "move the elbow, press 10 N"]

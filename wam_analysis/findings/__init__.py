@@ -1,7 +1,6 @@
 """The analysis of any recording, as `wam analyse` prints it.
 
 analysis               reads a bag and makes all sections, of one list
-analysed_run           a bag prepared for analysis: its sources, run, forces and predictions
 finding                one number with its prediction; a section
 held_force             each commanded force: measures and predictions
 steps                  section about the steps of a scenario, in answers

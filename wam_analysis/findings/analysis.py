@@ -6,14 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from wam_analysis.contact_list import contacts_by_link
-from wam_analysis.demo_summary import driver_faults
-from wam_analysis.demo_traces import OF_STEPS, Traces
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.contact import contact_section
-from wam_analysis.findings.finding import Section, shown, times
+from wam_analysis.findings.finding import Section, counted, shown, stated
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.motion import friction_section, ripple_section
@@ -30,18 +24,19 @@ from wam_analysis.foreign.sections import (
     topics_section,
 )
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
+from wam_analysis.traces import OF_STEPS
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
 from wam_bag.contents import contents
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
-from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.recording import RecordedRun
 
 OF_THE_START = "predicted for the parameters at the start, which were changed"
 Progress = Callable[[str], None]
-Maker = Callable[[AnalysedRun], Section | None]
-OfKinds = tuple[Maker, tuple[bool, ...]]  # and whether of another robot's recordings, of which kinds
+Maker = Callable[[AnalysedRecording], Section | None]
 
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
@@ -63,15 +58,16 @@ class Analysis(NamedTuple):
     Attributes
     ----------
     recording : what the sections are made from, for the pictures.
-    duration : s.
-    provenance : origin of the bag and of the numbers.
     sections : one for each subject; "verdict" is the first.
     """
 
-    recording: AnalysedRun
-    duration: float
-    provenance: dict[str, str]
+    recording: AnalysedRecording
     sections: tuple[Section, ...]
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Origin of the bag and of the numbers."""
+        return provenance(self.recording)
 
     @property
     def has_failed(self) -> bool:
@@ -86,7 +82,7 @@ class Analysis(NamedTuple):
         return (*failed, *wrong)
 
     def __repr__(self) -> str:
-        return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
+        return f"Analysis({self.recording.run.bag!r}, {self.recording.duration:.1f} s, {len(self.sections)} sections)"
 
 
 def analyse(
@@ -132,7 +128,7 @@ def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
     """
     bag = read(Path(path), OF_STEPS, may_lack=True)
     found = analyse_bag(bag, lambda doing: None, namespace, sections=SECTIONS_OF_STEPS)
-    if not found.recording.summary.steps:
+    if not found.recording.steps:
         raise BagError(
             f"{path} is not a recording of the demonstration: it has no step of a scenario; "
             f"{command('wam analyse', path)} analyses any recording, {command('wam bag info', path)} lists its topics"
@@ -163,34 +159,30 @@ def analyse_bag(
     progress: Progress,
     namespace: str = "",
     given: TopicMap | None = None,
-    sections: "Sequence[OfKinds] | None" = None,
+    sections: Sequence[Maker] = (),
 ) -> Analysis:
     """Analyse a bag that has been read, see `analyse`; `given` is None for one of this stack.
 
     Parameters
     ----------
-    sections : which are made; None for all.
+    sections : which are made; all if empty.
     """
-    recording = AnalysedRun(recorded_run(bag, namespace), given)
+    recording = AnalysedRecording(bag, namespace, given)
     made = []
-    for make, kinds in SECTIONS if sections is None else sections:
-        if recording.is_foreign in kinds and (section := make(recording)) is not None:
+    for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
+        if (section := make(recording)) is not None:
             progress(section.title)
             made.append(section)
-    return Analysis(recording, recording.duration, provenance(recording), (_verdict(recording, made), *made))
+    return Analysis(recording, (_verdict(recording, made), *made))
 
 
-def _verdict(recording: AnalysedRun, sections: Sequence[Section]) -> Section:
+def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Section:
     """Three lines: what the recording is, what is wrong with it, what it shows."""
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
-    return Section(
-        "verdict",
-        "Verdict",
-        (what, _line("Wrong", wrong, "nothing was found."), _line("Shows", shows, "nothing that can be evaluated.")),
-        (),
-    )
+    lines = (_line("Wrong", wrong, "nothing was found."), _line("Shows", shows, "nothing that can be evaluated."))
+    return Section("verdict", "Verdict", (what, *lines), ())
 
 
 def _line(title: str, sentences: list[str], silent: str) -> str:
@@ -202,64 +194,37 @@ def _line(title: str, sentences: list[str], silent: str) -> str:
     return f"{title}: {' '.join(kept)}{more}"
 
 
-def _foreign_line(recording: AnalysedRun) -> str:
+def _foreign_line(recording: AnalysedRecording) -> str:
     """What another robot's recording is."""
     bag = recording.bag
     joints = {name for one in bag.topics.values() if isinstance(one, JointColumns) for name in one.names}
     wrenches = sum(isinstance(one, WrenchColumns) for one in bag.topics.values())
-    held = [_count(len(joints), "joint"), *([_count(wrenches, "wrench topic")] if wrenches else [])]
+    held = [counted(len(joints), "joint"), *([counted(wrenches, "wrench topic")] if wrenches else [])]
     return f"Another robot's recording: {shown(recording.duration, 's')}, {' and '.join(held)}."
 
 
-def happened_section(recording: AnalysedRun) -> Section:
+def happened_section(recording: AnalysedRecording) -> Section:
     """What happened, in a few sentences."""
-    summary = recording.summary
-    sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
-    mode = recording.mode if recording.mode != "unknown" else "not known whether in lockstep or in realtime"
-    sentences.append(f"{shown(recording.duration, 's')} of {summary.namespace or '/'}, {mode}.")
-    if summary.steps:
-        ended = " to its end" if summary.outcome == Code.DONE else f"; {summary.outcome}"
-        sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
-    if summary.holds:
-        forces = ", ".join(f"{hold.commanded:.3g} N" for hold in summary.holds)
-        sentences.append(f"The arm was commanded to press {times(len(summary.holds))} ({forces}).")
-    sentences += [f"{one.sentence}." for one in recording.run.refused]
-    sentences += _touched(summary.traces)
-    faults = driver_faults(recording.run, summary.traces.zero)
-    sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
-    sentences += _changed(recording.run, summary.traces.zero)
+    run, faults = recording.run, recording.faults
+    wrong = [stated(run.others)] if run.others else []
+    wrong += [f"INCOMPLETE: {line}" for line in recording.lost]
+    wrong += [f"REFUSED: {one.sentence}." for one in run.refused]
+    wrong += [f"STOPPED: {fault}." for fault in faults]
+    wrong += [stated(recording.failure)] if recording.failure and not faults else []
+    sentences = [*wrong, *_changed(run, recording.traces.zero)]
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
-    sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
-    lacking = recording.lacking("joint_states", "force_command", "contact/wrench", "status")
-    others = [f"{recording.run.others[0].upper()}{recording.run.others[1:]}."] if recording.run.others else []
-    wrong = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
-    wrong += [f"REFUSED: {one.sentence}." for one in recording.run.refused]
-    wrong += [f"STOPPED: {fault}." for fault in faults[:1]]
-    wrong += [f"{recording.failure[0].upper()}{recording.failure[1:]}."] if recording.failure and not faults else []
+    lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")
     return Section("happened", "What happened", tuple(sentences), (), lacking, (), tuple(wrong))
 
 
-def _own_line(recording: AnalysedRun) -> str:
+def _own_line(recording: AnalysedRecording) -> str:
     """What a recording of this stack is."""
-    summary = recording.summary
     mode = "" if recording.mode == "unknown" else f" in {recording.mode}"
-    text = f"{summary.namespace or '/'}: {shown(recording.duration, 's')}{mode}"
-    steps = f", {_count(len(summary.steps), 'step')}" * bool(summary.steps)
-    part = ", part of a longer recording" if recording.is_part else f", {Code.DONE}" * (summary.outcome == Code.DONE)
+    text = f"{recording.namespace or '/'}: {shown(recording.duration, 's')}{mode}"
+    steps = f", {counted(len(recording.steps), 'step')}" * bool(recording.steps)
+    part = ", part of a longer recording" if recording.is_part else f", {Code.DONE}" * (recording.outcome == Code.DONE)
     return f"{text}{steps}{part}."
-
-
-def _touched(traces: Traces) -> Iterator[str]:
-    """How often something touched the arm, each link by itself, as far as that was recorded."""
-    for signal, touched, never in (
-        (traces.true, "Something touched the arm", "Nothing touched the arm."),
-        (traces.estimated, "A contact was estimated", "No contact was estimated."),
-    ):
-        if np.any(signal.is_known):
-            number = len(contacts_by_link(traces.stamp, signal))
-            yield f"{touched} {times(number)}." if number else never
-            return
 
 
 def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
@@ -280,10 +245,10 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
         )
 
 
-def _of_the_start(make: Maker, recording: AnalysedRun) -> Section | None:
+def _of_the_start(make: Maker, recording: AnalysedRecording) -> Section | None:
     """A section whose predictions are for the parameters at the start, marked where these were changed."""
     section = make(recording)
-    changed = tuple(_changed(recording.run, recording.summary.traces.zero)) if section is not None else ()
+    changed = tuple(_changed(recording.run, recording.traces.zero)) if section is not None else ()
     if section is None or not changed:
         return section
     findings = tuple(
@@ -293,39 +258,13 @@ def _of_the_start(make: Maker, recording: AnalysedRun) -> Section | None:
     return section._replace(sentences=(*changed, *section.sentences), findings=findings)
 
 
-def _brief(note: str) -> str:
-    """A note on the parameters in one line; the whole of it is in the provenance."""
-    if len(note) <= LAYOUT.note:
-        return note
-    return f"{note[: LAYOUT.note].rpartition(',')[0]}, ... (all under Provenance)."
-
-
-def _count(number: int, name: str) -> str:
-    return f"{number} {name}{'s' * (number != 1)}"
-
-
-OWN, FOREIGN = (False,), (True,)  # kinds of recordings
-SECTIONS_OF_STEPS: tuple[OfKinds, ...] = (
-    (happened_section, OWN),
-    (steps_section, OWN),
-    (partial(_of_the_start, force_section), OWN),
-    (contact_section, OWN),
-)
-SECTIONS: tuple[OfKinds, ...] = (
-    *SECTIONS_OF_STEPS[:1],
-    (topics_section, FOREIGN),
-    *SECTIONS_OF_STEPS[1:3],
-    (step_section, FOREIGN),
-    (partial(_of_the_start, cycle_section), OWN),
-    (repetition_section, FOREIGN),
-    (contact_section, OWN),
-    (stick_section, OWN + FOREIGN),
-    (friction_section, OWN),
-    (effort_section, FOREIGN),
-    (ripple_section, OWN),
-    (power_section, OWN),
-    (frequency_section, OWN),
-    (spectrum_section, FOREIGN),
-    (timing_section, OWN + FOREIGN),
-)
-"""Each makes its section, or None where the recording has nothing for it; and of which recordings."""
+_force, _cycles = (partial(_of_the_start, make) for make in (force_section, cycle_section))
+SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, _force, contact_section)
+SECTIONS: tuple[Maker, ...] = (
+    happened_section, steps_section, _force, _cycles, contact_section, stick_section, friction_section, ripple_section,
+    power_section, frequency_section, timing_section,
+)  # fmt: skip
+FOREIGN_SECTIONS: tuple[Maker, ...] = (
+    topics_section, step_section, repetition_section, stick_section, effort_section, spectrum_section, timing_section,
+)  # fmt: skip
+"""Each makes its section of a recording, or None where the recording has nothing for it."""

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, SHAFTS
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.foreign.cycles import held as held_command
 from wam_analysis.foreign.sources import Source, longest, pieces
 from wam_analysis.measures.lines import amplitudes
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
 
 Numbers = NDArray[np.float64]
@@ -90,16 +90,16 @@ def _over_time(analysis: Analysis) -> Iterator[Chart]:
         yield _thinned(Chart(SIGNALS, f"{one.label} over time.", TIME, up, one.time, tuple(lines), one.topic))
 
 
-def _shown(recording: AnalysedRun) -> list[Source]:
+def _shown(recording: AnalysedRecording) -> list[Source]:
     """What was measured; of this stack the joints, else the motors."""
     states = [one for one in recording.states if len(one.time) >= STREAM.shown]
     motors = [] if recording.is_foreign else [one for one in states if one.topic.endswith("/motor_states")]
     return motors if len(motors) == len(states) else [one for one in states if one not in motors]
 
 
-def _forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Numbers]] | None:
+def _forces_over_time(recording: AnalysedRecording) -> tuple[Numbers, dict[str, Numbers]] | None:
     """Time, (k,), s, and size of each force that was recorded, (k,), N; None if there is none."""
-    traces = recording.summary.traces
+    traces = recording.traces
     signals = {"commanded": traces.commanded, "true": traces.true, "measured": traces.measured}
     signals["estimated"] = traces.estimated
     found = {
@@ -119,7 +119,7 @@ def _forces_over_time(recording: AnalysedRun) -> tuple[Numbers, dict[str, Number
 
 def _positions(analysis: Analysis) -> Iterator[Chart]:
     """Where the arm was touched."""
-    traces = analysis.recording.summary.traces
+    traces = analysis.recording.traces
     touched = {name: getattr(traces, name) for name in ("true", "estimated")}
     positions = {name: np.where(one.acts, 100.0 * one.position, np.nan) for name, one in touched.items()}
     lines = [ChartLine(name, COLOURS[name], position) for name, position in positions.items()]

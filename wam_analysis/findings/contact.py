@@ -5,47 +5,33 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy, ListedContact
-from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, ListedContact
+from wam_analysis.findings.finding import Finding, Section, shown, stated, times
 from wam_analysis.measures.runs import runs
-from wam_analysis.task_forces import arm_of
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import TOUCH
-from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
 BLIND = "Contacts under the brakes are not compared: the motors, which alone are observed, sense none then."
-BEFORE = {
-    CutBy.NOTHING: "",
-    CutBy.RECORDING: "it began before the recording",
-    CutBy.GAP: "the estimate is missing before it",
-}
-AFTER = {
-    CutBy.NOTHING: "",
-    CutBy.RECORDING: "it goes past the end of the recording",
-    CutBy.GAP: "the estimate is missing after it",
-}
 
 
-def contact_section(recording: AnalysedRun) -> Section:
+def contact_section(recording: AnalysedRecording) -> Section:
     """Estimated contacts, compared with the true ones."""
-    summary = recording.summary
-    traces = summary.traces
+    traces = recording.traces
     estimated = ("contact/wrench", "contact/point", "contact/hypotheses")
-    lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
+    lacking = recording.run.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    wrong = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
+    wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
-    named = [f"{number} {one.step}" for number, one in enumerate(summary.contacts, 1) if one.step]
+    named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
     sentences += [f"In the steps: {', '.join(named)}."] if named else []
-    sentences += contact_doubts(summary)
-    sentences += [BLIND] * summary.is_blind
-    findings += contact_numbers(summary)
+    sentences += contact_doubts(recording)
+    sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
+    findings += contact_numbers(recording)
     sentences += wrong
     true, sensed = traces.true, traces.estimated
-    known = true.is_known & sensed.is_known
+    known = traces.is_compared
     touching = known & true.acts
     if np.any(touching):
         both = touching & sensed.acts & (sensed.frame == true.frame)
@@ -68,52 +54,48 @@ def contact_section(recording: AnalysedRun) -> Section:
         ]
         shows.append(f"Contacts: right link for {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
-        false = known & sensed.acts & ~true.acts
-        count = len(runs(false))
-        seconds = float(np.sum(false)) * summary.traces.period
+        count = len(runs(traces.is_false))
+        seconds = float(np.sum(traces.is_false)) * traces.period
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
             sentences.append(f"False detections: {count}, together {shown(seconds, 's')}.")
             wrong.insert(0, sentences[-1])
-    elif summary.contacts:
+    elif recording.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
-        shows.append(f"Contacts: {len(summary.contacts)} estimated; the true ones are not in this bag.")
+        shows.append(f"Contacts: {len(recording.contacts)} estimated; the true ones are not in this bag.")
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
-        sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
+        sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
     findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(shows), tuple(wrong))
 
 
-def contact_numbers(summary: DemoSummary) -> Iterator[Finding]:
+def contact_numbers(recording: AnalysedRecording) -> Iterator[Finding]:
     """Every estimated contact in numbers."""
-    for number, contact in enumerate(summary.contacts, 1):
-        yield from _numbers(f"{number} {contact.estimate.link}", contact, summary.traces.period)
+    for number, contact in enumerate(recording.contacts, 1):
+        yield from _numbers(f"{number} {contact.estimate.link}", contact, recording.traces.period)
 
 
-def contact_doubts(summary: DemoSummary) -> Iterator[str]:
+def contact_doubts(recording: AnalysedRecording) -> Iterator[str]:
     """What is not to be trusted of the estimated contacts."""
-    for number, contact in enumerate(summary.contacts, 1):
+    for number, contact in enumerate(recording.contacts, 1):
         yield from _doubts(f"{number} {contact.estimate.link}", contact)
-    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
+    if any(math.isnan(contact.estimate.probability) for contact in recording.contacts):
         yield NOT_CERTAIN
-    if not all(contact.estimate.is_placed for contact in summary.contacts):
+    if not all(contact.estimate.is_placed for contact in recording.contacts):
         yield f"Positions of contacts: {NOT_PLACED}."
 
 
 def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Finding]:
     """A contact in numbers, those that are compared with the true ones last."""
     cm = 100.0
-    note = f"in step '{contact.step}'" if contact.step else ""
-    yield Finding(f"{name}: from", "s", contact.begin, note=note)
+    yield Finding(f"{name}: from", "s", contact.begin)
     yield Finding(f"{name}: to", "s", contact.end)
     one = contact.estimate
     yield Finding(f"{name}: probability of the link", "%", 100.0 * one.probability)
     yield Finding(f"{name}: position along the link", "cm", cm * one.position, error=cm * one.position_sd)
-    yield Finding(f"{name}: its standard deviation", "cm", cm * one.position_sd)
     least = "the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
-    yield Finding(f"{name}: standard deviation of the force", "N", one.force_sd)
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be only the least one" * (not one.is_placed)
     yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
@@ -123,8 +105,8 @@ def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Findi
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     """What is not to be trusted of a contact, and whether it was another one."""
-    if cut := [text for text in (BEFORE[contact.before], AFTER[contact.after]) if text]:
-        yield f"{name}: {' and '.join(cut)}."
+    if cut := " and ".join(filter(None, contact.cut)):
+        yield f"{name}: {cut}."
     if contact.estimate.lasting < TOUCH.steady_link:
         yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
     if contact.estimate.reasons:
@@ -133,11 +115,10 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
         yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
 
 
-def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
+def _tracked_friction(recording: AnalysedRecording) -> Iterator[Finding]:
     """Friction of motors and joints as the estimator followed it, at the end of the recording."""
-    run, arm = recording.run, arm_of(recording.run)
-    columns = run.bag.topics.get(f"{run.namespace}/contact/tracked_friction")
-    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
+    arm, columns = recording.parameters.arm, recording.run.table("contact/tracked_friction")
+    if columns is None or arm is None:
         return
     names = (*arm.motors.names, *arm.joints.names)
     for way in FRICTION_COLUMNS[:2]:

@@ -96,6 +96,16 @@ def shown(value: float, unit: str = "") -> str:
     return f"{text} {unit}".rstrip()
 
 
+def stated(text: str) -> str:
+    """Some words as a sentence."""
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def counted(number: int, name: str) -> str:
+    """A number of things, as '1 joint' and '2 joints'."""
+    return f"{number} {name}{'s' * (number != 1)}"
+
+
 def times(number: int) -> str:
     """How often, in words: 'once', '3 times', 'never'."""
     return {0: "never", 1: "once"}.get(number, f"{number} times")

@@ -5,27 +5,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
-from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
+from wam_analysis.measures.force_accuracy import ForceAccuracy
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.thresholds import GUARD
 from wam_description.signals import BASE
 from wam_sim.reactions import (
     STEADY,
-    TOO_MUCH,
-    UNREACHED,
     RecordedReaction,
     of_force_loop,
-    too_short,
-    unassessed,
-    unmet,
     within,
 )
 from wam_sim.reactions import sentences as reaction_sentences
@@ -35,10 +28,10 @@ STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in whic
 NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
 
 
-def force_section(recording: AnalysedRun) -> Section:
+def force_section(recording: AnalysedRecording) -> Section:
     """Each commanded force, how it was reached and held, and the dynamic range (3.2.1)."""
-    lacking = recording.lacking("force_command", "force_measured", "sim/contact/wrench")
-    sentences, findings, zero, held = [], [], recording.summary.traces.zero, recording.held
+    lacking = recording.run.lacking("force_command", "force_measured", "sim/contact/wrench")
+    sentences, findings, zero, held = [], [], recording.traces.zero, recording.held
     for one in held:
         sentences.append(_press_sentence(one))
         sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
@@ -47,20 +40,19 @@ def force_section(recording: AnalysedRun) -> Section:
         sentences.append(f"{NO_FORCE}.")
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
-    range_stated, range_findings = _dynamic_range(recording)
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
-    wrong = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary))
-    every = (*findings, *range_findings)
-    return Section("force", "Force", (*sentences, *range_stated), every, lacking, _forces_verdict(held), wrong)
+    wrong = tuple(_reaction_verdict(reactions, zero))
+    every = (*findings, *_dynamic_range(recording))
+    return Section("force", "Force", tuple(sentences), every, lacking, _forces_verdict(held), wrong)
 
 
-def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
+def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
     """What was not simply obeyed besides constant forces, by step of the scenario, or of the run."""
-    spans = [(hold.begin, hold.end) for hold in recording.summary.holds]
-    reactions = of_force_loop(recording.summary.reactions)
+    spans = [(hold.begin, hold.end) for hold in recording.holds]
+    reactions = of_force_loop(recording.reactions)
     rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
     steps: dict[str, tuple[RecordedReaction, ...]] = {}
-    for step in recording.summary.steps:  # several may have one name
+    for step in recording.steps:  # several may have one name
         steps[step.name] = (*steps.get(step.name, ()), *within(rest, step.begin, step.end))
     return {name: found for name, found in (steps or {"force loop": tuple(rest)}).items() if found}
 
@@ -78,16 +70,6 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
     return verdict
 
 
-def _command_verdict(summary: DemoSummary) -> list[str]:
-    """Steps whose command was not reached in the end, and those that are too short to assess, in a sentence each."""
-    reactions, steps, settling = summary.reactions, summary.steps, summary.settling_times
-    found = [(step.name, {one.outcome for one in unmet(reactions, step)}) for step in steps]
-    named = {what: "; ".join(name for name, outcomes in found if what in outcomes) for what in (TOO_MUCH, UNREACHED)}
-    brief = unassessed(reactions, summary.torques, steps, settling)
-    verdict = [f"{what.upper()} in the end: {names}." for what, names in named.items() if names]
-    return [*verdict, *([f"{'; '.join(step.name for step in brief)}: {too_short(settling, brief)}."] if brief else [])]
-
-
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
     held = [one for one in held if not one.hold.is_short]
@@ -100,36 +82,21 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     return (f"Forces: {len(known)} of {len(held)} applied, largest {whose}error {error:+.1f} %.",)
 
 
-def _dynamic_range(recording: AnalysedRun) -> tuple[list[str], list[Finding]]:
+def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     """Dynamic range (3.2.1): of the recording, and up to the limits of the arm."""
     known = [(one, accuracy) for one in recording.held if math.isfinite((accuracy := _accuracy(one)).smallest)]
     if not known:
-        return [], []
-    limits = [
-        one.largest
-        for one in recording.theories.values()
-        if one.largest is not None and math.isfinite(one.largest.force)
-    ]
-    least = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
-    promised = dynamic_range(least.force, least.limited_by, [accuracy for _, accuracy in known])
-    held_most = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
-    ratio = held_most / promised.smallest if promised.smallest > 0.0 else math.nan
-    whose = "true" if any(len(one.true) for one, _ in known) else "measured"
-    text = (
-        f"Dynamic range of force control (3.2.1): {shown(ratio)} (error of the {whose} force "
-        f"{shown(promised.smallest, 'N')}, largest held force {shown(held_most, 'N')})."
-    )
-    if limits:
-        text += (
-            f" With the same error, the {promised.limited_by} would allow {shown(promised.ratio)} "
-            f"({shown(promised.largest, 'N')})."
-        )
+        return []
+    limits = [one.largest for one in recording.theories.values() if one.largest and math.isfinite(one.largest.force)]
+    limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
+    smallest = max(accuracy.smallest for _, accuracy in known) or math.nan
+    largest = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
     note = "largest force over the measured error; predicted: largest force that the limits allow"
-    by = f"largest held force; predicted limit: {promised.limited_by}" if limits else "largest held force"
-    return [text], [
-        Finding("smallest controllable force", "N", promised.smallest, note="bias and ripple of the worst force"),
-        Finding("largest controllable force", "N", held_most, promised.largest, by),
-        Finding("dynamic range", "", ratio, promised.ratio, note),
+    by = f"largest held force; predicted limit: {limit.limited_by}" if limits else "largest held force"
+    return [
+        Finding("smallest controllable force", "N", smallest, note="bias and ripple of the worst force"),
+        Finding("largest controllable force", "N", largest, limit.force, by),
+        Finding("dynamic range", "", largest / smallest, limit.force / smallest, note),
     ]
 
 
@@ -212,12 +179,11 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
     return found
 
 
-def cycle_section(recording: AnalysedRun) -> Section:
+def cycle_section(recording: AnalysedRecording) -> Section:
     """Stability and limit cycles of the force loop, compared with chapter 5."""
     sentences: list[str] = []
     findings: list[Finding] = []
     verdict: list[str] = []
-    seen: set[str] = set()
     refused = [one.hold.name for one in recording.held if one.hold.is_refused]
     held = [one for one in recording.held if not one.hold.is_refused]
     if refused:
@@ -227,7 +193,7 @@ def cycle_section(recording: AnalysedRun) -> Section:
         found = [_fate(one)[0], *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]
         sentences += [sentence for sentence in found if sentence not in sentences]
         verdict += filter(None, [_fate(one)[1]])
-        findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory, seen)]
+        findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
@@ -293,30 +259,15 @@ def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding
     ]
 
 
-def _theory_findings(name: str, theory: Theory, seen: set[str]) -> list[Finding]:
-    """Predictions for the loop itself, once if several forces have the same."""
-    predicted = theory.predicted
-    margin = theory.guarded.assessment.scale if theory.guarded is not None else math.nan
-    actuator = math.nan if predicted is None else 1e3 * predicted.actuator_peak_to_peak
-    key = f"{shown(actuator)} {shown(margin)}"
-    if key in seen:
-        return []
-    seen.add(key)
-    label = f"{name}: actuator cycle at the contact, peak to peak"
-    return [
-        *_margin_findings(name, theory.guarded),
-        *([] if predicted is None else [Finding(label, "mm", 1e3 * theory.moved, actuator, "(5.20)")]),
-    ]
-
-
-def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
-    """Gain margin of the recorded loop, by the stability guard."""
-    if found is None:
-        return []
-    scale = found.assessment.scale
-    note = f"domain {found.assessment.domain}; stability guard, contact of {shown(found.surface, 'N/m')}"
-    sentences = [Finding(f"{name}: gain margin, up to {GUARD.largest_scale:g}", "", math.nan, scale, note)]
-    if scale < GUARD.largest_scale:
-        label = f"{name}: largest stable gain, real velocity loops, sampled"
-        sentences.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
-    return sentences
+def _theory_findings(name: str, theory: Theory) -> list[Finding]:
+    """Predictions for the loop itself."""
+    found = []
+    if theory.guarded is not None:
+        guard, surface = theory.guarded.assessment, shown(theory.guarded.surface, "N/m")
+        label = f"{name}: gain margin, up to {GUARD.largest_scale:g}"
+        note = f"domain {guard.domain}; stability guard, contact of {surface}"
+        found.append(Finding(label, "", math.nan, guard.scale, note))
+    if theory.predicted is not None and (size := theory.predicted.actuator_peak_to_peak) > 0.0:
+        label = f"{name}: actuator cycle at the contact, peak to peak"
+        found.append(Finding(label, "mm", 1e3 * theory.moved, 1e3 * size, "(5.20)"))
+    return found

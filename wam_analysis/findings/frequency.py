@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.held_messages import at_stamps, by_names
-from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
+from wam_analysis.measures.frequency import bandwidth, frequency_response
 from wam_analysis.measures.runs import after_gaps
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE
 
 
-def frequency_section(recording: AnalysedRun) -> Section | None:
+def frequency_section(recording: AnalysedRecording) -> Section | None:
     """Up to which frequency the motors follow their velocity commands."""
     arm, signals, *_ = recording.motion
     if arm is None or signals is None:
@@ -20,7 +20,7 @@ def frequency_section(recording: AnalysedRun) -> Section | None:
     sentences, findings = [], []
     shows: list[str] = []
     commands, states = recording.run.joints("motor_velocity_command"), recording.run.joints("motor_states")
-    lacking = recording.lacking("motor_velocity_command")
+    lacking = recording.run.lacking("motor_velocity_command")
     commanded = None if commands is None else by_names(commands, "velocity", arm.motors.names)
     got = None if states is None else by_names(states, "velocity", arm.motors.names)
     if commands is not None and states is not None and commanded is not None and got is not None:
@@ -37,7 +37,7 @@ def frequency_section(recording: AnalysedRun) -> Section | None:
                 continue
             if found.segments < CYCLE.segments:
                 continue
-            believed = believable(found, CYCLE.coherent, CYCLE.excited)
+            believed = (found.coherence >= CYCLE.coherent) & (found.excitation >= CYCLE.excited)
             width = bandwidth(found, believed)
             trusted = found.frequency[believed]
             top = float(trusted[-1]) if len(trusted) else math.nan

@@ -28,13 +28,11 @@ class Guarded(NamedTuple):
     ----------
     assessment : at this contact.
     surface : its stiffness, N/m.
-    gain : G_I along the force, m/s/N.
     posture : of this contact, in words.
     """
 
     assessment: GuardAssessment
     surface: float
-    gain: float
     posture: str
 
 
@@ -71,7 +69,6 @@ def guarded(
     return Guarded(
         found,
         parameters.contact_stiffness,
-        max(law.gain),
         posture_of(touches[0]._replace(q=tuple(np.round(q, 3)))),
     )
 

@@ -1,19 +1,17 @@
 """Each commanded force: how it was reached and held, and what theory predicts for it."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.demo_traces import ForceSignal, Traces
+from wam_analysis.contact_list import most
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.swinging import Swinging, at_the_contact, swinging
-from wam_analysis.held_messages import by_names
+from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.holds import Hold
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
@@ -23,6 +21,7 @@ from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
+from wam_analysis.traces import ForceSignal, Traces
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
@@ -32,7 +31,6 @@ from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
-JOINTS = ("sim/joint_states", "joint_states")
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan)
 
@@ -79,14 +77,10 @@ class HeldForce(NamedTuple):
         return bool(len(self.measured) or len(self.true))
 
 
-def held_forces(run: RecordedRun, summary: DemoSummary, parameters: PredictionParameters) -> tuple[HeldForce, ...]:
-    """Evaluate every hold of a recording; of a force that was not controlled its signals are all there is."""
-    found = (_held(run, summary.traces, parameters, hold) for hold in summary.holds)
-    return tuple(_refused(one) if one.hold.is_refused else one for one in found)
-
-
-def _refused(held: HeldForce) -> HeldForce:
-    return HeldForce(*held[:5], cover=held.cover, position=held.position)
+def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
+    """Evaluate a hold; of a force that was not controlled its signals are all there is."""
+    held = _held(run, traces, parameters, hold)
+    return HeldForce(*held[:5], cover=held.cover, position=held.position) if hold.is_refused else held
 
 
 def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
@@ -161,7 +155,7 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
 
 def _touch_down(traces: Traces, parameters: PredictionParameters, hold: Hold) -> float:
     """Start of the contact of a hold, by the simulator, else by the estimate; see `HeldForce`."""
-    if any(stiffness > 0.0 for stiffness in parameters.springs.stiffness):
+    if parameters.world is not None and any(stiffness > 0.0 for stiffness in parameters.world.springs.stiffness):
         return math.nan  # a spring under the joint is always in contact
     first, last = (int(row) for row in np.searchsorted(traces.stamp, [hold.begin, hold.end]))
     for signal in (traces.true, traces.estimated):
@@ -221,10 +215,10 @@ def _touched(traces: Traces, parameters: PredictionParameters, hold: Hold) -> tu
 def _median_position(signal: ForceSignal, rows: NDArray[np.bool_]) -> tuple[str, float]:
     if not np.any(rows):
         return "", math.nan
-    cover = Counter(signal.frame[rows].tolist()).most_common(1)[0][0]
+    cover = most(signal.frame[rows])
     positions = signal.position[rows & (signal.frame == cover)]
     positions = positions[np.isfinite(positions)]
-    return (str(cover), float(np.median(positions))) if len(positions) else ("", math.nan)
+    return (cover, float(np.median(positions))) if len(positions) else ("", math.nan)
 
 
 class Theory(NamedTuple):
@@ -249,14 +243,14 @@ def theory_of(
     parameters: PredictionParameters,
     one: HeldForce,
     arm: Arm | None = None,
-    topics: Sequence[str] = JOINTS,
 ) -> Theory:
-    """What is predicted for a held force, for the recorded arm or another one, in the pose that some topics have."""
+    """What is predicted for a held force, for the recorded arm or another one, in its pose in the middle."""
     hold, cover, position = one.hold, one.cover, one.position
     arm = arm or parameters.arm
-    q = None if arm is None else _pose(run, arm, hold, topics)
-    if arm is None or q is None or cover not in arm.covers.names:
+    poses = None if arm is None else joint_angles(run, arm)
+    if arm is None or poses is None or cover not in arm.covers.names:
         return Theory()
+    q = poses[1][row_at(poses[0], (hold.begin + hold.end) // 2)].tolist()
     link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
     if hold.frame != link:
         body = RigidBody(arm)
@@ -275,21 +269,6 @@ def theory_of(
     if seen is not None and seen.swings.verdict is Verdict.LIMIT_CYCLE:
         moved = at_the_contact(seen, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
     return Theory(node, predicted, largest, found, moved)
-
-
-def _pose(run: RecordedRun, arm: Arm, hold: Hold, topics: Sequence[str]) -> list[float] | None:
-    """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
-    for topic in topics:
-        columns = run.joints(topic)
-        names = arm.motors.names if topic == "motor_states" else arm.joints.names
-        found = None if columns is None else by_names(columns, "position", names)
-        if columns is None or found is None:
-            continue
-        row = max(int(np.searchsorted(columns.stamp_ns, (hold.begin + hold.end) // 2, side="right")) - 1, 0)
-        q: list[float] = found[row].tolist()
-        if np.all(np.isfinite(q)):
-            return TransmissionMap.of(arm).joint_positions(q) if topic == "motor_states" else q
-    return None
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:

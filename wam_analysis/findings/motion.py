@@ -6,18 +6,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.transmission import turning
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals
 from wam_analysis.measures.friction import Friction
 from wam_analysis.recorded import PredictionParameters
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
 Numbers = NDArray[np.float64]
 
-NOT_IDENTIFIABLE = "not identifiable"
 ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
 
@@ -25,13 +24,13 @@ MORE = "record motions that do not repeat each other, slow and fast, both ways, 
 # friction
 
 
-def friction_section(recording: AnalysedRun) -> Section:
+def friction_section(recording: AnalysedRecording) -> Section:
     """Friction of motors and joints, next to what is configured."""
     arm, signals, joints, friction, _, drowned = recording.motion
     if arm is None or signals is None:
         why = "no parameters of the arm" if arm is None else "no motor_states with a load"
         sentences = [f"Friction, ripple and power cannot be evaluated: {why} in this bag."]
-        missing = recording.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
+        missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
         return Section("friction", "Friction", tuple(sentences), (), missing)
     alone = signals.load_from == CABLE
     note = (
@@ -47,12 +46,7 @@ def friction_section(recording: AnalysedRun) -> Section:
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
         findings += _friction_findings(name, found, configured, "cable torque less strain")
     seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic)]
-    sentences = [
-        f"{name}: dry friction {_known(found.dynamic, found.dynamic_error, 'N m')}, {_breakaway(found)}, "
-        f"viscous {_known(found.viscous, found.viscous_error, 'N m s/rad')}."
-        for name, found in {**friction, **joints}.items()
-        if name in seen
-    ]
+    sentences = []
     unsure = [
         _named(name, kind)
         for name, found in {**friction, **joints}.items()
@@ -64,27 +58,15 @@ def friction_section(recording: AnalysedRun) -> Section:
     still = [name for name in {**friction, **joints} if name not in seen]
     if still:
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
-    lacking = recording.lacking("joint_sensors", "sim/joint_states")
+    lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(tuple(findings))
     every = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
     return Section("friction", "Friction", every, tuple(findings), lacking, (), flagged)
 
 
-def _breakaway(found: Friction) -> str:
-    if not math.isfinite(found.static):
-        return "no breakaway"
-    return f"breakaway {_known(found.static, found.static_error, 'N m')}"
-
-
-def _known(value: float, error: float, unit: str) -> str:
-    """A value with its standard error, or that it is not identifiable."""
-    if math.isnan(error):
-        return shown(value, unit)
-    if math.isinf(error):
-        return NOT_IDENTIFIABLE
-    if not _is_identified(value, error):
-        return f"{NOT_IDENTIFIABLE} ({shown(value)} +- {shown(error, unit)})"
-    return f"{shown(value)} +- {shown(error, unit)}"
+def identified(found: Friction) -> dict[str, float]:
+    """Friction of a shaft by kind, NaN where it is not identifiable."""
+    return {k: value if _is_identified(value, error) else math.nan for k, _, value, error in _numbers(found)}
 
 
 def _is_identified(value: float, error: float) -> bool:
@@ -125,12 +107,11 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         about["dynamic"] = ONE_WAY
     findings = []
     for (kind, unit, value, error), predicted in zip(_numbers(found), configured, strict=True):
-        identified = _is_identified(value, error)
-        deviation = f"+-{shown(error)}" if math.isfinite(error) else ""
-        if not identified:
-            deviation = f"{NOT_IDENTIFIABLE}: {shown(value)} {deviation}" if deviation else NOT_IDENTIFIABLE
-        text = "; ".join(filter(None, (about.get(kind), deviation, note)))
-        stated = (value, error) if identified else (math.nan, math.nan)
+        doubt, stated = "", (value, error)
+        if not _is_identified(value, error):
+            doubt = f"not identifiable: {shown(value)} +-{shown(error)}" if math.isfinite(error) else "not identifiable"
+            stated = (math.nan, math.nan)
+        text = "; ".join(filter(None, (about.get(kind), doubt, note)))
         findings.append(Finding(_named(name, kind), unit, stated[0], predicted, text, stated[1]))
     return findings
 
@@ -138,7 +119,7 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
 # ripple
 
 
-def ripple_section(recording: AnalysedRun) -> Section | None:
+def ripple_section(recording: AnalysedRecording) -> Section | None:
     """The largest ripple of each motor over its own angle, next to what is configured."""
     _, signals, _, friction, ripple, drowned = recording.motion
     if signals is None or drowned:

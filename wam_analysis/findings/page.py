@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.charts import FIRST, SIGNALS, Chart, charts, data, scripts
-from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.plots import arm_plot
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 from wam_bag.losses import PARAMETERS
@@ -105,7 +105,7 @@ def page(analysis: Analysis) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY.format(allowed)}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(name)}: analysis</title><style>{styles}{CSS}</style></head><body>"
-        f"<header><div><h1>{html.escape(name)}</h1><p>{html.escape(_lead(analysis))}</p></div></header>"
+        f"<header><div><h1>{html.escape(name)}</h1><p>{html.escape(analysis.sections[0].sentences[0])}</p></div></header>"
         f"<main><nav>{links}</nav>{sections}{_provenance(analysis)}{_parameters(analysis)}</main>"
         f'<script type="application/json" id="charts">{data(drawn)}</script>'
         f"{''.join(f'<script>{text}</script>' for text in run)}</body></html>\n"
@@ -114,10 +114,6 @@ def page(analysis: Analysis) -> str:
 
 def _digest(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _lead(analysis: Analysis) -> str:
-    return f"{analysis.recording.summary.namespace or '/'}, {shown(analysis.duration, 's')}, {analysis.recording.mode}"
 
 
 def _section(section: Section, drawn: Sequence[tuple[str, str]]) -> str:

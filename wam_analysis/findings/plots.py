@@ -9,30 +9,33 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
+from wam_analysis.contact_list import contact_rows
 from wam_analysis.drawing import ESTIMATED, STYLE, TRUE
-from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.recorded import recorded_arm
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
 from wam_description.signals import Contact
+from wam_sim.reactions import steady_begin
 
 
-def arm_plot(recording: AnalysedRun) -> tuple[str, bytes] | None:
-    """Caption and SVG of the arm in the pose of the summary's moment; None without a pose."""
-    moment, recorded = recording.summary.moment, recorded_arm(recording.run.parameters)
-    arm, traces = recorded.arm, recording.summary.traces
-    if moment is None or set(arm.joints.names) - set(moment.names):
+def arm_plot(recording: AnalysedRecording) -> tuple[str, bytes] | None:
+    """Caption and SVG of the arm in the pose of `_moment`; None without a pose."""
+    recorded, traces = recorded_arm(recording.parameters), recording.traces
+    arm = recorded.arm
+    poses = joint_angles(recording.run, arm)
+    if poses is None or not len(traces.stamp):
         return None
-    q = [float(moment.q[moment.names.index(name)]) for name in arm.joints.names]
-    if not np.all(np.isfinite(q)):
-        return None
+    stamp = _moment(recording)
+    row, q = row_at(traces.stamp, stamp), poses[1][row_at(poses[0], stamp)].tolist()
     arrows = []
     for signal, colour, label, width in (
         (traces.true, TRUE, "true", 4.2),  # visible under a correct estimate
         (traces.estimated, ESTIMATED, "estimated", 1.3),
     ):
-        x, y, z = signal.force[moment.row].tolist()
-        contact = Contact(str(signal.frame[moment.row]), float(signal.position[moment.row]), (x, y, z))
-        if signal.acts[moment.row] and contact.cover in arm.covers.names and math.isfinite(contact.position):
+        x, y, z = signal.force[row].tolist()
+        contact = Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
+        if signal.acts[row] and contact.cover in arm.covers.names and math.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             ends = np.array([point, point + LAYOUT.metres_per_newton * force])
             arrows.append((ends, colour, f"{label} {np.linalg.norm(force):.1f} N", width))
@@ -52,6 +55,16 @@ def arm_plot(recording: AnalysedRun) -> tuple[str, bytes] | None:
         if arrows:
             axes.legend(loc="upper right", fontsize=13)  # readable on a narrow page
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    seconds = (moment.stamp - traces.zero) / 1e9
+    seconds = (stamp - traces.zero) / 1e9
     note = f" ({recorded.note})" if recorded.note else ""
     return f"The arm at {seconds:.1f} s, with the true and the estimated contact force.{note}", stream.getvalue()
+
+
+def _moment(recording: AnalysedRecording) -> int:
+    """Middle of the steady state of the hardest press, else of the first contact, else the end, ns."""
+    traces, holds = recording.traces, recording.holds
+    if holds:
+        hardest = max(holds, key=lambda hold: hold.commanded)
+        return (steady_begin(hardest) + hardest.end) // 2
+    contacts = contact_rows(traces.stamp, traces.true.acts) or contact_rows(traces.stamp, traces.estimated.acts)
+    return int(traces.stamp[sum(contacts[0]) // 2 if contacts else -1])

@@ -6,18 +6,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.transmission_signals import TransmissionSignals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
 Numbers = NDArray[np.float64]
 
 
-def power_section(recording: AnalysedRun) -> Section | None:
+def power_section(recording: AnalysedRecording) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
     arm, signals, joints, friction, _, drowned = recording.motion
     if arm is None or signals is None or drowned:
@@ -46,21 +46,14 @@ def power_section(recording: AnalysedRun) -> Section | None:
             expected = max(expected, 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
-            sentences.append(
-                f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission; "
-                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %. With the "
-                f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
-                "recording."
-            )
+            sentences.append(f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission.")
         if is_measured and found.back_put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
-            sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
+            sentences.append(f"The links put {shown(found.back_put, 'J')} into it while they were backdriven.")
     findings += _backdrive(arm, friction, joints)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
-    verdict = tuple(
-        f"{one.name[0].upper()}{one.name[1:]}: {shown(one.measured, '%')}." for one in findings if one.unit == "%"
-    )
+    verdict = tuple(stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%")
     return Section("power", "Efficiency and backdrivability", tuple(sentences), tuple(findings), (), verdict)
 
 

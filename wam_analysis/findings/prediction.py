@@ -124,12 +124,13 @@ def _surface(recorded: PredictionParameters, arm: Arm, cover: str, position: flo
     """Stiffness, N/m, and damping, N s/m: of the spring under the joint, else of the obstacles if all have the same."""
     link = arm.covers.links[arm.covers.names.index(cover)]
     joint = arm.joints.names[arm.links.names.index(link)]
-    springs = recorded.springs
+    if recorded.world is None:
+        return _Surface(math.nan, 0.0)
+    springs, obstacles = recorded.world.springs, recorded.world.obstacles
     for name, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
         if name == joint and stiffness > 0.0 and position > 0.0:
             return _Surface(stiffness * (lever / position) ** 2, 0.0)
-    obstacles = recorded.obstacles
-    found = set(zip(obstacles.stiffness, obstacles.damping, strict=True)) if obstacles is not None else set()
+    found = set(zip(obstacles.stiffness, obstacles.damping, strict=True))
     return _Surface(*found.pop()) if len(found) == 1 else _Surface(math.nan, 0.0)
 
 

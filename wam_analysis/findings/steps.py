@@ -1,7 +1,6 @@
 """Section about the steps of a scenario: whether each did what was commanded, in answers."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
@@ -9,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_list import NO_LINK, ListedContact
-from wam_analysis.demo_summary import DemoSummary
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.held_force import HeldForce
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD, TOUCH
 from wam_analysis.unplanned_contact import LIMIT
-from wam_sim.reactions import OUTCOMES, STEADY, too_short, unassessed, unmet
+from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
 
 class VerdictResult(StrEnum):
@@ -47,26 +45,37 @@ class VerdictAnswer(NamedTuple):
         return f"{self.question}: {self.result}{worst}{remark}"
 
 
-def steps_section(recording: AnalysedRun) -> Section | None:
+def steps_section(recording: AnalysedRecording) -> Section | None:
     """Whether the commands of a scenario were carried out; None without a scenario."""
-    if not recording.summary.steps:
+    if not recording.steps:
         return None
-    return Section(
-        "steps", "Result of the steps, worst case in brackets", tuple(f"{answer}." for answer in verdict(recording)), ()
-    )
+    outcomes, (brief, why) = _outcomes(recording), recording.unassessed
+    wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
+    wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
+    answers = tuple(f"{answer}." for answer in verdict(recording))
+    return Section("steps", "Result of the steps, worst case in brackets", answers, (), (), (), tuple(wrong))
 
 
-def verdict(recording: AnalysedRun) -> tuple[VerdictAnswer, ...]:
+def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
+    """Names of the steps whose command was not met, by what became of it; that of a force has its own answer."""
+    found: dict[str, list[str]] = {one: [] for one in OUTCOMES}
+    for step in recording.steps:
+        is_force = any(step.begin < hold.end and hold.begin < step.end for hold in recording.holds)
+        for one in {one.outcome for one in unmet(recording.reactions, step)} - {*OUTCOMES[:is_force]}:
+            found[one].append(step.name)
+    return found
+
+
+def verdict(recording: AnalysedRecording) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
-    summary = recording.summary
     answers = (
-        _force_verdict(recording.held, _brief(summary)),
-        *_command_verdict(summary),
-        _link_verdict(summary),
-        _position_verdict(summary),
-        *_false_verdict(summary),
+        _force_verdict(recording.held, _brief(recording)),
+        *_command_verdict(recording),
+        _link_verdict(recording),
+        _position_verdict(recording),
+        *_false_verdict(recording),
     )
-    hard, unknown = summary.unplanned
+    hard, unknown = recording.unplanned
     question = "without a commanded force no contact above"
     if hard:
         worst = max(hard, key=lambda one: one.force)
@@ -74,10 +83,10 @@ def verdict(recording: AnalysedRun) -> tuple[VerdictAnswer, ...]:
     return *answers, *[VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")][: bool(unknown)]
 
 
-def _brief(summary: DemoSummary) -> int:
+def _brief(recording: AnalysedRecording) -> int:
     """How many steps commanded a force too briefly for a hold."""
-    traces, holds = summary.traces, summary.holds
-    pressed = [one for one in summary.steps if np.any(traces.during(one.begin, one.end) & traces.commanded.acts)]
+    traces, holds = recording.traces, recording.holds
+    pressed = [one for one in recording.steps if np.any(traces.during(one.begin, one.end) & traces.commanded.acts)]
     return sum(not any(hold.begin < step.end and step.begin < hold.end for hold in holds) for step in pressed)
 
 
@@ -93,57 +102,54 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     return answer._replace(remark=f"{short} of {len(held) + brief} commanded for less than {STEADY:g} s" * bool(short))
 
 
-def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+def _command_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     """Commands that were not carried out; none if there is none, and all could be assessed."""
-    outcomes: Counter[str] = Counter()
-    for step in summary.steps:
-        found = {one.outcome for one in unmet(summary.reactions, step)}
-        if any(step.begin < hold.end and hold.begin < step.end for hold in summary.holds):
-            found -= {OUTCOMES[0]}  # that of a force has its own answer
-        outcomes.update(found)
-    counts = [f"{outcomes[one]} {one}" for one in OUTCOMES if outcomes[one]]
-    brief = unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_times)
+    counts = [f"{len(names)} {what}" for what, names in _outcomes(recording).items() if names]
+    brief, why = recording.unassessed
     if not counts and not brief:
         return []
     result = VerdictResult.NO if counts else VerdictResult.NOTHING
-    remark = f"{len(brief)} {too_short(summary.settling_times, brief)}" * bool(brief)
+    remark = f"{len(brief)} {why}" * bool(brief)
     return [VerdictAnswer("commands carried out", result, ", ".join(counts), remark)]
 
 
-def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
+def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Of each true contact; one that is estimated where none is has its own answer."""
-    if any(one.lasts for one in summary.missed):
+    if any(one.lasts for one in recording.missed):
         return VerdictAnswer("right link", VerdictResult.NO, "missed")
-    right = [one.right for one in summary.touched if one.lasts]
+    right = [one.right for one in recording.touched if one.lasts]
     answer = _answer("right link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
     least = f"{100.0 * min(right, default=0.0):.0f} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 
 
-def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
+def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
-    found = _compared(summary)
+    found = _compared(recording)
     errors = [100.0 * abs(one.position_error) for one in found if not one.estimate.is_lower_bound]
-    errors += [math.nan] * sum(one.lasts for one in summary.missed)
+    errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = sum(one.estimate.is_lower_bound for one in found)
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
     return answer._replace(remark=f"unknown for {unknown} of {len(found)} contacts" * bool(unknown))
 
 
-def _compared(summary: DemoSummary) -> list[ListedContact]:
+def _compared(recording: AnalysedRecording) -> list[ListedContact]:
     """The estimated contacts that are no false detections."""
-    return [one for one in summary.contacts if one.true != NO_LINK]
+    return [one for one in recording.contacts if one.true != NO_LINK]
 
 
-def _false_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     """Whether a contact was estimated where none is; none where that is not known."""
-    if not summary.free:
+    traces = recording.traces
+    free = int(np.sum(traces.is_compared & ~traces.true.acts))
+    if not free:
         return []
+    false = int(np.sum(traces.is_false))
     question = f"false detections within {TOUCH.false_tolerance:g} % of the time without contact"
-    part = 100.0 * summary.false_contact / summary.free
-    if part > TOUCH.false_tolerance and summary.false_contact <= TOUCH.ending:
-        brief = f"{1e3 * summary.false_contact:.0f} ms, as a contact that ends may take"
+    part, seconds = 100.0 * false / free, false * traces.period
+    if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
+        brief = f"{1e3 * seconds:.0f} ms, as a contact that ends may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]
     is_right = part <= TOUCH.false_tolerance
     return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]

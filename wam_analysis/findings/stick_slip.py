@@ -1,15 +1,15 @@
 """Section about stick and slip."""
 
-from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, rest_words, shown
 from wam_analysis.foreign.mechanics import hidden_motion, sticking
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 
 
-def stick_section(recording: AnalysedRun) -> Section:
+def stick_section(recording: AnalysedRecording) -> Section:
     """How long each motor and joint was at rest, and how often it moved; whether it sticks under a command."""
     sentences, findings, verdict = [], [], []
-    lacking = () if recording.is_foreign else recording.lacking("motor_states")
+    lacking = () if recording.is_foreign else recording.run.lacking("motor_states")
     for one in recording.states:
         command = recording.command_of(one)
         # not a position that is sent once and held
@@ -24,7 +24,7 @@ def stick_section(recording: AnalysedRun) -> Section:
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
-            Finding(f"{one.label}: slips", "", float(found.slips), note=f"{found.reversals} reverse the direction"),
+            Finding(f"{one.label}: slips", "", float(found.slips)),
         ]
         sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:

@@ -10,7 +10,7 @@ from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
-from wam_analysis.thresholds import CYCLE
+from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.bag import JointColumns
 from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
@@ -19,10 +19,9 @@ Numbers = NDArray[np.float64]
 
 
 class Swinging(NamedTuple):
-    """A shaft that swings during a hold; `topic` is where it was seen."""
+    """A shaft that swings during a hold."""
 
     name: str
-    topic: str
     swings: Swings
 
 
@@ -36,7 +35,7 @@ def swinging(run: RecordedRun, hold: Hold) -> Swinging | None:
         for i, name in enumerate(columns.names):
             one = _swings(columns, i, hold)
             if one is not None:
-                found.append(Swinging(name, topic, one))
+                found.append(Swinging(name, one))
         if found:
             break
     order = (Verdict.DIVERGED, Verdict.LIMIT_CYCLE, Verdict.SETTLED, Verdict.UNDECIDED)
@@ -46,7 +45,7 @@ def swinging(run: RecordedRun, hold: Hold) -> Swinging | None:
 def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
     a, b = (int(row) for row in np.searchsorted(columns.stamp_ns, [hold.begin, hold.end]))
     value = columns.position[a:b, i]
-    if len(value) < 20 or not np.all(np.isfinite(value)):
+    if len(value) < SHAFT.fewest_samples or not np.all(np.isfinite(value)):
         return None
     extent = float(np.ptp(value[int((1.0 - CYCLE.late_part) * len(value)) :]))
     if extent < CYCLE.still_shaft:

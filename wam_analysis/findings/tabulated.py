@@ -78,7 +78,8 @@ def _table(findings: list[Finding]) -> Tabulated:
 
 
 def _measured(one: Finding) -> str:
-    return bounded(shown(one.measured), one.is_lower_bound) + MARK * one.deviates
+    error = f" +- {shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
+    return bounded(shown(one.measured), one.is_lower_bound) + error + MARK * one.deviates
 
 
 def _titled(quantity: str, unit: str) -> str:

@@ -58,7 +58,7 @@ def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
         LAYOUT.column, min(int(LAYOUT.name * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows)))))
     )
     words = [word for name in table.columns[1:] for word in name.split()]  # none is broken
-    column = max(LAYOUT.column, *map(len, words))
+    column = max(LAYOUT.column, *(len(text) for row in (words, *(row[1:] for row in table.rows)) for text in row))
     column = min(column, wide - 4 - names)
     fits = max(1, (wide - 2 - names) // (column + 2))
     groups: list[list[int]] = []
@@ -85,7 +85,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "provenance": analysis.provenance,
-        "duration": analysis.duration,
+        "duration": analysis.recording.duration,
         "sections": [
             {
                 "key": section.key,

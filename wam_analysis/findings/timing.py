@@ -1,20 +1,21 @@
 """Section about the timing of the loop, and the provenance of the recording."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import LoopReport
-from wam_analysis.findings.analysed_run import STAMPED, AnalysedRun
+from wam_analysis.contact_list import median
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Source
-from wam_analysis.measures.loop_timing import has_lagged, latency, stamp_timing
+from wam_analysis.measures.loop_timing import stamp_timing
+from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.losses import RECORDING
+from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 
 Times = NDArray[np.int64]
 
@@ -30,7 +31,7 @@ class _Stream(NamedTuple):
     expected: float
 
 
-def _own_streams(recording: AnalysedRun) -> Iterator[_Stream]:
+def _own_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
     timing = recording.parameters.timing
     for name in TIMED:
         columns = recording.bag.topics.get(f"{recording.namespace}/{name}")
@@ -42,7 +43,7 @@ def _own_streams(recording: AnalysedRun) -> Iterator[_Stream]:
             yield _Stream(name, columns.stamp_ns, received, expected)
 
 
-def _foreign_streams(recording: AnalysedRun) -> Iterator[_Stream]:
+def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
     """Those of each sender by itself."""
     senders: dict[tuple[str, bytes], list[Source]] = {}
     for one in recording.analysed:
@@ -58,10 +59,9 @@ def _foreign_streams(recording: AnalysedRun) -> Iterator[_Stream]:
         yield _Stream(name, stamp, received, math.nan)
 
 
-def timing_section(recording: AnalysedRun) -> Section:
+def timing_section(recording: AnalysedRecording) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
     sentences, findings, verdict = [], [], []
-    real = recording.mode == "realtime"
     streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
     for name, stamp, received, expected in streams:
         found = stamp_timing(stamp, received)
@@ -84,51 +84,27 @@ def timing_section(recording: AnalysedRun) -> Section:
     if recording.is_foreign:
         stated = "Every period has its message." if findings else "No stamped topic was recorded."
         return Section("timing", "Timing", tuple(sentences) or (stated,), tuple(findings), (), (), tuple(verdict))
-    states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
-    lagging = [
-        name
-        for name, one in ((TIMED[0], states), (TIMED[1], answers))
-        if real and one is not None and has_lagged(one.stamp_ns, one.log_time_ns)
-    ]
-    if lagging:
-        sentences.append(
-            f"The recorder lagged: {' and '.join(lagging)} came in bursts, so no latency is measured from the times of "
-            "reception."
-        )
-    elif real and states is not None and answers is not None:
-        answer = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
-        findings += [
-            Finding("latency, state to current at the recorder: median", "us", 1e6 * answer.p50),
-            Finding("latency, state to current at the recorder: 99 %", "us", 1e6 * answer.p99),
-            Finding("latency, state to current at the recorder: worst", "us", 1e6 * answer.worst),
-            Finding("states without a command", "", float(answer.unanswered)),
-        ]
-        sentences.append(
-            f"Latency from state to current command, at the recorder: median {shown(1e6 * answer.p50, 'us')}, "
-            f"worst {shown(1e3 * answer.worst, 'ms')}; "
-            f"{answer.unanswered} of {answer.answered + answer.unanswered} states got no command."
-        )
-    loop = recording.summary.loop
-    if not math.isnan(loop.rate):
-        findings += [
-            Finding("driver: rate", "Hz", loop.rate),
-            Finding("driver: latency p50", "us", loop.p50),
-            Finding("driver: latency p99", "us", loop.p99),
-            Finding("driver: missed periods", "", float(loop.missed), note=f"of {loop.periods}"),
-        ]
+    if timed := [facts for facts in recording.loop if RATE in facts]:
+        last = timed[-1]
+        findings.append(Finding("driver: rate", "Hz", float(last[RATE])))
+        for p in ("p50", "p99"):  # of every second
+            values = np.array([float(facts.get(f"latency {p} [us]", math.nan)) for facts in timed])
+            findings.append(Finding(f"driver: latency {p}", "us", median(values)))
+        note = f"of {last.get('periods', '-')}"
+        findings.append(Finding("driver: missed periods", "", float(last.get("missed periods", math.nan)), note=note))
     if recording.mode == "lockstep":
         sentences.append(
             "Recorded in lockstep: the driver waited for every command, so reception times have no meaning."
         )
     if not findings:
         sentences.append("No stamped topic of the loop was recorded.")
-    lacking = recording.lacking(*TIMED[:2])
+    lacking = recording.run.lacking(*TIMED[:2])
     return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), lacking, (), tuple(verdict))
 
 
-def provenance(recording: AnalysedRun) -> dict[str, str]:
+def provenance(recording: AnalysedRecording) -> dict[str, str]:
     """Origin of the recording and of its numbers."""
-    bag, summary = recording.bag, recording.summary
+    bag = recording.bag
     metadata = dict(bag.metadata.get(RECORDING, {}))
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
     whole = bag.counts or counts
@@ -139,12 +115,10 @@ def provenance(recording: AnalysedRun) -> dict[str, str]:
     facts = {
         "bag": str(bag.path),
         "arm": recording.namespace or "/",
-        "mode": recording.mode + _pace(summary.loop),
+        "mode": recording.mode + _pace(recording.loop),
         "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
-        "received": "no counts in the bag" if summary.received < 0 else str(summary.received),
-        "dropped": "no counts in the bag" if summary.dropped < 0 else str(summary.dropped),
-        "lost": " ".join(summary.lost) or "none known",
+        "lost": " ".join(recording.lost) or "none known",
         "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
         **({"parameters, notes": "; ".join(recording.run.parameters.notes)} if recording.run.parameters.notes else {}),
         "analysed with": f"wam_stack {here}",
@@ -153,12 +127,17 @@ def provenance(recording: AnalysedRun) -> dict[str, str]:
     return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
 
 
-def _pace(loop: LoopReport) -> str:
+def _pace(loop: Sequence[Mapping[str, str]]) -> str:
     """How fast the time of the arm passed in paced lockstep, '' where that is not known."""
-    if math.isnan(loop.factor):
+    paced = [facts for facts in loop if REAL_TIME_FACTOR in facts][1:]  # the first is of no time
+    if not paced:
         return ""
-    slower = f", {loop.slips} periods too late to be made up for" if loop.slips else ""
-    return f"; real-time factor {loop.factor:.2f}, at most {1e3 * loop.behind:.0f} ms behind{slower}"
+    factors = np.array([float(facts[REAL_TIME_FACTOR]) for facts in paced])
+    factor = 1.0 / float(np.mean(1.0 / np.maximum(factors, 1e-3)))  # each is of a second of the arm
+    behind = max(float(facts.get(BEHIND, math.nan)) for facts in paced)
+    slips = paced[-1].get(SLIPS, "0")
+    slower = f", {slips} periods too late to be made up for" * (slips != "0")
+    return f"; real-time factor {factor:.2f}, at most {behind:.0f} ms behind{slower}"
 
 
 def _part_of(read: int, all_of_them: int) -> str:

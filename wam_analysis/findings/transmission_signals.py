@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.held_messages import at_stamps, by_names, lacking
+from wam_analysis.held_messages import at_stamps, by_names
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
@@ -138,7 +138,7 @@ def _caveats(run: RecordedRun, left_out: float) -> Iterator[str]:
     yield "The motors' load is that of gravity alone: what accelerates the links is in their friction, too."
     if left_out > 0.0:
         yield f"Left out is {100.0 * left_out:.0f} % of the time, in which something pushed or touched the arm."
-    unknown = lacking(run, *TOUCHES[: 1 + run.is_simulated])
+    unknown = run.lacking(*TOUCHES[: 1 + run.is_simulated])
     if unknown:
         yield (
             f"Whether something pushed or touched the arm is not known: not recorded ({', '.join(unknown)}). "

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Piece, Source, longest, pieces
+from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import SpectralLine, spectral_lines
@@ -198,8 +199,7 @@ def _begins_after(command: Source, begin: float) -> bool:
 
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:
     """The last command before each of some times, before the first one that, (n,)."""
-    rows = np.maximum(np.searchsorted(command.time, time, side="right") - 1, 0)
-    values: Numbers = command.values[quantity][rows]
+    values: Numbers = command.values[quantity][row_at(command.time, time)]
     return values
 
 

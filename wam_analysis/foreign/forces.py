@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Source, pieces
+from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.thresholds import HOLD
 
@@ -48,7 +49,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     begins = [0, *changed.tolist()]
     ends = [*command.time[changed].tolist(), float(measured.time[-1])]
     stretches = pieces(measured)
-    rows = np.maximum(np.searchsorted(command.time, measured.time[known], side="right") - 1, 0)
+    rows = row_at(command.time, measured.time[known])
     got = np.column_stack([measured.values[axis][known] for axis in axes])
     sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (desired[rows] - desired[rows].mean(axis=0))))) or 1.0
     found, arrives = [], command.arrives

@@ -23,21 +23,20 @@ class Sticking(NamedTuple):
     Attributes
     ----------
     stuck : fraction of the time at rest.
-    slips, reversals : motions between, and those against the one before; a motion back and forth is one.
+    slips : motions between; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
     """
 
     stuck: float
     slips: int
-    reversals: int
     commanded: float
 
 
 def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
     """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
     if rests(source):
-        return Sticking(1.0, 0, 0, math.nan)
-    still = slips = reversals = total = disobeyed = 0
+        return Sticking(1.0, 0, math.nan)
+    still = slips = total = disobeyed = 0
     moved = next((q for q in ("velocity", "position") if q in source.values), "")
     for piece in pieces(source, moved) if moved else ():
         rest = _rest(piece, least)
@@ -51,13 +50,13 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
             continue
         phases = without_turns(phases, piece.values["velocity"], rest)
         still += round(phases.stuck * len(piece.time))
-        slips, reversals = slips + len(phases.slips), reversals + phases.reversals
+        slips += len(phases.slips)
         if command is not None:
             moves = np.abs(_commanded_speed(command, piece.time)) > rest
             disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
     if not total:
         return None
-    return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
+    return Sticking(still / total, slips, disobeyed / still if command is not None and still else math.nan)
 
 
 def rests(source: Source) -> bool:

@@ -5,12 +5,13 @@ import importlib
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from functools import cache, partial
 from numbers import Integral
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
@@ -37,20 +38,6 @@ ROSBAGS = (".bag", ".db3")
 BILLION = 1_000_000_000
 
 
-class Opened(NamedTuple):
-    """A recording that is open.
-
-    Attributes
-    ----------
-    kinds, counts : type and number of messages by topic.
-    messages : topic, time and message of each message of some topics.
-    """
-
-    kinds: dict[str, str]
-    counts: dict[str, int]
-    messages: Callable[[Collection[str]], Iterator[tuple[str, int, Any]]]
-
-
 def needs_rosbags(path: Path) -> bool:
     """Whether a bag is of ROS 1 or of SQLite, which rosbags reads."""
     if path.is_file():
@@ -71,9 +58,9 @@ def foreign_bag(path: Path, given: TopicMap) -> Bag:
     if path.suffix == ".csv":
         return table_bag(path, series_of_csv(path), given)
     if needs_rosbags(path):
-        bag = _of(path, _by_rosbags(path), given)
+        bag = _by_rosbags(path, given)
     elif encoded := of_other_encoding(path):
-        bag = _of(path, _by_mcap(path, encoded), given)
+        bag = _by_mcap(path, encoded, given)
     else:
         listed = contents(path).topics
         chosen = [name for name, topic in listed.items() if _is_wanted(name, topic.type, given)]
@@ -182,30 +169,23 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
 # other formats
 
 
-def _by_rosbags(path: Path) -> AbstractContextManager[Opened]:
+def _by_rosbags(path: Path, given: TopicMap) -> Bag:
     try:
         highlevel: Any = importlib.import_module("rosbags.highlevel")
         typesys: Any = importlib.import_module("rosbags.typesys")
     except ImportError:
         raise BagError(f"{path} is no MCAP; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
-
-    @contextmanager
-    def opened() -> Iterator[Opened]:
-        store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
-        try:
-            with highlevel.AnyReader([path], default_typestore=store) as reader:
-
-                def messages(topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
-                    some = [one for one in reader.connections if one.topic in topics]
-                    for one, time, data in reader.messages(some) if some else ():
-                        yield one.topic, time, reader.deserialize(data, one.msgtype)
-
-                kinds = {one.topic: one.msgtype for one in reader.connections}
-                yield Opened(kinds, {topic: found.msgcount for topic, found in reader.topics.items()}, messages)
-        except highlevel.AnyReaderError as error:
-            raise BagError(f"{path} cannot be read by rosbags: {error}") from None
-
-    return opened()
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
+    try:
+        with highlevel.AnyReader([path], default_typestore=store) as reader:
+            kinds = {one.topic: one.msgtype for one in reader.connections}
+            counts = {topic: found.msgcount for topic, found in reader.topics.items()}
+            some = [one for one in reader.connections if _is_wanted(one.topic, one.msgtype, given)]
+            read = reader.messages(some) if some else ()
+            decoded = ((one.topic, time, reader.deserialize(data, one.msgtype)) for one, time, data in read)
+            return _bag_of(path, kinds, counts, decoded)
+    except highlevel.AnyReaderError as error:
+        raise BagError(f"{path} cannot be read by rosbags: {error}") from None
 
 
 def of_other_encoding(path: Path) -> list[Path]:
@@ -223,8 +203,7 @@ def _has_other_encoding(file: Path) -> bool:
     return summary is not None and any(one.message_encoding in ("json", "ros1") for one in summary.channels.values())
 
 
-@contextmanager
-def _by_mcap(path: Path, files: Sequence[Path]) -> Iterator[Opened]:
+def _by_mcap(path: Path, files: Sequence[Path], given: TopicMap) -> Bag:
     with ExitStack() as stack:
         readers = [make_reader(stack.enter_context(file.open("rb"))) for file in files]
         kinds: dict[str, str] = {}
@@ -235,19 +214,18 @@ def _by_mcap(path: Path, files: Sequence[Path]) -> Iterator[Opened]:
                 schema = summary.schemas.get(channel.schema_id)
                 kinds[channel.topic] = _ros2_name(schema.name) if schema else ""
                 counts[channel.topic] += numbers.get(channel.id, 0)
+        wanted = [topic for topic, kind in kinds.items() if _is_wanted(topic, kind, given)]
+        decoder = cache(partial(_decoder, path))
 
-        def messages(topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
-            for reader in readers:
-                decoders: dict[int, Callable[[bytes], Any]] = {}
-                for schema, channel, message in reader.iter_messages(topics=[*topics]):
-                    if channel.id not in decoders:
-                        decoders[channel.id] = _decoder(path, channel.message_encoding, kinds[channel.topic], schema)
-                    yield channel.topic, message.log_time, decoders[channel.id](message.data)
+        def decoded() -> Iterator[tuple[str, int, Any]]:
+            for schema, channel, message in (one for each in readers for one in each.iter_messages(topics=wanted)):
+                decode = decoder(channel.message_encoding, kinds[channel.topic], schema.data if schema else b"")
+                yield channel.topic, message.log_time, decode(message.data)
 
-        yield Opened(kinds, counts, messages)
+        return _bag_of(path, kinds, counts, decoded())
 
 
-def _decoder(path: Path, encoding: str, kind: str, schema: Any) -> Callable[[bytes], Any]:
+def _decoder(path: Path, encoding: str, kind: str, schema: bytes) -> Callable[[bytes], Any]:
     if encoding == "json":
         return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
     try:
@@ -257,7 +235,7 @@ def _decoder(path: Path, encoding: str, kind: str, schema: Any) -> Callable[[byt
             f"{path} has messages in '{encoding}'; rosbags reads them: pip install 'wam_stack[rosbags]'"
         ) from (None)
     store = typesys.get_typestore(typesys.Stores.EMPTY)
-    store.register(typesys.get_types_from_msg(schema.data.decode(), kind))
+    store.register(typesys.get_types_from_msg(schema.decode(), kind))
     take = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     return lambda data: take(data, kind)
 
@@ -268,17 +246,15 @@ def _ros2_name(kind: str) -> str:
     return f"{package}/msg/{name}" if slash and "/" not in name else kind
 
 
-def _of(path: Path, reading: AbstractContextManager[Opened], given: TopicMap) -> Bag:
-    """A bag of what another reader yields."""
+def _bag_of(path: Path, kinds: dict[str, str], counts: dict[str, int], read: Iterable[tuple[str, int, Any]]) -> Bag:
+    """A bag of topic, time and message of each message that another reader yields."""
     times: dict[str, list[int]] = {}
     found: dict[str, list[Any]] = {}
-    with reading as opened:
-        wanted = [topic for topic, kind in opened.kinds.items() if _is_wanted(topic, kind, given)]
-        for topic, time, message in opened.messages(wanted):
-            times.setdefault(topic, []).append(time)
-            found.setdefault(topic, []).append(message)
+    for topic, time, message in read:
+        times.setdefault(topic, []).append(time)
+        found.setdefault(topic, []).append(message)
     topics: dict[str, Any] = {name: Messages(np.array(times[name], np.int64), found[name]) for name in found}
-    return Bag(path, topics, opened.kinds, {}, {}, opened.counts)
+    return Bag(path, topics, kinds, {}, {}, counts)
 
 
 # to columns

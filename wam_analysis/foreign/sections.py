@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.finding import Finding, Section, counted, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines, slowest
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
@@ -19,6 +18,7 @@ from wam_analysis.foreign.mechanics import (
     velocity_factor,
 )  # fmt: skip
 from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
@@ -32,7 +32,7 @@ ALSO = {
 }
 
 
-def topics_section(recording: AnalysedRun) -> Section:
+def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     what = (
@@ -50,7 +50,7 @@ def topics_section(recording: AnalysedRun) -> Section:
     ]
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
-            wrong += [f"{name}: {_counted(n, what)}." for what, n in columns.irregular.items()]
+            wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
             largest = float(np.nanmax(np.abs(columns.position), initial=0.0))
             if largest > TURNS and not given.units.get("position"):
                 far = f"positions up to {shown(largest, 'rad')}, taken as radians"
@@ -76,10 +76,6 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         sizes = sizes[np.isfinite(sizes)]
         what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} message{'s' * (number != 1)} with {what}"
 
 
 DONE_TO = {
@@ -159,7 +155,7 @@ def _unread(bag: Bag) -> list[str]:
 # forces
 
 
-def step_section(recording: AnalysedRun) -> Section:
+def step_section(recording: AnalysedRecording) -> Section:
     """Steps of a commanded force, and how the measured one followed."""
     states, commands = recording.states, recording.commands
     steps: list[ForceStep] = []
@@ -180,10 +176,8 @@ def step_section(recording: AnalysedRun) -> Section:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
         over = 100.0 * response.overshoot
-        sentences.append(
-            f"{name}: from {shown(step.before, 'N')}, {shown(response.final, 'N')} in the steady state; rose in "
-            f"{shown(response.rise, 's')}, {_settled(response.settling)}, overshot by {over:.0f} %."
-        )
+        settled = "" if math.isfinite(response.settling) else ", which did not settle to 5 %"
+        sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
         findings += [
             Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),
             Finding(f"{name}: rise time 10-90 %", "s", response.rise),
@@ -194,8 +188,8 @@ def step_section(recording: AnalysedRun) -> Section:
     if steps:
         worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
         error = shown(abs(worst.response.final - worst.commanded), "N")
-        number = f"{len(steps)} force step{'s' * (len(steps) != 1)}"
-        verdict = f"{number}; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
+        number, size = counted(len(steps), "force step"), shown(worst.commanded, "N")
+        verdict = f"{number}; the largest steady error is {error} of {size}."
         return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict,), tuple(doubts))
     stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
     return Section("force", "Force", stated, (), (), (), tuple(doubts))
@@ -213,14 +207,10 @@ def _arrival(command: Source) -> str:
     )
 
 
-def _settled(seconds: float) -> str:
-    return f"settled to 5 % after {shown(seconds, 's')}" if math.isfinite(seconds) else "did not settle to 5 %"
-
-
 # cycles and spectrum
 
 
-def repetition_section(recording: AnalysedRun) -> Section:
+def repetition_section(recording: AnalysedRecording) -> Section:
     """What repeats, and whether it was commanded."""
     found = [cycle for one in recording.states for cycle in cycles(one, recording.command_of(one))]
     sentences, findings, verdict = [], [], []
@@ -246,8 +236,6 @@ def repetition_section(recording: AnalysedRun) -> Section:
 
 def _cycle_sentence(one: FoundCycle) -> str:
     size = f"{shown(one.peak_to_peak, one.unit)} peak to peak"
-    if one.error > CYCLE.unsure * one.peak_to_peak:
-        size = f"{shown(one.peak_to_peak)} +- {shown(one.error, one.unit)} peak to peak"
     if not CYCLE.changing < one.growth < 1.0 / CYCLE.changing:
         change = f"{'growing' if one.growth > 1.0 else 'shrinking'} by {100.0 * abs(one.growth - 1.0):.0f} %"
         size += f", {change} from half to half,"
@@ -265,20 +253,19 @@ def _cycle_sentence(one: FoundCycle) -> str:
     return f"{one.label} repeats at {frequency}, {size}, {where}; no command of it is known, --command names one."
 
 
-def spectrum_section(recording: AnalysedRun) -> Section:
+def spectrum_section(recording: AnalysedRecording) -> Section:
     """The strongest lines of each joint and wrench axis."""
     states = recording.states
-    sentences, findings = [], []
+    findings = []
     for label, unit, line in (found for one in states for found in lines(one)):
-        sentences.append(f"{label}: {shown(line.frequency, 'Hz')}, amplitude {shown(line.amplitude, unit)}.")
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: amplitude", unit, line.amplitude))
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: frequency", "Hz", line.frequency))
     begins = [first for one in states if math.isfinite(first := slowest(one))]
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",), ())
     span = f"from {shown(min(begins), 'Hz')} on, five cycles of the longest stretch"
-    if sentences:
-        return Section("frequency", "Spectrum", (*sentences, f"Looked for {span}."), tuple(findings))
+    if findings:
+        return Section("frequency", "Spectrum", (f"Looked for {span}.",), tuple(findings))
     silent = f"No frequency is above the noise {span}; slower ones were not looked for."
     return Section("frequency", "Spectrum", (silent,), (), (), (silent,))
 
@@ -286,7 +273,7 @@ def spectrum_section(recording: AnalysedRun) -> Section:
 # mechanics
 
 
-def effort_section(recording: AnalysedRun) -> Section:
+def effort_section(recording: AnalysedRecording) -> Section:
     """Friction and inertia of the joints of another robot."""
     states = recording.states
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
@@ -303,47 +290,37 @@ def effort_section(recording: AnalysedRun) -> Section:
                 doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
             continue
         found = whole.friction
-        effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
-        numbers = []
-        if is_sure(found.dynamic, found.dynamic_error):
-            numbers.append(("dry friction", effort, found.dynamic, found.dynamic_error))
-        if is_sure(found.viscous, found.viscous_error):
-            numbers.append(
-                ("viscous friction", f"{effort} s/{speed.partition('/')[0]}", found.viscous, found.viscous_error)
-            )
-        if is_sure(found.inertia, found.inertia_error):
-            inertia = "kg m2" if effort == "N m" else f"{effort} s2/{speed.partition('/')[0]}"
-            numbers.append(("inertia", inertia, found.inertia, found.inertia_error))
+        effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
+        every = (
+            ("dry friction", effort, found.dynamic, found.dynamic_error),
+            ("viscous friction", f"{effort} s/{speed}", found.viscous, found.viscous_error),
+            ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia, found.inertia_error),
+        )
+        numbers = [number for number in every if is_sure(*number[2:])]
         findings += [Finding(f"{one.label}: {what}", unit, value, error=error) for what, unit, value, error in numbers]
-        stated = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
         brief.append(f"{one.label}: {', '.join(f'{what} {shown(value, unit)}' for what, unit, value, _ in numbers)}.")
-        missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
+        missing = [what for what, _, value, error in every if not (math.isnan(value) or is_sure(value, error))]
+        stated = [f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"]
         if math.isnan(found.inertia):
-            missing.remove("inertia")
-            stated += (
-                f"; one frequency, 1 ms of delay changes the viscous friction by {shown(1e-3 * abs(whole.per_lag))}"
-            )
+            late = shown(1e-3 * abs(whole.per_lag))
+            stated.append(f"one frequency, 1 ms of delay changes the viscous friction by {late}")
             alone.append(one.label)
-        stated += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
-        stated += "".join(f"; {ALSO[name]}" for name in whole.also)
-        if whole.lag:
-            stated += (
-                f"; the effort is {shown(abs(whole.lag), 's')} {'behind' if whole.lag > 0.0 else 'before'} the motion"
-            )
-        sentences.append(
-            f"{one.label}: {stated}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained."
+        stated += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
+        stated += [ALSO[name] for name in whole.also]
+        way = "behind" if whole.lag > 0.0 else "before"
+        stated += [f"the effort is {shown(abs(whole.lag), 's')} {way} the motion"] * bool(whole.lag)
+        sentences.append(f"{one.label}: {'; '.join(stated)}.")
+    if not sentences:
+        why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
+        return Section("friction", "Friction", (why, *doubts, *wrong), (), (), (), tuple(wrong))
+    assumed = (
+        "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
+        "that it may also hold are taken off where they are found, and otherwise count in the errors:"
+    )
+    if alone:
+        doubts.append(
+            f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
+            "friction from a delay of the effort."
         )
-    if sentences:
-        assumed = (
-            "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
-            "that it may also hold are taken off where they are found, and otherwise count in the errors:"
-        )
-        if alone:
-            doubts.append(
-                f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
-                "friction from a delay of the effort."
-            )
-        every = (assumed, *sentences, *doubts, *wrong)
-        return Section("friction", "Friction", every, tuple(findings), (), tuple(brief), tuple(wrong))
-    why = "The friction of the joints cannot be identified: no recorded effort determines a dry or viscous friction."
-    return Section("friction", "Friction", (why, *doubts, *wrong), (), (), (), tuple(wrong))
+    stated = [assumed, *sentences, *doubts, *wrong]
+    return Section("friction", "Friction", tuple(stated), tuple(findings), (), tuple(brief), tuple(wrong))

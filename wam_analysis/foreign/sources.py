@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from enum import StrEnum
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
 from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.held_messages import row_at
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import SHAFT, STREAM
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -308,7 +310,7 @@ def _treated(one: Source) -> Source:
     if {"position", "velocity"} <= both.values.keys() and not one.is_command:
         jumps = _jumps(both)
         if len(sizes := jumps[jumps != 0.0]):
-            whole = np.cumsum(jumps)[np.maximum(np.searchsorted(both.time, one.time, side="right") - 1, 0)]
+            whole = np.cumsum(jumps)[row_at(both.time, one.time)]
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
     return one._replace(values=values, treated=tuple(treated))
@@ -358,38 +360,26 @@ def _labelled(found: list[Source]) -> list[Source]:
 
 
 def command_of(source: Source, commands: Sequence[Source], states: Sequence[Source]) -> Source | None:
-    """The command of a joint by its name, of a wrench in its frame or with none; of several that in the same namespace.
+    """The command of a joint by its name, of a wrench in its frame or with none; of several the one named most alike.
 
-    Of two robots whose topics differ in one part of the name, as /left/joint_states and /right/joint_states, neither
-    has the command of the other.
+    A command is of the states whose topics share most parts with its own: of two robots, as /left/joint_states and
+    /right/joint_states, neither has that of the other.
     """
+    alike = [one for one in states if one.name == source.name]
     own = [
         one
         for one in commands
         if one.name == source.name
         and (source.is_joint or source.shares_frame(one))
-        and not any(_is_of(one, other, source) for other in states if other.name == source.name)
+        and _shared(one, source) == max(_shared(one, other) for other in alike)
     ]
-    return max(own, key=lambda one: _shared(_path(one), _path(source)), default=None)
+    return max(own, key=lambda one: _shared(one, source), default=None)
 
 
-def _path(source: Source) -> list[str]:
-    return source.topic.strip("/").split("/")
-
-
-def _shared(one: Sequence[str], other: Sequence[str]) -> int:
-    """How many parts two names have in common from the beginning."""
-    apart = (k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b)
-    return next(apart, min(len(one), len(other)))
-
-
-def _is_of(command: Source, one: Source, other: Source) -> bool:
-    """Whether the topic of a command has that part of the name of the first topic by which the second differs."""
-    mine, theirs = _path(one), _path(other)
-    apart = [k for k, (a, b) in enumerate(zip(mine, theirs, strict=False)) if a != b]
-    if len(mine) != len(theirs) or len(apart) != 1 or apart[0] == len(mine) - 1:
-        return False
-    return _path(command)[apart[0] : apart[0] + 1] == [mine[apart[0]]]
+def _shared(one: Source, other: Source) -> int:
+    """How many parts the names of two topics have in common from the beginning."""
+    parts = zip(one.topic.strip("/").split("/"), other.topic.strip("/").split("/"), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], parts))
 
 
 def pieces(source: Source, *quantities: str) -> list[Piece]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.held_messages import by_names
 from wam_analysis.thresholds import IDENTIFY, STREAM
 from wam_bag.bag import BagError
 from wam_description.arm import Arm
@@ -81,11 +82,11 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
         raise BagError(
             f"{where}: motor_states are of {', '.join(columns.names)}; the configuration has {', '.join(names)}"
         )
-    if not columns.position.shape[1] or not columns.effort.shape[1]:
+    position, effort = (by_names(columns, field, names) for field in ("position", "effort"))
+    if position is None or effort is None:
         raise BagError(f"{where}: motor_states lack position or effort; both are needed")
-    order = [columns.names.index(name) for name in names]
     try:
-        return motion(evenly(columns.stamp_ns / 1e9, columns.position[:, order], columns.effort[:, order]))
+        return motion(evenly(columns.stamp_ns / 1e9, position, effort))
     except ValueError as error:
         raise BagError(f"{where}: {error}") from None
 

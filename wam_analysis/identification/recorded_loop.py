@@ -1,5 +1,6 @@
 """The friction node and the force loop of chapter 5, as far as a recording shows them."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,14 +10,13 @@ import numpy as np
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.guarded import sentence
-from wam_analysis.findings.held_force import JOINTS, Theory, theory_of
+from wam_analysis.findings.held_force import Theory, theory_of
+from wam_analysis.findings.motion import identified
 from wam_analysis.foreign.mechanics import friction, is_sure
 from wam_analysis.foreign.sources import Source
 from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.recording import AnalysedRecording
 from wam_description.arm import Arm
-
-POSES = (*JOINTS, "joint_sensors", "motor_states")
-QUANTITIES = ("static friction", "dynamic friction", "viscous friction")
 
 
 class LoopNumber(NamedTuple):
@@ -64,12 +64,10 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
     ((label, (joint, found_friction)),) = seen.items()
     fit = found_friction.friction
     values = {"rate": _rate(joint)}
-    if is_sure(fit.dynamic, fit.dynamic_error):
-        values["friction"] = _identified(label, fit.dynamic, fit.dynamic_error)
-    if is_sure(fit.viscous, fit.viscous_error):
-        values["damping"] = _identified(label, fit.viscous, fit.viscous_error)
-    if is_sure(fit.inertia, fit.inertia_error):
-        values["inertia"] = _identified(label, fit.inertia, fit.inertia_error)
+    for name, kind in (("friction", "dynamic"), ("damping", "viscous"), ("inertia", "inertia")):
+        value, error = getattr(fit, kind), getattr(fit, f"{kind}_error")
+        if is_sure(value, error):
+            values[name] = _identified(label, value, error)
     if "friction" in values and fit.breakaways > 2:
         values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
     return RecordedLoop(values, "")
@@ -89,10 +87,10 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     arm, loop, timing = parameters.arm, parameters.force_loop, parameters.timing
     if arm is None or loop is None or timing is None:
         raise ValueError(f"{path} has no parameters of the arm: {parameters.note}")
-    better, names = _with_identified(arm, analysis)
+    better, names = _with_identified(arm, analysis.recording)
     theory, largest = Theory(), None
     for largest in sorted(analysis.recording.held, key=lambda one: -one.hold.commanded):
-        theory = theory_of(analysis.recording.run, parameters, largest, better, POSES)
+        theory = theory_of(analysis.recording.run, parameters, largest, better)
         if theory.node is not None and np.isfinite(theory.node.contact_stiffness):
             break
     else:
@@ -125,15 +123,14 @@ def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     return RecordedLoop(numbers, sentence(theory.guarded) if theory.guarded is not None else "")
 
 
-def _with_identified(arm: Arm, analysis: Analysis) -> tuple[Arm, list[str]]:
+def _with_identified(arm: Arm, recording: AnalysedRecording) -> tuple[Arm, list[str]]:
     """The arm with the friction of its joints that the recording shows, and their names."""
-    (section,) = [one for one in analysis.sections if one.key == "friction"]
-    numbers = {one.name: one.measured for one in section.findings if np.isfinite(one.measured)}
     joints, names = arm.joints, []
-    for quantity in QUANTITIES:
-        field = quantity.replace(" ", "_")
-        old = zip(joints.names, getattr(joints, field), strict=True)
-        values = [numbers.get(f"{name}: {quantity}", value) for name, value in old]
-        names += [name for name in joints.names if f"{name}: {quantity}" in numbers]
-        joints = replace(joints, **{field: tuple(values)})
+    for kind in ("static", "dynamic", "viscous"):
+        found = {name: identified(one)[kind] for name, one in recording.motion.joints.items()}
+        names += [name for name, value in found.items() if math.isfinite(value)]
+        old = zip(joints.names, getattr(joints, f"{kind}_friction"), strict=True)
+        values = [value if math.isnan(found.get(name, math.nan)) else found[name] for name, value in old]
+        changed: dict[str, Any] = {f"{kind}_friction": tuple(values)}
+        joints = replace(joints, **changed)
     return replace(arm, joints=joints), list(dict.fromkeys(names))

@@ -1,7 +1,7 @@
 """Measures of recorded signals: pure functions of arrays, without bags and ROS.
 
 response            rise, settling and overshoot of a step
-force_accuracy      accuracy of a held force, dynamic range
+force_accuracy      accuracy of a held force
 limit_cycle         amplitude, period and confidence of a limit cycle
 episodes            limit cycles that fill a part of a recording
 lines               lines in the spectrum, above the noise
@@ -12,6 +12,6 @@ friction            static, dynamic and viscous friction
 frequency           frequency response, coherence, bandwidth, poles
 efficiency          efficiency in both directions
 ripple              torque ripple by the angle of a pulley
-loop_timing         periods, jitter and latency from stamps
+loop_timing         periods and jitter from stamps
 runs                intervals of a condition, noise, smoothing
 """

@@ -77,18 +77,13 @@ def _level(values: Numbers) -> Numbers:
     return result
 
 
-def believable(found: FrequencyResponse, least_coherence: float, least_excitation: float) -> Mask:
-    """Frequencies, (k,), at which the input was strong enough and explains the output."""
-    return (found.coherence >= least_coherence) & (found.excitation >= least_excitation)
-
-
 def bandwidth(found: FrequencyResponse, believed: Mask) -> float:
     """Frequency at which the response falls 3 dB below that at the lowest accepted frequency, Hz.
 
     Parameters
     ----------
     found : the response.
-    believed : (k,), the accepted frequencies, as `believable` finds them.
+    believed : (k,), the accepted frequencies.
 
     Returns
     -------

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.measures.runs import noise
+from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import CYCLE
 
 Numbers = NDArray[np.float64]
@@ -61,7 +61,7 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
         with confidence 0 if nothing repeats at least three times, or the times have gaps.
     """
     n = len(value)
-    if n < 4 * CYCLE.cycles or float(np.ptp(value)) == 0.0 or _has_gaps(time):
+    if n < 4 * CYCLE.cycles or float(np.ptp(value)) == 0.0 or np.any(after_gaps(time)):
         return NO_CYCLE
     seconds = float(time[-1] - time[0]) / (n - 1)
     centre = np.linspace(-1.0, 1.0, n)
@@ -114,12 +114,6 @@ def error_of_size(time: Numbers, value: Numbers, period: float) -> float:
     parts = [value[cell == i] for i in range(cells)]
     sizes = [float(np.ptp([middle(part) for part in parts if len(part)])) for middle in (np.mean, np.median)]
     return abs(sizes[1] - sizes[0])
-
-
-def _has_gaps(time: Numbers) -> bool:
-    """Whether samples are missing, so that a number of samples is no time."""
-    steps = np.diff(time)
-    return bool(steps.max() > CYCLE.gap * float(np.median(steps)))
 
 
 class CycleExtent(NamedTuple):

@@ -1,12 +1,10 @@
-"""Timing of the loop from stamps and reception times."""
+"""Regularity of a topic from stamps and reception times."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from wam_analysis.thresholds import STREAM
 
 Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -30,23 +28,6 @@ class StampTiming(NamedTuple):
     longest_gap: float
     backwards: int
     jitter: float
-    worst: float
-
-
-class Latency(NamedTuple):
-    """Time from the reception of a message to that of the command with the same stamp, s.
-
-    Attributes
-    ----------
-    answered : messages that were answered.
-    unanswered : messages between the first and the last answered one that were not.
-    p50, p99, worst : s.
-    """
-
-    answered: int
-    unanswered: int
-    p50: float
-    p99: float
     worst: float
 
 
@@ -92,36 +73,3 @@ def _skipped(steps: Numbers) -> Times:
     around = np.convolve(np.pad(steps, 1, "edge"), np.ones(3), "valid")
     skipped[(steps < 2.0) & (around < 3.5)] = 0
     return skipped
-
-
-def has_lagged(stamp: Times, received: Times) -> bool:
-    """Whether messages were received in bursts, so that the times of reception are not those of their arrival.
-
-    Parameters
-    ----------
-    stamp, received : (n,), ns.
-    """
-    if len(stamp) < 2:
-        return False
-    period = float(np.median(np.diff(np.sort(stamp))))
-    return float(np.mean(np.diff(np.sort(received)) < round(STREAM.burst * period))) > STREAM.lagged
-
-
-def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:
-    """Time from a state to the command with its stamp.
-
-    Parameters
-    ----------
-    stamp, received : (n,), ns, of the states.
-    answer_stamp, answer_received : (m,), ns, of the commands; the first answer to a stamp counts.
-    """
-    _, first_state = np.unique(stamp, return_index=True)
-    known, first = np.unique(answer_stamp, return_index=True)
-    common, at_state, at_answer = np.intersect1d(stamp[first_state], known, assume_unique=True, return_indices=True)
-    if not len(common):
-        return Latency(0, 0, math.nan, math.nan, math.nan)
-    commanded, given = received[first_state[at_state]], answer_received[first[at_answer]]
-    seconds = (given - commanded).astype(np.float64) / 1e9
-    between = (stamp[first_state] >= common[0]) & (stamp[first_state] <= common[-1])
-    p50, p99 = (float(p) for p in np.percentile(seconds, [50.0, 99.0]))
-    return Latency(len(common), int(np.sum(between)) - len(common), p50, p99, float(np.max(seconds)))

@@ -18,19 +18,15 @@ class Ripple(NamedTuple):
     ----------
     order : (k,), cycles per turn, 1 to k.
     amplitude : (k,), N m (half of the peak to peak of each).
-    phase : (k,), rad: torque = amplitude sin(order angle + phase).
     turns : range of the angle in turns; at least 1 is needed, in practice 1.2.
-    rest : standard deviation of the residual, N m.
     """
 
     order: NDArray[np.int64]
     amplitude: Numbers
-    phase: Numbers
     turns: float
-    rest: float
 
 
-NO_RIPPLE = Ripple(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), 0.0, math.nan)
+NO_RIPPLE = Ripple(np.empty(0, dtype=np.int64), np.empty(0), 0.0)
 
 
 def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
@@ -70,11 +66,4 @@ def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     if singular[0] > SHAFT.determined * singular[-1]:
         return NO_RIPPLE._replace(turns=turns)
     sine, cosine = solution[:orders], solution[orders : 2 * orders]
-    rest = mean - columns @ solution
-    return Ripple(
-        order=k,
-        amplitude=np.hypot(sine, cosine),
-        phase=np.arctan2(cosine, sine),
-        turns=turns,
-        rest=float(np.sqrt(np.average(rest**2, weights=number))),
-    )
+    return Ripple(k, np.hypot(sine, cosine), turns)

@@ -20,14 +20,12 @@ class Phases(NamedTuple):
     sticks, slips : (k, 2), rows [begin, end) of each.
     directions : (slips,), sign of the mean velocity of each slip.
     stuck : fraction of the time at rest.
-    reversals : slips in the opposite direction of the one before.
     """
 
     sticks: Rows
     slips: Rows
     directions: Numbers
     stuck: float
-    reversals: int
 
 
 def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
@@ -53,7 +51,6 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
         slips=slips,
         directions=directions,
         stuck=float(np.mean(still)) if len(still) else 0.0,
-        reversals=int(np.sum(directions[1:] * directions[:-1] < 0.0)),
     )
 
 
@@ -87,5 +84,4 @@ def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
         still[a:b] = True
     sticks, slips = runs(still), runs(~still)
     first = np.array([begins[a] for a, _ in slips.tolist()])
-    last = np.array([ends[b] for _, b in slips.tolist()])
-    return Phases(sticks, slips, first, float(np.mean(still)), int(np.sum(first[1:] * last[:-1] < 0.0)))
+    return Phases(sticks, slips, first, float(np.mean(still)))

@@ -125,10 +125,10 @@ def _recording(given: argparse.Namespace) -> int:
 
 def _run_of(given: argparse.Namespace) -> Any:
     """The run of the arm in a bag; of several, it is named."""
-    from wam_analysis.findings.analysed_run import analysed_run
+    from wam_analysis.recording import AnalysedRecording
     from wam_bag.bag import read
 
-    found = analysed_run(read(given.bag), given.namespace or "")
+    found = AnalysedRecording(read(given.bag), given.namespace or "")
     if found.run.others:
         _print(found.run.others)
     return found

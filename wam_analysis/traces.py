@@ -6,12 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.held_messages import held_rows, with_holes
-from wam_analysis.task_forces import TaskForce, arm_of
+from wam_analysis.held_messages import held_rows, joint_angles, with_holes
+from wam_analysis.task_forces import TaskForce
 from wam_analysis.thresholds import TOUCH
-from wam_bag.bag import TableColumns
+from wam_description.arm import Arm
+from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
+from wam_sim.reactions import RecordedReaction
 from wam_sim.recording import RecordedRun
 
 Numbers = NDArray[np.float64]
@@ -121,12 +123,41 @@ class Traces(NamedTuple):
         """Time between two instants, s."""
         return float(np.median(np.diff(self.stamp))) / 1e9 if len(self.stamp) > 1 else 0.0
 
+    @property
+    def is_compared(self) -> Mask:
+        """Whether both the true and the estimated contact are known, (k,)."""
+        return self.true.is_known & self.estimated.is_known
+
+    @property
+    def is_false(self) -> Mask:
+        """Whether a contact is estimated and there is none, (k,)."""
+        return self.is_compared & ~self.true.acts & self.estimated.acts
+
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)
 
+    def with_forces(self, reaction: RecordedReaction) -> RecordedReaction:
+        """A reaction to what pushes, with how hard it did at most and in the end; its reason is of its first moment.
 
-def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
+        It ends where the loop no longer knows of more than is allowed; a push that it does not estimate may go on.
+        """
+        rows = np.flatnonzero(self.during(reaction.begin, reaction.end))
+        sizes = {name: signal.size for name, signal in (("true", self.true), ("estimated", self.estimated))}
+        known = {name: size for name, size in sizes.items() if np.any(size[rows] > 0.0)}
+        if reaction.name is not Code.PUSHED or not known:
+            return reaction
+        hardest = {name: rows[np.nanargmax(size[rows])] for name, size in known.items()}
+        largest = [
+            f"{known[name][row]:.3g} N ({name}, at {(self.stamp[row] - self.zero) / 1e9:.2f} s)"
+            for name, row in hardest.items()
+        ]
+        left = [f"{size[rows[-1]]:.3g} N ({name})" for name, size in known.items() if size[rows[-1]] > 0.0]
+        remark = f"; the largest force until its end: {', '.join(largest)}; at its end: {', '.join(left) or 'none'}"
+        return reaction._replace(remark=remark)
+
+
+def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[TaskForce] = ()) -> Traces:
     """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
 
     That is the estimated one, which has a message in every outer period; a program need not command a force in all.
@@ -134,6 +165,7 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     Parameters
     ----------
     run : the run.
+    arm : None if it is not known; forces in the base frame then stay there.
     tasks : forces that tasks command in it.
     """
 
@@ -165,7 +197,8 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         frames, forces = commanded.frame.astype(object), commanded.force.copy()
         frames[rows], forces[rows], covers[rows] = task.frame, task.force, task.cover
         commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)
-    commanded, measured = _on_links(run, base, (commanded, measured), covers)
+    if arm is not None:
+        commanded, measured = _on_links(run, arm, base, (commanded, measured), covers)
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
 
 
@@ -188,10 +221,8 @@ def most_probable(run: RecordedRun) -> tuple[Times, dict[str, Numbers]] | None:
     tuple or None
         stamps, (k,), ns, and columns by their names, (k,); None without a table of hypotheses.
     """
-    columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
-    if not isinstance(columns, TableColumns) or not len(columns.message):
-        return None
-    if not {*HYPOTHESIS} <= {*columns.columns}:
+    columns = run.table("contact/hypotheses")
+    if columns is None or not len(columns.message) or not {*HYPOTHESIS} <= {*columns.columns}:
         return None
     _, first = np.unique(columns.message, return_index=True)
     return columns.row_stamp_ns[first], {name: columns.columns[name][first] for name in HYPOTHESIS}
@@ -199,8 +230,8 @@ def most_probable(run: RecordedRun) -> tuple[Times, dict[str, Numbers]] | None:
 
 def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
     """The cover on which the force loop controls the force at each instant, (k,); where unknown, what is touched."""
-    columns = run.bag.topics.get(f"{run.namespace}/force_axis")
-    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns):
+    columns = run.table("force_axis")
+    if columns is None:
         return np.asarray(touched.astype(object))
     row, known = held_rows(columns.stamp_ns, base)
     frames = np.array(columns.frames, object)[row]
@@ -208,16 +239,15 @@ def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
 
 
 def _on_links(
-    run: RecordedRun, base: Times, signals: tuple[ForceSignal, ForceSignal], covers: Names
+    run: RecordedRun, arm: Arm, base: Times, signals: tuple[ForceSignal, ForceSignal], covers: Names
 ) -> tuple[ForceSignal, ForceSignal]:
     """Signals whose forces in the base frame are given in those of some covers, (k,), if the first signal acts."""
     rows = np.flatnonzero((signals[0].frame == BASE) & signals[0].acts)
-    arm, joints = arm_of(run), run.joints("sim/joint_states") or run.joints("joint_states")
-    if not len(rows) or arm is None or joints is None or any(name not in joints.names for name in arm.joints.names):
+    poses = joint_angles(run, arm)
+    if not len(rows) or poses is None:
         return signals
     rows = rows[np.isin(covers[rows], arm.covers.names)]
-    order = [joints.names.index(name) for name in arm.joints.names]
-    q = np.stack([np.interp(base[rows], joints.stamp_ns, joints.position[:, i]) for i in order], axis=1)
+    q = np.stack([np.interp(base[rows], poses[0], angle) for angle in poses[1].T], axis=1)
     body = RigidBody(arm)
     rotations = [body.cover_pose(one, cover).rotation.T for one, cover in zip(q, covers[rows].tolist(), strict=True)]
     found: list[ForceSignal] = []

@@ -1,0 +1,276 @@
+"""A recording: what is in a bag, prepared for the sections of an analysis; each is found where it is first used."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.command_gaps import CommandGap, command_gaps
+from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
+from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theory_of
+from wam_analysis.findings.transmission import TransmissionFindings, transmission_findings
+from wam_analysis.foreign.sources import Source, alternates, command_of, sources
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_analysis.holds import Hold, holds_of
+from wam_analysis.recorded import PredictionParameters, prediction_parameters
+from wam_analysis.task_forces import RecordedTask, TaskForce, task_forces, tasks_of
+from wam_analysis.traces import Traces, traces_of
+from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
+from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, WrenchColumns
+from wam_bag.losses import CUT, Losses, losses
+from wam_control.task.scenario import FORCE_LOOP
+from wam_description.event import Code
+from wam_description.status import ENABLED, diagnosed_name
+from wam_sim.reactions import SETTLING_TIME, RecordedReaction, too_short, unassessed, watched_times
+from wam_sim.recording import RecordedStep, messages_of, recorded_run, status_of
+
+STAMPED = (JointColumns, WrenchColumns, PointColumns)
+MOVING = ("motor_states", "joint_sensors", "joint_states", "sim/joint_states")  # where motion is seen, the best first
+UNFINISHED = "not finished: the recording ends before the scenario does"
+RATE = "rate [Hz]"  # of a loop in realtime, among the facts that its driver reports
+
+
+class AnalysedRecording:
+    """What the sections of an analysis take from a bag.
+
+    Parameters
+    ----------
+    bag : of this stack, or of another robot, as read by `wam_analysis.foreign.reading`.
+    namespace : of an arm of this stack, '' for the one with the most topics.
+    given : topics, joints, fields and units of another robot's recording; None of one of this stack.
+    """
+
+    def __init__(self, bag: Bag, namespace: str = "", given: TopicMap | None = None) -> None:
+        self.run = recorded_run(bag, namespace)
+        self.is_foreign = given is not None
+        self.given = given or NOTHING_GIVEN
+
+    @property
+    def bag(self) -> Bag:
+        """The bag of the run."""
+        return self.run.bag
+
+    @property
+    def namespace(self) -> str:
+        """Of the arm."""
+        return self.run.namespace
+
+    @cached_property
+    def parameters(self) -> PredictionParameters:
+        """What predictions need, as far as the bag has it."""
+        return prediction_parameters(self.run.parameters)
+
+    @property
+    def duration(self) -> float:
+        """Length of what was recorded of the arm, s: from the first to the last stamp, or log time without stamps."""
+        prefix = "" if self.is_foreign else f"{self.namespace}/"
+        own = [one for name, one in self.bag.topics.items() if name.startswith(prefix) and len(one.log_time_ns)]
+        stamped = [one.stamp_ns for one in own if isinstance(one, STAMPED) and len(one.stamp_ns)]
+        chosen = stamped or [one.log_time_ns for one in own]
+        return (max(map(np.max, chosen), default=0) - min(map(np.min, chosen), default=0)) / 1e9
+
+    # joints and wrenches
+
+    @cached_property
+    def sources(self) -> tuple[Source, ...]:
+        """Joints and wrenches with what was done to their raw values; of this stack the motors and joints that move."""
+        bag = self.bag
+        if not self.is_foreign:
+            seen = [name for name in MOVING if self.run.joints(name) is not None]
+            kept = seen[: 1 + ("motor_states" in seen)]  # the joints once
+            topics = [f"{self.namespace}/{name}" for name in kept]
+            bag = bag._replace(topics={name: bag.topics[name] for name in topics})
+        return tuple(sources(bag, self.given))
+
+    @cached_property
+    def mixed(self) -> tuple[Source, ...]:
+        """Those whose topic two publishers share, so that it is not analysed."""
+        return tuple(one for one in self.sources if not one.is_command and self.is_foreign and alternates(one))
+
+    @property
+    def analysed(self) -> tuple[Source, ...]:
+        """All but those of a topic that two publishers share."""
+        left_out = {one.topic for one in self.mixed}
+        return tuple(one for one in self.sources if one.topic not in left_out)
+
+    @cached_property
+    def states(self) -> tuple[Source, ...]:
+        """What was measured."""
+        return tuple(one for one in self.analysed if not one.is_command)
+
+    @property
+    def commands(self) -> tuple[Source, ...]:
+        """What was commanded to another robot."""
+        return tuple(one for one in self.analysed if one.is_command)
+
+    def command_of(self, source: Source) -> Source | None:
+        """What was commanded of a joint or wrench; None where that is not known."""
+        return command_of(source, self.commands, self.states)
+
+    # the run
+
+    @property
+    def steps(self) -> tuple[RecordedStep, ...]:
+        """Steps of the scenario, with the one in which the recording ends."""
+        return self.run.steps if self.run.unfinished is None else (*self.run.steps, self.run.unfinished)
+
+    @property
+    def outcome(self) -> str:
+        """DONE, why the scenario failed, or that the recording ended before."""
+        return self.run.outcome or UNFINISHED
+
+    @property
+    def is_part(self) -> bool:
+        """Whether it was cut out of a longer recording."""
+        return CUT in self.bag.metadata
+
+    @property
+    def failure(self) -> str:
+        """Why the run failed or that it was cut off; '' where it did not, or had neither a scenario nor a fault.
+
+        A part that was cut out of a recording is none.
+        """
+        if self.run.outcome or self.is_part:
+            return "" if self.run.outcome in ("", Code.DONE) else self.run.outcome
+        return self.run.faults[-1].reason if self.run.faults else UNFINISHED * bool(self.run.steps)
+
+    @property
+    def faults(self) -> list[str]:
+        """What the driver stopped for, a sentence each."""
+        zero = self.traces.zero
+        texts = [f"driver fault at {(one.stamp - zero) / 1e9:.2f} s: {one.reason}" for one in self.run.faults]
+        return list(dict.fromkeys(texts))
+
+    @cached_property
+    def loop(self) -> list[dict[str, str]]:
+        """What the driver reported of its loop every second."""
+        arrays = messages_of(self.bag, "/diagnostics")
+        statuses = (status for array in arrays for status in map(status_of, array.status))
+        return [dict(one.facts) for one in statuses if one.node == diagnosed_name(self.namespace, "driver")]
+
+    @property
+    def mode(self) -> str:
+        """'lockstep', 'realtime' or 'unknown'."""
+        is_timed = any(RATE in facts for facts in self.loop)
+        return "realtime" if self.run.mode == "unknown" and is_timed else self.run.mode
+
+    @cached_property
+    def losses(self) -> Losses:
+        """What the bag lacks of what was published."""
+        return losses(self.bag.path, self.bag.metadata, self.bag.attachments, self.bag.counts)
+
+    @cached_property
+    def gaps(self) -> tuple[CommandGap, ...]:
+        """Gaps of commands."""
+        return command_gaps(self.run, self.traces.stamp, self.losses, self.steps)
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Sentences about what the bag lacks, none if no loss is known."""
+        gaps = (gap.sentence(self.traces.zero) for gap in self.gaps)
+        return (*self.losses.sentences(self.bag.first_ns), *gaps)
+
+    # forces
+
+    @cached_property
+    def tasks(self) -> list[RecordedTask]:
+        """Each task with its times; none if the arm is not known."""
+        return tasks_of(self.run, self.parameters.arm)
+
+    @property
+    def task_forces(self) -> list[TaskForce]:
+        """The forces at points of links in all tasks, in the order of time."""
+        return task_forces(self.tasks)
+
+    @cached_property
+    def traces(self) -> Traces:
+        """Forces and contacts over time."""
+        return traces_of(self.run, self.parameters.arm, self.task_forces)
+
+    @cached_property
+    def reactions(self) -> tuple[RecordedReaction, ...]:
+        """Those of the force loop to what was commanded, and faults of the driver."""
+        ends = [int(stamp) for stamp in self.traces.stamp[-1:]] + [step.end for step in self.steps[-1:]]
+        return tuple(self.traces.with_forces(one) for one in self.run.reactions(max(ends, default=0)))
+
+    @cached_property
+    def holds(self) -> tuple[Hold, ...]:
+        """The constant forces that were commanded."""
+        return holds_of(self.run, self.steps, self.task_forces, self.traces, self.reactions)
+
+    @cached_property
+    def held(self) -> tuple[HeldForce, ...]:
+        """Each of them, and how it was reached and held."""
+        return tuple(held_force(self.run, self.traces, self.parameters, hold) for hold in self.holds)
+
+    @cached_property
+    def theories(self) -> dict[str, Theory]:
+        """What is predicted for each of them, by name; nothing where it was refused."""
+        return {
+            one.hold.name: Theory() if one.hold.is_refused else theory_of(self.run, self.parameters, one)
+            for one in self.held
+        }
+
+    @property
+    def settling_times(self) -> list[tuple[int, float]]:
+        """Those of the force loop, s, and since when it had each, ns; NaN where it was not recorded."""
+        key = f"{FORCE_LOOP}:{SETTLING_TIME}"
+        try:
+            first = self.run.parameters.node(FORCE_LOOP).get(SETTLING_TIME)
+        except BagError:
+            first = None
+        changes = [(since, values[key]) for since, values in self.run.live_values(FORCE_LOOP) if key in values]
+        every = [(0, first), *changes]
+        return [(since, float(value) if isinstance(value, (int, float)) else np.nan) for since, value in every]
+
+    @property
+    def unassessed(self) -> tuple[list[RecordedStep], str]:
+        """The steps that are too short to be assessed, and that in words."""
+        watched = watched_times(self.tasks, without_forces=True)
+        found = unassessed(self.reactions, watched, self.steps, self.settling_times)
+        return found, too_short(self.settling_times, found)
+
+    # contacts
+
+    @cached_property
+    def contacts(self) -> tuple[ListedContact, ...]:
+        """All that were estimated."""
+        return listed_contacts(self.run, self.traces, self.steps)
+
+    @cached_property
+    def blind(self) -> NDArray[np.bool_]:
+        """Whether nothing can be estimated at each instant: under the brakes, where the motors alone are observed."""
+        blind = np.zeros(len(self.traces.stamp), dtype=bool)
+        try:
+            if self.run.parameters.node("contact_estimator").get("use_joint_sensors", True):
+                return blind
+        except BagError:
+            return blind
+        for stamp, status in self.run.stamped_statuses():
+            if status.node == "driver" and status.mode:
+                blind[self.traces.stamp >= stamp] = status.mode != ENABLED
+        return blind
+
+    @cached_property
+    def touched(self) -> tuple[TouchedLink, ...]:
+        """The true contacts, estimated or not."""
+        traces = self.traces
+        seen = traces._replace(true=traces.true.unknown(self.blind))
+        return true_contacts(seen, self.steps)
+
+    @property
+    def missed(self) -> tuple[TouchedLink, ...]:
+        """True contacts that were not estimated."""
+        return tuple(one for one in self.touched if one.is_missed)
+
+    @cached_property
+    def unplanned(self) -> UnplannedContacts:
+        """Contacts without a command of a force, harder than allowed."""
+        return unplanned_contacts(self.run, self.traces, self.steps, self.gaps)
+
+    # the transmission
+
+    @cached_property
+    def motion(self) -> TransmissionFindings:
+        """Friction and ripple of motors and joints."""
+        return transmission_findings(self.run, self.parameters)
