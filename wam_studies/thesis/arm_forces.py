@@ -137,13 +137,10 @@ def _named(run: Recording, word: str) -> Sequence[Step]:
 
 def _position(run: Recording, steps: Sequence[Step]) -> Comparison:
     """Greatest error of the estimated position, of the means of each step."""
-    true, estimated = run.positions("sim/contact/point"), run.positions("contact/point")
-    errors = []
+    both, errors = (run.positions("sim/contact/point"), run.positions("contact/point")), []
     for step in steps:
-        means = []
-        for time, position in (true, estimated):
-            means.append(float(np.nanmean(position[_late(time, step)])))
-        errors.append(abs(means[1] - means[0]))
+        true, estimated = (float(np.nanmean(position[_late(time, step)])) for time, position in both)
+        errors.append(abs(estimated - true))
     return below("position error, worst step", max(errors), "m", BOUNDS.position, "chapter 2")
 
 

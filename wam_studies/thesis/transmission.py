@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_description.arm import Arm
 from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
@@ -30,25 +31,16 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     """The experiment `frequency-response`."""
     run = runs["chirp"]
     found, low, high = transfer(run), *swept(run)
-    gain = 1.0 / np.abs(found.inverse)
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
-    predicted = np.abs(response_of(run, found.frequency))
+    predicted, gain = np.abs(response_of(run, found.frequency[lowest])), 1.0 / np.abs(found.inverse[lowest])
+    label = f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz"
     rows = [
-        *_resonance_rows(run, found),
-        near(
-            f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
-            np.median(predicted[lowest]),
-            np.median(gain[lowest]),
-            "rad/(N m)",
-            "(4.3)",
-        ),
+        *(_resonance(run, found, which) for which in Resonances._fields),
+        near(label, np.median(predicted), np.median(gain), "rad/(N m)", "(4.3)"),
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
     ]
-    curves = [
-        _gain("measured", found, low, high),
-        ("(4.3) with damping", line_only(found.frequency[inside], predicted[inside])),
-    ]
+    curves = [_gain("measured", found, low, high), _theory("(4.3) with damping", run, found, low, high)]
     coherence = [("", measured(found.frequency[inside], found.coherence[inside]))]
     panels = [_gains(curves), Panel("coherence", "frequency [Hz]", "coherence [-]", coherence, "x")]
     count = BOUNDS.averaged_frequencies
@@ -60,9 +52,33 @@ def resonances_sample(runs: Mapping[str, Recording]) -> Result:
     """The sweep of `frequency-response` from motor and joint only."""
     (run,) = runs.values()
     found = transfer(run)
-    rows = _resonance_rows(run, found)
+    rows = [_resonance(run, found, which) for which in Resonances._fields]
     low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
     return Result(rows, [_gains([_gain("measured", found, low, high)])])
+
+
+def allocation(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `stiffness-allocation`."""
+    rows, curves = [], []
+    for name, run in runs.items():
+        found, label, ends = transfer(run), name.replace("_", " "), swept(run)
+        rows.append(_resonance(run, found, "lower", f"{label}, "))
+        curves += [_gain(label, found, *ends), _theory("(4.3)", run, found, *ends)]
+    for ratio in (14, 30):
+        joint, motor = (runs[f"reducer_at_{where}_N_{ratio}"].shared.arm for where in ("joint", "motor"))
+        stiffness = joint.circuits[0].stiffness / motor.circuits[0].stiffness
+        label = f"stiffness with reducer at joint over at motor, N {ratio}"
+        rows.append(near(label, stiffness_gain(joint), stiffness, "", "(4.1)", 1e-3))
+    return Result(rows, [_gains(curves)])
+
+
+def allocation_sample(runs: Mapping[str, Recording]) -> Result:
+    """One of the sweeps of `stiffness-allocation`, from motor and joint only."""
+    ((name, run),) = runs.items()
+    found = transfer(run)
+    row = _resonance(run, found, "lower", f"{name.replace('_', ' ')}, ")
+    line = _gain("measured", found, 0.5 * float(row.predicted), 3.0 * float(row.predicted))
+    return Result([row], [_gains([line])])
 
 
 def _gain(label: str, found: Transfer, low: float, high: float) -> Line:
@@ -71,62 +87,25 @@ def _gain(label: str, found: Transfer, low: float, high: float) -> Line:
     return label, measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
 
 
+def _theory(label: str, run: Recording, found: Transfer, low: float, high: float) -> Line:
+    """The same by (4.3) with damping."""
+    frequency = found.frequency[(found.frequency > low) & (found.frequency < high)]
+    return label, line_only(frequency, np.abs(response_of(run, frequency)))
+
+
 def _gains(lines: Sequence[Line]) -> Panel:
     return Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", lines, "xy")
 
 
-def _resonance_rows(run: Recording, found: Transfer) -> list[Comparison]:
-    theory = resonances(run)
-    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
-    return [near(name, at, zero_of(found, at, _lead(run)), "Hz", "(4.4)") for name, at in expected.items()]
+def _resonance(run: Recording, found: Transfer, which: str, of: str = "") -> Comparison:
+    """The lower or the upper resonance of (4.4), Hz."""
+    at, (circuit,) = float(getattr(resonances(run), which)) * HZ, run.shared.arm.circuits
+    return near(f"{of}{which} resonance", at, zero_of(found, at, circuit.damping / circuit.stiffness), "Hz", "(4.4)")
 
 
-def allocation(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `stiffness-allocation`."""
-    rows, curves = [], []
-    for name, run in runs.items():
-        found = transfer(run)
-        label = name.replace("_", " ")
-        rows.append(_lower_resonance(run, found, label))
-        low, high = swept(run)
-        inside = (found.frequency > low) & (found.frequency < high)
-        curves.append(_gain(label, found, low, high))
-        predicted = np.abs(response_of(run, found.frequency[inside]))
-        curves.append(("(4.3)", line_only(found.frequency[inside], predicted)))
-    for ratio in (14, 30):
-        at_joint, at_motor = (runs[f"reducer_at_{where}_N_{ratio}"] for where in ("joint", "motor"))
-        predicted_ratio = stiffness_gain(at_joint)
-        stiffness = at_joint.shared.arm.circuits[0].stiffness / at_motor.shared.arm.circuits[0].stiffness
-        rows.append(
-            near(
-                f"stiffness with reducer at joint over at motor, N {ratio}",
-                predicted_ratio,
-                stiffness,
-                "",
-                "(4.1)",
-                1e-3,
-            )
-        )
-    return Result(rows, [_gains(curves)])
-
-
-def allocation_sample(runs: Mapping[str, Recording]) -> Result:
-    """One of the sweeps of `stiffness-allocation`, from motor and joint only."""
-    ((name, run),) = runs.items()
-    found = transfer(run)
-    row = _lower_resonance(run, found, name.replace("_", " "))
-    line = _gain("measured", found, 0.5 * float(row.predicted), 3.0 * float(row.predicted))
-    return Result([row], [_gains([line])])
-
-
-def _lower_resonance(run: Recording, found: Transfer, label: str) -> Comparison:
-    at = float(resonances(run).lower) * HZ
-    return near(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", "(4.4)")
-
-
-def stiffness_gain(run: Recording) -> float:
+def stiffness_gain(arm: Arm) -> float:
     """Stiffness of the line with the reducer at the joint over that with the reducer at the motor, (4.1)."""
-    cables, ratio = run.shared.arm.cables, 1.0 / run.shared.arm.joint_from_motor[0]
+    cables, ratio = arm.cables, 1.0 / arm.joint_from_motor[0]
     ea, length = cables.stage_ea[0], cables.stage_length[0]
     ends = [float(stiffness_with_reducer(ea, length, ratio, distance)) for distance in (length, 0.0)]
     return ends[0] / ends[1]
@@ -149,11 +128,6 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
     link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + joint_stiffness(run)
     found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
     return found
-
-
-def _lead(run: Recording) -> float:
-    (circuit,) = run.shared.arm.circuits
-    return circuit.damping / circuit.stiffness
 
 
 def swept(run: Recording) -> tuple[float, float]:
