@@ -68,7 +68,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
         driver.exchange()
     clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
-    line = CanLine(host, lambda: at[0], time.sleep, interface == "udp_multicast")
+    line = CanLine(host, lambda: at[0], time.sleep, 0.1 * (interface == "udp_multicast"))
     own = driver._host
     own.line, own.receive, own.now = line, line.receive, line.now
 

@@ -62,6 +62,7 @@ class BusThresholds:
     silent: float = 0.01  # s without a position of a motor, above which there is a fault
     unguarded: float = 0.045  # s without the mode of the safety module, above which there is a fault
     described_firmware: int = 200  # whose names of properties a dry run shows
+    slack: float = 0.1  # s, by which a simulated arm in another process may answer later, where computers are busy
     poll: float = 0.02  # s, between two questions for the modes of safety module and controllers
     collect: float = 0.6  # of a period, in which the positions have to come
     most_frames: int = 40  # taken in one period: one of 2 ms has no more

@@ -1,6 +1,7 @@
 """The driver of a real arm on a simulated bus: its start, torques and positions, and injected faults by name."""
 
 import math
+import os
 import random
 from collections.abc import Callable
 from functools import cache
@@ -38,8 +39,10 @@ class Served(CanLine):
     """A line of python-can, with the arm at its other end; both are in bus time."""
 
     def __init__(self, bus: SimulatedBus, interface: str, channel: str) -> None:
-        own, other = (can.Bus(interface=interface, channel=channel) for _ in range(2))
-        super().__init__(own, bus.now, bus.sleep, has_echo=interface == "udp_multicast")
+        is_multicast = interface == "udp_multicast"
+        place = {"port": 20000 + os.getpid() % 10000} if is_multicast else {}  # that no other run on this computer uses
+        own, other = (can.Bus(interface=interface, channel=channel, **place) for _ in range(2))
+        super().__init__(own, bus.now, bus.sleep, 0.1 * is_multicast)
         self._arm = ServedArm(CanLine(other, lambda: 0.0, bus.sleep), bus)
         self.let_pass, self._end = bus.let_pass, other
 

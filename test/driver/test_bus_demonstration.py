@@ -1,4 +1,4 @@
-"""The demonstration over the simulated bus, in bus time, against the plain driver at the same rates."""
+"""The stack over the simulated bus, in bus time: its demonstration against the plain driver, and an identification."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,10 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import wam_sim.simulation
+from wam_analysis.identification.contradictions import contradictions
+from wam_analysis.identification.fit import identify
+from wam_analysis.identification.motion import recorded_motion
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
+from wam_bag.losses import losses
 from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration, packaged
@@ -18,9 +23,12 @@ from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.bus.start_up import Wait
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.plant import Plant
+from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
+from wam_studies.identification.excitation import scenario
 
 MORE = 0.03  # of the commanded force, by which the true force may be further off over the bus
+FRICTION = 0.1  # of the configured friction, which is the true one, by which that of a recording may differ
 
 
 class PlantOnBus:
@@ -102,3 +110,22 @@ def test_forces_over_the_bus_are_those_of_the_plain_driver(tmp_path: Path, monke
     over_bus = force_errors(played(configuration, tmp_path / "bus"))
     assert len(plain) == len(over_bus) == 3
     assert max(over_bus) < max(plain) + MORE, (plain, over_bus)
+
+
+@pytest.mark.slow
+def test_exciting_moves_over_the_bus_identify_the_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    configuration = at_rates_of_the_bus("barrett-wam4").with_values({"timing.dither_cycle": 0})
+    script = tmp_path / "moves.yaml"
+    script.write_text(yaml.safe_dump(scenario(configuration, seed=1, seconds=20.0)))
+    steps = load_for(configuration, str(script))
+    monkeypatch.setattr(wam_sim.simulation, "Driver", DriverOnBus)
+    assert record(configuration, steps, tmp_path / "bag") == ""
+    bag = read(tmp_path / "bag")
+    assert losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(0) == []
+    shared = configuration.shared
+    motion = recorded_motion(recorded_run(bag), shared.arm)
+    found = identify(shared, motion)
+    assert contradictions(shared, motion, found) == []
+    for direction in ("positive", "negative"):
+        places = found.unknowns.places(f"motors.coulomb_{direction}")
+        assert found.values[places] == pytest.approx(found.unknowns.present[places], rel=FRICTION)

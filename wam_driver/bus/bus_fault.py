@@ -19,7 +19,7 @@ class BusFault(Enum):
     GAIN = "motor controller {node} has {detail} counts per N m, too far from those of the maker"
     LIMIT = "motor controller {node} has the largest torque {detail}, which is none"
     INDEX = "motor controller {node} has index or group {detail}, with which it takes the torque of another motor"
-    NOT_ZEROED = "motor controller {node} is {detail} counts away from the home pose; it did not take its zero"
+    NOT_ZEROED = "motor controller {node} is at {detail} counts, not those of home; it did not take its zero"
     # later
     NO_REPLY = "motor controller {node} sends no position"
     JUMP = "the position of motor {node} jumps"

@@ -30,6 +30,7 @@ class Cycle:
         self._host, self.motors, self._period = host, motors, period
         self._by_answer = {frames.position(motor.node, 0).identifier: motor for motor in motors}
         self.safety_mode: int = SafetyMode.IDLE
+        self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
         self._requests = [  # the pendant first: it states why the mode changes
@@ -68,9 +69,9 @@ class Cycle:
         if host.now() >= self._poll_at:
             self._poll()
         host.send(self._requests[-1])
-        requested, patience, awaited = host.now(), BUS.collect * self._period, self._by_answer.copy()
+        requested, awaited = host.now(), self._by_answer.copy()
         for _ in range(BUS.most_frames):
-            if not awaited or (frame := host.receive(patience)) is None:
+            if not awaited or (frame := host.receive(self._patience)) is None:
                 break
             identifier, data = frame
             motor = awaited.pop(identifier, None)
@@ -94,7 +95,8 @@ class Cycle:
         """Take a frame that is no awaited position."""
         found = frames.read(frame)
         if frame.sender == BusNode.HOST:
-            self._stray(BusFault.FOREIGN)
+            if not self._host.line.slack:  # no echo
+                self._stray(BusFault.FOREIGN)
         elif found is None or found.node not in self._host.versions:
             self._host.counts["other frames"] += 1
         elif found.node == BusNode.SAFETY_MODULE:

@@ -55,7 +55,7 @@ class Host:
         answer = node, None if name == "P" else number
         for _ in range(attempts):
             self.send(frames.get(node, number))
-            end = self.now() + BUS.reply
+            end = self.now() + BUS.reply + self.line.slack
             while (left := end - self.now()) > 0.0 and (frame := self.receive(left)) is not None:
                 found = frames.read(frame)
                 if found and found[:-1] == answer:

@@ -9,6 +9,7 @@ from wam_description.parameters import ParameterError
 from wam_driver.bus.frames import BusNode, Frame
 from wam_driver.bus.interface import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
+from wam_driver.thresholds import BUS
 
 
 class CanLine:
@@ -18,19 +19,18 @@ class CanLine:
     ----------
     bus : `can.Bus` of any interface.
     now, sleep : the steady clock, s.
-    has_echo : whether the interface gives own frames back, so that all frames of a host are dropped.
+    slack : s, by which answers may be late; above 0 for a simulated arm in another process, whose bus gives own frames
+        back.
 
     Attributes
     ----------
     counts : of errors.
     """
 
-    def __init__(
-        self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], has_echo: bool = False
-    ) -> None:
+    def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], slack: float = 0.0) -> None:
         import can
 
-        self._bus, self._errors, self._has_echo = bus, (can.CanError, OSError), has_echo
+        self._bus, self._errors, self.slack = bus, (can.CanError, OSError), slack
         self._message: Any = can.Message(is_extended_id=False)  # to be sent, again and again
         self.now, self.sleep, self.close = now, sleep, bus.shutdown
         self.counts: Counter[str] = Counter()
@@ -50,7 +50,7 @@ class CanLine:
         return True
 
     def receive(self, timeout: float) -> Frame | None:
-        """The next frame of another node; None where none comes in time, s, or at an error of the bus."""
+        """The next frame; None where none comes in time, s, or at an error of the bus."""
         try:
             message = self._bus.recv(timeout)
         except self._errors:
@@ -61,8 +61,7 @@ class CanLine:
         if message.is_error_frame:
             self.counts["bus errors"] += 1
             return None
-        frame = Frame(message.arbitration_id, bytes(message.data))
-        return self.receive(timeout) if self._has_echo and frame.sender == BusNode.HOST else frame
+        return Frame(message.arbitration_id, bytes(message.data))
 
 
 Line = CanLine | SimulatedBus
@@ -86,11 +85,14 @@ def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep:
         raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
     except (can.CanError, OSError, ValueError) as error:
         raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, now, sleep, own.interface == "udp_multicast")
+    return CanLine(bus, now, sleep, BUS.slack if own.interface == "udp_multicast" else 0.0)
 
 
 class ServedArm:
-    """A simulated arm that answers on a line, as that to `virtual` or `udp_multicast`, in the time of the line."""
+    """A simulated arm that answers on a line, as that to `virtual` or `udp_multicast`, in the time of the line.
+
+    Time in which nothing comes from the host is no silence to it, since a computer may hold up the host.
+    """
 
     def __init__(self, line: Line, arm: SimulatedBus) -> None:
         self._line, self._arm, self._passed = line, arm, line.now()
@@ -99,10 +101,10 @@ class ServedArm:
         """Answer the next frame, if one comes in time, s."""
         while (frame := self._line.receive(timeout)) is not None and frame.sender != BusNode.HOST:
             pass  # an echo
-        now = self._line.now()
-        self._arm.let_pass(now - self._passed)
-        self._passed = now
         if frame is not None:
             self._arm.send(frame)
         while (found := self._arm.receive(0.0)) is not None:
             self._line.send(found)
+        now = self._line.now()
+        self._arm.let_pass(now - self._passed, BUS.silent if frame else 0.0)
+        self._passed = now

@@ -4,13 +4,7 @@ from enum import IntEnum
 from typing import Final
 
 WATCHED: Final = ("velocity", "torque", "voltage", "heartbeat", "other")  # three bits each, from bit 0
-
-
-class Lamp(IntEnum):
-    """Of a watched quantity, one of three bits; 2 is a warning."""
-
-    SAFE = 1
-    FAULT = 4
+SAFE, FAULT = 1, 4  # lamps, of three bits; 2 is a warning
 
 
 class SafetyMode(IntEnum):
@@ -23,10 +17,10 @@ class SafetyMode(IntEnum):
 
 def faults(pendant: int) -> list[str]:
     """Watched quantities whose lamp shows a fault, by the property PEN."""
-    return [name for at, name in enumerate(WATCHED) if pendant >> 3 * at & Lamp.FAULT]
+    return [name for at, name in enumerate(WATCHED) if pendant >> 3 * at & FAULT]
 
 
 def pendant_of(*faulty: str) -> int:
     """The property PEN with lamps of faults, without buttons, segments and warnings."""
-    lamps = (Lamp.FAULT if name in faulty else Lamp.SAFE for name in WATCHED)
+    lamps = (FAULT if name in faulty else SAFE for name in WATCHED)
     return 3 << 26 | sum(lamp << 3 * at for at, lamp in enumerate(lamps))

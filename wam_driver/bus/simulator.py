@@ -83,6 +83,7 @@ class SimulatedBus:
     controllers : by node, to be changed by tests.
     is_attended : whether a person presses Idle and Activate where that is wanted.
     on_line : what becomes of each frame, for tests: lost, doubled, another one; None: the adapter refuses it.
+    slack : s, by which answers may be late.
     counts : of errors.
     time : bus time, s.
     """
@@ -92,7 +93,7 @@ class SimulatedBus:
         self._plant = plant or Plant(arm, own.world, own.effects, substep, own.friction)
         self._plant.brake(False)
         self._body, self._step, self._constant = RigidBody(arm), substep, arm.motors.torque_constant
-        self.is_attended = True
+        self.is_attended, self.slack = True, 0.0
         self._motors = [self._motor(at, version) for at in range(len(self._constant))]
         safety = SimulatedController(BusNode.SAFETY_MODULE, version)
         self.controllers, self._safety = {one.node: one for one in (*self._motors, safety)}, safety.values
@@ -118,9 +119,10 @@ class SimulatedBus:
         """Let bus time pass."""
         self._advance(self.time + seconds)
 
-    def let_pass(self, seconds: float) -> None:
-        """A period of the host has passed, in which there may have been frames; the late part is no silence."""
-        self._requested += max(0.0, seconds - BUS.silent)
+    def let_pass(self, seconds: float, silent: float = BUS.silent) -> None:
+        """Time of the host has passed, s, in which there may have been frames; what is later is no silence."""
+        if self._mode == SafetyMode.ACTIVE:
+            self._requested += max(0.0, seconds - silent)
         self._passed = max(self._passed, self.time - BUS.silent) + seconds
         self._advance(max(self.time, self._passed))
 

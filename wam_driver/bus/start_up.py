@@ -115,9 +115,7 @@ class StartUp:
         if asleep:
             yield from self._pause(Wait.WAKE, BUS.silence)
         for node in asleep:
-            status = host.ask(node, "STAT")
-            if status != BUS.ready:
-                raise Trouble(BusFault.NOT_AWAKE, node, status)
+            host.demand(node, "STAT", [BUS.ready], BusFault.NOT_AWAKE)
         host.write(BusGroup.MOTORS, "MODE", BUS.idle_mode)
 
     def _read(self, node: int, limit: int) -> Motor:
@@ -139,11 +137,9 @@ class StartUp:
         host = self._host
         host.write(BusNode.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
         for motor, angle in zip(motors, self._home, strict=True):
-            wanted = motor.count_at(angle)
-            host.write(motor.node, "P", wanted)
-            away = host.demand(motor.node, "P") - wanted
-            if abs(away) > motor.count_at(BUS.jump):
-                raise Trouble(BusFault.NOT_ZEROED, motor.node, away)
+            host.write(motor.node, "P", motor.count_at(angle))
+            near = range(motor.count_at(angle - BUS.jump), motor.count_at(angle + BUS.jump))
+            host.demand(motor.node, "P", near, BusFault.NOT_ZEROED)
         host.sleep(BUS.between_writes)
         host.write(BusNode.SAFETY_MODULE, "ZERO", 1)
         host.sleep(BUS.between_writes)
