@@ -391,10 +391,11 @@ def refusals() -> str:
     for name, change in (
         ("wam", {"force_loop:force_gain": [0.5]}),
         ("wam", {"force_loop:mode": "joint_torque", "force_loop:torque_gain": [0.05]}),
-        ("testbed", {"force_loop:force_gain": [0.05], "force_loop:guard.mode": "refuse"}),
-        ("testbed", {"force_loop:force_gain": [0.2], "force_loop:guard.mode": "refuse"}),
+        ("testbed", {"force_loop:force_gain": [0.05]}),
+        ("testbed", {"force_loop:force_gain": [0.2]}),
     ):
-        configuration = Configuration.load(ROOT / "config" / f"{name}.yaml").with_values(change)
+        values = {**change, "force_loop:guard.mode": "refuse"}
+        configuration = Configuration.load(ROOT / "config" / f"{name}.yaml").with_values(values)
         shared = configuration.shared
         given = ", ".join(f"{key.removeprefix('force_loop:')} {value}" for key, value in change.items())
         try:

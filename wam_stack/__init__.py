@@ -12,6 +12,7 @@ arm       kinematics, Jacobians and gravity torques
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,6 +100,8 @@ def analyse(recording: str | Path | Mapping[str, Any]) -> Analysis:
 def guard(configuration: Named = "wam") -> Report:
     """The stability of the force loop at its configured posture: one line, whether it is a warning, and numbers.
 
+    It assesses the gains as they are given, also where ``guard.mode`` is ``limit`` and a stack would lower them.
+
     Raises
     ------
     ParameterError
@@ -106,6 +109,8 @@ def guard(configuration: Named = "wam") -> Report:
     """
     found = _loaded(configuration)
     shared, own = found.shared, found.node("force_loop", ForceLoopParameters)
+    if own.guard.mode == "limit":
+        own = replace(own, guard=replace(own.guard, mode="refuse"))
     return ForceLoop(shared.model_arm, shared.servo, own, shared.timing).report
 
 

@@ -23,7 +23,7 @@ from wam_studies.force_benchmark.tasks import (
     steps,
     triple,
 )
-from wam_studies.force_benchmark.trial import TaskWatch, with_accepted_gain
+from wam_studies.force_benchmark.trial import TaskWatch
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
 
@@ -46,7 +46,7 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
         **obstacles(BODY, POSE, [surface]),
         **changes,
     }
-    configuration = with_accepted_gain(CONFIGURATION.with_values(given))
+    configuration = CONFIGURATION.with_values(given)
     run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), *steps])
     model, data = run.driver.plant.model, run.driver.plant.data
     rod, wrench, forces, reactions = model.geom(NAMES[0]).id, np.zeros(6), [], []
@@ -99,9 +99,12 @@ def test_an_arm_that_holds_presses_no_harder_than_commanded(as_task: bool) -> No
 
 
 @pytest.mark.parametrize("source", ["pinned", "estimated"])
-@pytest.mark.parametrize(("place", "newtons"), [(0.38, 4.0), (0.2, -4.0), (0.1, 6.0)])
+@pytest.mark.parametrize(("place", "newtons"), [(0.38, 4.0), (0.2, -5.0), (0.1, 6.0)])
 def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float, source: str) -> None:
-    """Along the force and 8 cm and more from it: the surface got 3.2 to 12.8 N of 8, and nothing was said."""
+    """Along the force and 8 cm and more from it: the surface got 3.2 to 12.8 N of 8, and nothing was said.
+
+    With an estimated place 4 N against the force are within what is not known of the torques.
+    """
     local = BODY.cover_pose(POSE, OUTER).rotation.T @ (newtons * np.array(DIRECTION))
     steps = [press(8.0, 1.8), press(8.0, 0.8, push=Push(OUTER, place, triple(local), 0.0, 0.8))]
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": source})
@@ -140,7 +143,7 @@ def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:
         asymmetry=-0.015,
     )
     task = Task((-1.011, 1.243, 2.07, -0.741), surface, 14.63, conditions)
-    configuration = with_accepted_gain(configured(CONFIGURATION, task))
+    configuration = configured(CONFIGURATION, task)
     run = Simulation(configuration, steps(task, 3.5))
     forces = TaskWatch(configuration, task, run).traces()[0].forces[-1000:]
     cycle = RANGES.dither_cycle

@@ -19,7 +19,7 @@ from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.outcome import TaskEnd
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, triple
-from wam_studies.force_benchmark.trial import perform, with_accepted_gain
+from wam_studies.force_benchmark.trial import perform
 
 BODY = RigidBody(WAM)
 OUTER = "outer_link"
@@ -36,7 +36,7 @@ MOTORS = {
 def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simulation:
     """A simulation of the arm released in free space, at its start."""
     given = {"arm.joints.start": list(q), "force_loop:guard.posture": list(q), **FAR_AWAY, **changes}
-    configuration = with_accepted_gain(CONFIGURATION.with_values(given))
+    configuration = CONFIGURATION.with_values(given)
     return Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
 
 

@@ -21,7 +21,7 @@ from wam_studies.force_benchmark import surfaces
 from wam_studies.force_benchmark.outcome import TaskEnd
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, triple
-from wam_studies.force_benchmark.trial import perform, with_accepted_gain
+from wam_studies.force_benchmark.trial import perform
 
 MASS = 0.5  # kg
 STEP = CONFIGURATION.shared.timing.substep
@@ -82,7 +82,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
     direction = triple(-RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
     given = configured(CONFIGURATION, Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 8.0))
     run = Simulation(
-        with_accepted_gain(given.with_values({**PINNED, "driver:mismatch.payload": 0.08})),
+        given.with_values({**PINNED, "driver:mismatch.payload": 0.08}),
         [
             ScenarioStep("release", RANGES.release, request="enable"),
             *(
@@ -159,7 +159,7 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
         ScenarioStep("move", 0.43, posture=DEMO),
         ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
     ]
-    run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
+    run = Simulation(CONFIGURATION.with_values(given), steps)
     loop, causes = run.nodes["force_loop"], list[str]()
     while not run.step():
         if loop.event.holds and loop.event.cause not in causes[-1:]:

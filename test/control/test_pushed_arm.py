@@ -15,7 +15,6 @@ from wam_description.signals import NodeStatus
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import RANGES, triple
-from wam_studies.force_benchmark.trial import with_accepted_gain
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
 
@@ -41,7 +40,7 @@ def pushed(
         **obstacles(BODY, POSE, [still, rod]),
         **changes,
     }
-    configuration = with_accepted_gain(CONFIGURATION.with_values(given))
+    configuration = CONFIGURATION.with_values(given)
     run = Simulation(configuration, [ScenarioStep("release", RANGES.release, request="enable"), step])
     model, data, present = run.driver.plant.model, run.driver.plant.data, [NodeStatus(Level.OK, "")]
     run.listen("status", lambda _, status: present.append(status), "force_loop")

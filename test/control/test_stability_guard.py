@@ -28,7 +28,7 @@ WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"
 ARM, CLOCK = WAM.shared.arm, WAM.shared.timing
 PACKAGED = WAM.node("force_loop", ForceLoopParameters)
 # the sensors of these tests are those of no arm at rest: no zero
-OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0))
+OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0), guard=replace(PACKAGED.guard, mode="refuse"))
 SERVO = WAM.shared.servo
 Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
 UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)
@@ -165,7 +165,7 @@ def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str) -> None:
-    found = Loop(replace(OWN, feedback=feedback)).assessment
+    found = Loop(replace(PACKAGED, feedback=feedback)).assessment
     assert found is not None
     assert found.domain is Domain.I
 
@@ -278,7 +278,21 @@ def test_in_domain_ii_the_saturation_is_held_below_the_stable_error_and_the_test
 
 def test_domain_iii_is_refused_with_any_saturation() -> None:
     with pytest.raises(ParameterError, match="domain III; allowed: force_gain up to"):
-        bench_loop(guarded(bench(force_gain=(0.2,), force_error_limit=(0.01,)), mode="limit"))
+        bench_loop(bench(force_gain=(0.2,), force_error_limit=(0.01,)))
+
+
+def test_mode_limit_lowers_the_gains_to_what_a_refusal_allows() -> None:
+    high = bench(force_gain=(0.2,), force_error_limit=(5.0,), force_proportional_gain=(0.0,))
+    with pytest.raises(ParameterError, match="domain III; allowed: force_gain up to") as refusal:
+        bench_loop(high)
+    allowed = float(str(refusal.value).split("force_gain up to [")[1].split(",")[0])
+    lowered = bench_loop(guarded(high, mode="limit"))
+    assert lowered.parameters.force_gain == pytest.approx([allowed], rel=0.01)
+    assert "lowered to be stable: force_gain [" in lowered.report.message
+    assert lowered.assessment is not None
+    assert lowered.assessment.domain is Domain.I
+    lowered.retune_servo(TESTBED.shared.servo)
+    assert lowered.parameters.force_gain == pytest.approx([allowed], rel=0.01), "of the gain that was given"
 
 
 # ------------------------------------------------------------------------------- while it moves

@@ -15,7 +15,7 @@ from wam_description.signals import ForceCommand, PathPoint, PosturePath
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, triple
-from wam_studies.force_benchmark.trial import TaskWatch, with_accepted_gain
+from wam_studies.force_benchmark.trial import TaskWatch
 
 BODY = RigidBody(WAM)
 LEVEL = (-0.031, -1.083, -1.826, -0.482)  # the outer link is level
@@ -32,7 +32,7 @@ class Played:
     def __init__(
         self, task: Task, axes: Sequence[TaskAxis], seconds: float, *later: ScenarioStep, **changes: Any
     ) -> None:
-        configuration = with_accepted_gain(configured(CONFIGURATION, task).with_values(changes))
+        configuration = configured(CONFIGURATION, task).with_values(changes)
         steps = [
             ScenarioStep("release", RANGES.release, request="enable"),
             ScenarioStep("press", seconds, task=TaskCommand("base", tuple(axes))),

@@ -249,7 +249,7 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
             {"force_gain": [0.02], "force_gian": 0.02},
             "unknown parameter 'force_gian'; did you mean 'force_gain'? allowed, as they can change while node",
         ),
-        ({"force_gain": [0.5]}, "times the largest linearly stable one"),
+        ({"force_gain": [0.5], "guard.mode": "refuse"}, "times the largest linearly stable one"),
         ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
     ],
 )
@@ -391,7 +391,12 @@ def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     [
         ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
-        ("force_loop", "force_gain: [1.45e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
+        (
+            "force_loop",
+            "force_limit: 60.0",
+            "force_limit: 1e9",
+            "parameter 'force_limit' is 1000000000.0 N; allowed: 0 to 1000",
+        ),
         ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
     ],
 )

@@ -24,11 +24,11 @@ ARROWS = {
     "wam_studies": {
         "wam_theory", "wam_description", "wam_bag", "wam_driver", "wam_control", "wam_ros", "wam_sim", "wam_analysis",
     },
+    "wam_stack": {"wam_description", "wam_bag", "wam_control", "wam_sim", "wam_analysis"},
     "wam_cli": {
         "wam_theory", "wam_description", "wam_bag", "wam_driver", "wam_control", "wam_ros", "wam_sim", "wam_analysis",
-        "wam_live", "wam_studies",
+        "wam_live", "wam_stack", "wam_studies",
     },
-    "wam_stack": {"wam_description", "wam_bag", "wam_control", "wam_sim", "wam_analysis"},
 }  # fmt: skip
 # package -> all that it may import of others; the rest take what they need
 DEPENDENCIES = {

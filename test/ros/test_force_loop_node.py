@@ -82,14 +82,17 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
     assert facts["verdict"] == "accepted"
     assert float(facts["effective stiffness [N/m]"]) > 1000.0
     assert float(facts["deadband that removes it [N]"]) > 0.0
-    refused = feeder.set(force_gain=[0.5])
+    refused = feeder.set(force_gain=[0.5], guard__mode="refuse")
     assert not refused.successful
     assert "times the largest linearly stable one" in refused.reason
-    assert feeder.loop.node._loop.parameters.force_gain == (0.0145,)
+    assert feeder.loop.node._loop.parameters.force_gain == (0.02,)
+    assert feeder.set(force_gain=[0.5]).successful
+    feeder.feed_until(lambda: "lowered" in feeder.facts()[0].message)
+    assert feeder.facts()[1]["lowered"].startswith("force_gain [")
+    assert 0.02 < feeder.loop.node._loop.parameters.force_gain[0] < 0.2
     assert feeder.set(force_gain=[0.5], guard__mode="warn").successful
-    feeder.feed_until(lambda: feeder.facts()[0].message != reported.message)
+    feeder.feed_until(lambda: feeder.facts()[0].message.startswith("not stable: force_gain "))
     assert feeder.facts()[0].level == DiagnosticStatus.WARN
-    assert feeder.facts()[0].message.startswith("not stable: force_gain ")
 
 
 def test_a_force_above_the_limit_is_counted_and_the_last_good_one_remains_in_force(ros: Any, tmp_path: Path) -> None:

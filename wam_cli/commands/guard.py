@@ -14,11 +14,10 @@ from wam_cli.options import (
     take_topic_map,
     topic_map_of,
 )
-from wam_control.force.force_loop import ForceLoop
-from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
+from wam_stack import guard
 from wam_studies.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
@@ -36,7 +35,7 @@ LOOP = {  # option: default, what it is
     "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
-WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor")  # facts of a running arm
+WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered")  # facts of a running arm
 NUMBERS = (*PLANT, "stiction", *LOOP)
 
 
@@ -79,8 +78,7 @@ def run(given: argparse.Namespace) -> int:
 
 def _assess_configuration(configuration: Configuration) -> int:
     require_parameters(configuration)
-    shared, parameters = configuration.shared, configuration.node("force_loop", ForceLoopParameters)
-    report = ForceLoop(shared.model_arm, shared.servo, parameters, shared.timing).report
+    report = guard(configuration)
     facts = {name: value for name, value in report.facts.items() if name not in WHILE_IT_RUNS}
     width = max(map(len, facts))
     print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in facts.items())]))

@@ -173,11 +173,12 @@ class CommandRun:
         self.feed_forward, self.advice, self.fallback = FeedForward(arm), Advice(), ""
 
     def go_on(self, before: "CommandRun") -> None:
-        """Keep where the axes touch and hold that were commanded before, too."""
+        """Keep where the axes touch and hold that were commanded before, too, and the torque that is fed forward."""
         for one in self.axes:
             for other in before.axes:
                 if (before.frame, other.of) == (self.frame, one.of):
                     one.place, one.anchor = other.place, other.anchor
+                    self.fed, self.feed_forward = before.fed, before.feed_forward
 
     @property
     def is_touching(self) -> bool:

@@ -75,7 +75,7 @@ class ForceLoop:
 
     Attributes
     ----------
-    parameters : those in force.
+    parameters : those in force; with guard.mode `limit` they may be lower than given.
     refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in force.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
@@ -99,7 +99,7 @@ class ForceLoop:
         arm = self._body.arm
         parameters.require_fit(arm)
         self._supervision = Supervision(arm, servo, self._timing, parameters, tuple(self._q))
-        self.parameters = parameters
+        self._given, self.parameters = parameters, self._supervision.parameters
         self._axes = TaskAxes(arm, self._body, ForceAxes(arm, self._body, sensing_of(parameters)))
 
     def tune(self, parameters: ForceLoopParameters) -> None:
@@ -115,7 +115,7 @@ class ForceLoop:
 
     def retune_servo(self, servo: Servo) -> None:
         """Take new gains of the velocity loop, on which the guard relies, or refuse them, as `tune` does."""
-        self._take(servo, self.parameters)
+        self._take(servo, self._given)
 
     @property
     def event(self) -> Event:
@@ -510,7 +510,7 @@ class ForceLoop:
     def _fed(self, axes: Sequence[CommandedAxis], dt: float) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
-        The velocity loops need not wind up to it; it rises as the force may.
+        The velocity loops need not wind up to it; the whole of it rises as the force may.
         """
         own, run = self.parameters, self._run
         at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
@@ -519,7 +519,10 @@ class ForceLoop:
                 at_once += own.force_feedforward * axis.desired * axis.along
                 if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
                     later += (1.0 - own.force_feedforward) * axis.desired * axis.along
-        run.fed += (later - run.fed) * dt / (rise_time(own) + dt) if own.limits.impact else 0.0
+        if own.limits.impact:
+            missing = later - run.fed
+            way, whole = (float(np.abs(one).max()) for one in (missing, [later, run.fed]))
+            run.fed += missing * min(whole * dt / (max(way, FORCE.negligible) * rise_time(own)), 1.0)
         return at_once + run.fed
 
     def _watch_motions(

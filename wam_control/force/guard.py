@@ -6,8 +6,8 @@ one only after the arm has moved.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from typing import Final, NamedTuple
+from dataclasses import fields, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from wam_control.force.stability_guard import (
     GuardedContact,
     GuardedTask,
     StabilityGuard,
+    listed,
     posture_of,
 )
 from wam_control.force.thresholds import GUARD
@@ -33,6 +34,9 @@ Triple = tuple[float, float, float]
 class Supervision:
     """A parameter set that the guard has let pass; another set needs another object.
 
+    With guard.mode `limit` a set that is not stable is lowered to one that is: the saturation in domain II, else
+    the gains.
+
     Parameters
     ----------
     arm : the arm as the controller knows it.
@@ -44,7 +48,8 @@ class Supervision:
     Attributes
     ----------
     servo, wound : gains of the velocity loop, and its integral gains at the joints (n, n), N m/rad.
-    force_law, torque_law : laws in force; with guard.mode `limit` their saturation may be lower than configured.
+    parameters : those in force.
+    force_law, torque_law : laws in force.
     assessment : what the guard finds; None where it is off or nothing is fed back.
     watch : what the guard does while the arm moves; None with the assessment.
     report : the guard's report; a new object where it has changed.
@@ -58,20 +63,21 @@ class Supervision:
     def __init__(
         self, arm: Arm, servo: Servo, timing: Timing, parameters: ForceLoopParameters, q: tuple[float, ...]
     ) -> None:
-        self._parameters, self.servo = parameters, servo
+        self.parameters, self.servo = parameters, servo
         self.wound = TransmissionMap.of(arm).at_joints(servo.integral_gain)
-        self.force_law, self.torque_law = force_law(parameters), torque_law(parameters, arm.joints.names)
+        self._joints = arm.joints.names
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
         self._guard = StabilityGuard(arm, servo, timing, parameters.guard, sensing_of(parameters))
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
+        self.force_law, self.torque_law = force_law(self.parameters), torque_law(self.parameters, self._joints)
+        self._lowered = _lowered(parameters, self.parameters)
         self._report()
 
     def _judge(self, postures: Sequence[tuple[float, ...]]) -> None:
-        guard, parameters = self._guard, self._parameters
+        guard, parameters = self._guard, self.parameters
         is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
-        task = task_of(parameters, self.torque_law if is_joints else self.force_law)
         position_sd = parameters.contact_position_sd
         contacts = [
             contact
@@ -84,21 +90,21 @@ class Supervision:
                 for each in contacts
                 if guard.axis(each).force_sd <= parameters.limits.doubt * tolerance(each.force, parameters)
             ]
-        found = guard.assess(task, contacts)
-        if found.reason and found.stable_error and mode == "limit":
-            limits = tuple(min(limit, found.stable_error) for limit in task.law.error_limit)
-            task = task._replace(law=replace(task.law, error_limit=limits))
-            found = found._replace(reason="")
+        task, found = self._assess(contacts)
+        if found.reason and mode == "limit" and found.scale:
+            self.parameters = _accepted(parameters, found)
+            task, found = self._assess(contacts)
         require(not found.reason or mode == "warn", found.reason)
-        if is_joints:
-            self.torque_law = task.law
-        else:
-            self.force_law = task.law
         self.assessment, self.watch = found, Watch(guard, task, found, parameters.schedule == "position")
 
+    def _assess(self, contacts: Sequence[GuardedContact]) -> tuple[GuardedTask, GuardAssessment]:
+        own = self.parameters
+        task = task_of(own, torque_law(own, self._joints) if own.mode == "joint_torque" else force_law(own))
+        return task, self._guard.assess(task, contacts)
+
     def _report(self) -> None:
-        parameters = self._parameters
-        self.report = report(self.assessment, self.watch, parameters.guard.mode, parameters.mode == "joint_torque")
+        own = self.parameters
+        self.report = report(self.assessment, self.watch, own.guard.mode, own.mode == "joint_torque", self._lowered)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
         """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
@@ -128,7 +134,7 @@ class Supervision:
     @property
     def present(self) -> float:
         """Factor of the gains in force."""
-        return 1.0 if self.watch is None or self._parameters.guard.mode == "warn" else self.watch.factor
+        return 1.0 if self.watch is None or self.parameters.guard.mode == "warn" else self.watch.factor
 
 
 class Watch:
@@ -221,7 +227,7 @@ class Report(NamedTuple):
     facts: dict[str, str]
 
 
-def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, is_joints: bool) -> Report:
+def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, is_joints: bool, lowered: str) -> Report:
     """Report on the parameters in force.
 
     Parameters
@@ -230,12 +236,13 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
     watch : what the guard does while the arm moves.
     mode : of the guard.
     is_joints : whether joint torques are controlled, else the force along a direction.
+    lowered : what the guard has lowered, '' where nothing.
     """
     if assessment is None or watch is None:
         return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
     force, length = ("N m", "rad") if is_joints else ("N", "m")
     here = min(watch.scale, assessment.scale)
-    message = f"domain {assessment.domain}"
+    message = f"domain {assessment.domain}{lowered and ', lowered to be stable: '}{lowered}"
     if assessment.reason:
         message = f"not stable: {assessment.reason}"
     elif watch.factor < 1.0 and mode != "warn":
@@ -250,6 +257,7 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         if watch.assessed
         else UNKNOWN,
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
+        "lowered": lowered or "nothing",
         "worst": assessment.where,
         f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
         f"stable error [{force}]": "any" if math.isinf(assessment.stable_error) else f"{assessment.stable_error:.4g}",
@@ -259,6 +267,26 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "verdict": assessment.reason or "accepted",
     }
     return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
+
+
+def _accepted(own: ForceLoopParameters, found: GuardAssessment) -> ForceLoopParameters:
+    """The set that the reason of a refusal advises: a lower saturation in domain II, else lower gains."""
+    group = "torque" if own.mode == "joint_torque" else "force"
+    values: dict[str, Any] = {}
+    if found.stable_error:
+        name = f"{group}_error_limit"
+        values[name] = tuple(min(limit, found.stable_error) for limit in getattr(own, name))
+    else:
+        most = (1.0 - GUARD.slack) * own.guard.stability_fraction * found.scale
+        for name in (f"{group}_gain", f"{group}_proportional_gain"):
+            values[name] = tuple(most * gain for gain in getattr(own, name))
+    return replace(own, **values)
+
+
+def _lowered(given: ForceLoopParameters, taken: ForceLoopParameters) -> str:
+    """Which parameters were lowered, and to what."""
+    names = [one.name for one in fields(given) if getattr(given, one.name) != getattr(taken, one.name)]
+    return "; ".join(f"{name} {listed(getattr(taken, name))}" for name in names)
 
 
 def _margin(scale: float, largest: float = GUARD.largest_scale) -> str:

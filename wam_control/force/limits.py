@@ -40,9 +40,14 @@ def accelerated(low: Array, high: Array, before: Array, step: float) -> tuple[Ar
     return np.minimum(np.maximum(low, before - step), high), np.maximum(np.minimum(high, before + step), low)
 
 
+def latency(own: ForceLoopParameters) -> float:
+    """By how much the measured force is late, s."""
+    return own.force_filter + own.guard.feedback_lag * own.is_estimated
+
+
 def rise_time(own: ForceLoopParameters) -> float:
     """Time in which the force on the stiffest surface may rise, s: some latencies of the measured force."""
-    return FORCE.rise * (own.force_filter + own.guard.feedback_lag * own.is_estimated)
+    return FORCE.rise * latency(own)
 
 
 def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters) -> float:
@@ -145,9 +150,14 @@ def calm(velocity: Array, inertia: Array, energy: float) -> Array:
 def followed(
     posture: Array, axis: CommandedAxis, body: RigidBody, q: Sequence[float], own: ForceLoopParameters
 ) -> Array:
-    """Velocities of a posture (n,), rad/s, at which the link slides no faster than the force law follows a slope."""
+    """Velocities of a posture (n,), rad/s, at which the link slides no faster than the force law follows a slope.
+
+    The law follows with its gain once the change is measured; until then the surface yields.
+    """
     assert axis.place is not None
+    assert axis.sensed is not None
     point = (axis.place.position, *body.arm.covers.aside(axis.place.cover, axis.place.position))
     slide = FORCE.slide_slope * float(np.linalg.norm(body.point_jacobian(q, axis.place.cover, point) @ posture))
-    most = max(own.force_gain) * min(own.limits.tolerance, 1.0) * abs(axis.desired)
+    pace = min(max(own.force_gain), yielding(axis.sensed, own) / max(latency(own), FORCE.negligible))
+    most = pace * min(own.limits.tolerance, 1.0) * abs(axis.desired)
     return posture * (most / slide) if slide > most else posture

@@ -37,8 +37,8 @@ class GuardParameters:
     """Assumptions of the guard, and what it does about parameters that are not stable."""
 
     mode: str = parameter(
-        "off: no guard; warn: report; refuse: refuse unstable parameters; limit: in domain II lower the "
-        "saturation to the stable error, refuse others",
+        "off: no guard; warn: report; refuse: refuse unstable parameters; limit: lower them, in domain II the "
+        "saturation to the stable error, else the gains",
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )
@@ -244,7 +244,7 @@ class StabilityGuard:
         name = max(cycles, key=lambda axis: cycles[axis].peak_to_peak)
         node = nodes[name]
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
-        what = name if task.is_joints else f"force along {_list(contact.direction)} in the base frame"
+        what = name if task.is_joints else f"force along {listed(contact.direction)} in the base frame"
         where = f"{what} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
         found = GuardAssessment(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
@@ -295,17 +295,17 @@ class StabilityGuard:
         if max(law.error_limit) <= error:
             return found
         most = (1.0 - GUARD.slack) * share * found.scale
-        allowed = f"{group}_gain up to {_list([rounded_down(most * gain) for gain in law.gain])}"
+        allowed = f"{group}_gain up to {listed([rounded_down(most * gain) for gain in law.gain])}"
         if error:
             allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
         reason = (
-            f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
+            f"{group}_gain {listed(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
             f"one: domain {domain}; allowed: {allowed}; guard.stability_fraction is {share:g}; worst case: "
             f"{found.where}, contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         )
         if not found.scale:
             reason = (
-                f"{group}_gain {_list(law.gain)} is not stable, nor is a hundredth of it "
+                f"{group}_gain {listed(law.gain)} is not stable, nor is a hundredth of it "
                 f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, "
                 f"{group}_proportional_gain or guard.contact_stiffness"
             )
@@ -378,10 +378,11 @@ def rounded_up(value: float) -> float:
 
 def posture_of(contact: GuardedContact) -> str:
     """The posture of a contact in words."""
-    return f"posture {_list(contact.q)} rad"
+    return f"posture {listed(contact.q)} rad"
 
 
-def _list(values: Sequence[float]) -> str:
+def listed(values: Sequence[float]) -> str:
+    """Numbers for people, to three digits."""
     return "[" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.3g}" for value in values) + "]"
 
 

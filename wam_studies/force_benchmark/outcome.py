@@ -56,7 +56,6 @@ class TaskTrace(NamedTuple):
     is_stopped : whether the loop holds the arm instead, or the driver is in fault, at the end.
     is_fault : whether the driver is in fault.
     predicted_cycle : peak to peak of the limit cycle that the guard reports, N.
-    gain : force gain in use, m/s/N.
     """
 
     forces: Array
@@ -67,7 +66,6 @@ class TaskTrace(NamedTuple):
     is_stopped: bool
     is_fault: bool
     predicted_cycle: float
-    gain: float
 
 
 class TaskResult(NamedTuple):
@@ -80,7 +78,6 @@ class TaskResult(NamedTuple):
     limit : largest true force allowed, N.
     cycle : peak to peak of a limit cycle at the end, N; 0 without one.
     cycle_is_reported : whether the loop reports a reason, or the guard a cycle of this size.
-    gain : force gain in use, m/s/N.
     reason : of a refusal, an end or a warning.
     cause : its code, and the cause where the code has several; '' without a reason.
     is_over : whether the true force was above the largest allowed, or at the end above that of the last command.
@@ -93,7 +90,6 @@ class TaskResult(NamedTuple):
     limit: float
     cycle: float
     cycle_is_reported: bool
-    gain: float
     reason: str
     cause: str
     is_over: bool
@@ -107,7 +103,7 @@ class TaskResult(NamedTuple):
 def refused(task: Task, reason: str) -> TaskResult:
     """The result of a task that is refused before the start."""
     limit = OUTCOME.overshoot * task.force
-    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason, "parameters", is_over=False)
+    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, reason, "parameters", is_over=False)
 
 
 def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
@@ -123,7 +119,6 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
         limit=limit,
         cycle=cycle,
         cycle_is_reported=trace.event != OBEYED or trace.predicted_cycle >= OUTCOME.predicted * cycle > 0.0,
-        gain=trace.gain,
         reason=sentence(trace.event),
         cause=_cause(trace.event),
         is_over=peak > limit or mean > OUTCOME.overshoot * task.force + trace.impact,

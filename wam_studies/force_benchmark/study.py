@@ -89,7 +89,6 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
             f"  surface of {surface.stiffness:.4g} N/m, friction {surface.friction:.2f}; ramp of {ramp:.2g} s",
             f"  {course_of(task)}{first}; not known: {unknown_of(task)}",
             f"  feedback from {FEEDBACK.of(task)}; contact position {POSITION.of(task)}; {TARE.of(task)}",
-            f"  force gain {result.gain:.3g} m/s/N",
         ]
         return "\n".join([*lines, f"  reason: {result.reason}"] if result.reason else lines)
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force.force_loop import ForceLoop
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
@@ -102,7 +101,7 @@ def perform(
     controller : in place of the force loop.
     """
     try:
-        configuration = with_accepted_gain(configured(base, task).with_values(changes or {}))
+        configuration = configured(base, task).with_values(changes or {})
         run = Simulation(configuration, steps(task, seconds), {"force_loop": controller} if controller else None)
     except ValueError as error:
         return refused(task, str(error))
@@ -110,18 +109,6 @@ def perform(
     return worst(
         [evaluated(task._replace(force=force), trace) for (_, force), trace in zip(task.forces, traces, strict=True)]
     )
-
-
-def with_accepted_gain(configuration: Configuration) -> Configuration:
-    """With the largest force gain that the guard accepts, at most the configured one: what its refusal advises."""
-    shared = configuration.shared
-    warned = configuration.with_values({"force_loop:guard.mode": "warn"})
-    own = warned.node("force_loop", ForceLoopParameters)
-    found = ForceLoop(shared.model_arm, shared.servo, own, shared.timing).assessment
-    if found is None or not found.reason:
-        return configuration
-    fraction = 0.99 * found.scale * own.guard.stability_fraction
-    return configuration.with_values({"force_loop:force_gain": [fraction * gain for gain in own.force_gain]})
 
 
 class TaskWatch:
@@ -144,7 +131,6 @@ class TaskWatch:
         self._surfaces = {run.driver.plant.model.geom(name).id: i for i, name in enumerate(NAMES[: len(task.forces)])}
         self._node = run.nodes["force_loop"]
         self._wrench = np.zeros(6)
-        self._gain = configuration.node("force_loop", ForceLoopParameters).force_gain[0]
 
     def traces(self) -> list[TaskTrace]:
         """Play the task to its end, or until it has been stopped for `STOPPED`; what was seen of each force."""
@@ -176,7 +162,6 @@ class TaskWatch:
                 is_stopped=standing.is_stopped,
                 is_fault=standing.is_fault,
                 predicted_cycle=standing.predicted_cycle,
-                gain=self._gain,
             )
             for column, way in zip(zip(*forces, strict=True), travel, strict=True)
         ]
