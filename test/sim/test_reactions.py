@@ -107,7 +107,7 @@ def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) 
     assert words in str(answer)
     assert "not reached" not in str(answer)
     sections = {section.key: section for section in analyse_bag(bag, lambda stage: None).sections}
-    assert any(words in line for line in sections["force"].wrong)
+    assert any(words in line for line in sections["steps"].wrong)
 
 
 @pytest.mark.slow

@@ -259,12 +259,11 @@ def pressed(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
 
 @pytest.mark.slow
 def test_the_wrist_presses_within_ten_percent_while_the_elbow_moves(pressed: Bag) -> None:
-    recording = AnalysedRecording(pressed)
-    found = recording
+    found = AnalysedRecording(pressed)
     assert found.outcome == "done"
-    assert found.loop.mode == "lockstep"
-    assert [held.hold.name for held in recording.held] == ["press 5 N", "move the elbow, press 10 N"]
-    for held in recording.held:
+    assert found.mode == "lockstep"
+    assert [held.hold.name for held in found.held] == ["press 5 N", "move the elbow, press 10 N"]
+    for held in found.held:
         assert abs(held.true_accuracy.bias) < 0.1 * held.hold.commanded
     assert {contact.estimate.link for contact in found.contacts} == {"wrist"}
     body = RigidBody(CONFIGURATIONS["barrett_wam7"].shared.arm)
