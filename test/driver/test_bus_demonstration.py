@@ -28,6 +28,9 @@ from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
 MORE = 0.03  # of the commanded force, by which the true force may be further off over the bus
+WRIST = (
+    0.08  # of the commanded force, by which that of the wrist may be off; a refused one is off by a quarter and more
+)
 FRICTION = 0.1  # of the configured friction, which is the true one, by which that of a recording may differ
 
 
@@ -110,6 +113,17 @@ def test_forces_over_the_bus_are_those_of_the_plain_driver(tmp_path: Path, monke
     over_bus = force_errors(played(configuration, tmp_path / "bus"))
     assert len(plain) == len(over_bus) == 3
     assert max(over_bus) < max(plain) + MORE, (plain, over_bus)
+
+
+@pytest.mark.slow
+def test_the_arm_with_the_wrist_presses_over_the_bus_where_its_contact_is_pinned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configuration = at_rates_of_the_bus("barrett-wam7")
+    monkeypatch.setattr(wam_sim.simulation, "Driver", DriverOnBus)
+    over_bus = force_errors(played(configuration, tmp_path / "bus"))
+    assert len(over_bus) == 4
+    assert max(over_bus) < WRIST, over_bus
 
 
 @pytest.mark.slow
