@@ -209,9 +209,9 @@ def happened_section(recording: AnalysedRecording) -> Section:
     wrong = [stated(run.others)] if run.others else []
     wrong += [f"INCOMPLETE: {line}" for line in recording.lost]
     wrong += [f"REFUSED: {one.sentence}." for one in run.refused]
-    wrong += [f"STOPPED: {fault}." for fault in faults]
+    wrong += [f"STOPPED: {fault}." for fault in faults[:1]]
     wrong += [stated(recording.failure)] if recording.failure and not faults else []
-    sentences = [*wrong, *_changed(run, recording.traces.zero)]
+    sentences = [*wrong, *map(stated, faults[1:]), *_changed(run, recording.traces.zero)]
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")
