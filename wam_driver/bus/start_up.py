@@ -79,7 +79,7 @@ class StartUp:
         host = self._host
         while host.ask(BusNode.SAFETY_MODULE, "STAT") is None:
             if any(host.ask(node, "STAT", 1) is not None for node in self._motors):
-                raise Trouble(BusFault.NO_SAFETY_MODULE)
+                host.demand(BusNode.SAFETY_MODULE, "STAT")  # once more, as the power may have come in between
             yield from self._pause(Wait.POWER, BUS.look)
         host.versions[BusNode.SAFETY_MODULE] = host.demand(BusNode.SAFETY_MODULE, "VERS")
         while host.demand(BusNode.SAFETY_MODULE, "MODE") != SafetyMode.IDLE:
