@@ -74,10 +74,6 @@ class Rig:
         self.arm = ArmBus(via(self.bus), arm, PERIOD)
         self.currents = [0.1 + 0.05 * at for at in range(len(arm.motors.names))]
 
-    def wake(self) -> None:
-        for node in range(1, 1 + len(self.currents)):
-            self.bus.controllers[node].values["STAT"] = 2
-
     def start(self, most: float = 5.0) -> list[Wait]:
         """Until it runs or there is a fault; what was waited for."""
         waits, end = [], self.bus.now() + most
@@ -96,7 +92,6 @@ class Rig:
         self.arm.command(self.currents)
 
     def enable(self) -> None:
-        self.wake()
         self.start()
         assert self.arm.trouble is None
         self.run(0.5)
@@ -106,7 +101,7 @@ class Rig:
 
 @pytest.mark.parametrize("version", [OLDEST, OLD, NEW])
 @pytest.mark.parametrize("name", ["barrett-wam4", "barrett-wam7"])
-def test_the_arm_starts_wakes_and_follows_torques_with_any_firmware(name: str, version: int) -> None:
+def test_the_arm_starts_and_follows_torques_with_any_firmware(name: str, version: int) -> None:
     rig = Rig(name, version)
     assert rig.start() == [Wait.WAKE, Wait.ACTIVATE]
     rig.run(0.1)
@@ -166,6 +161,29 @@ def test_an_arm_without_a_zero_waits_for_a_person_at_home() -> None:
     rig.run(0.1)
     assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
     assert not rig.arm.confirm_home()
+
+
+@pytest.mark.parametrize("version", [OLDEST, OLD, NEW])
+def test_the_zero_is_lost_with_the_counts_of_one_controller(version: int) -> None:
+    rig = Rig(version=version)
+    rig.bus.is_attended = False
+    rig.plant.brake(True)  # the person holds it
+    assert rig.start()[-1] is Wait.ACTIVATE
+    rig.bus.controllers[3].values.update(STAT=0, P=3000)
+    rig.arm.begin()
+    assert rig.start(2.0)[-1] is Wait.HOME
+    assert rig.arm.advice.endswith("lost their counts: 3")
+    rig.arm.begin()  # it is awake now, and still without its counts
+    assert rig.start(2.0)[-1] is Wait.HOME
+    rig.bus.press(SafetyMode.ACTIVE)
+    rig.arm.release()
+    rig.step()
+    assert not any(rig.bus.commanded)
+    rig.bus.press(SafetyMode.IDLE)
+    rig.arm.confirm_home()
+    assert rig.start()[-1] is Wait.ACTIVATE
+    rig.run(0.1)
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.05)
 
 
 def test_in_estop_the_start_waits_for_shift_idle() -> None:
@@ -250,6 +268,11 @@ def jumping(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
     return pass_on
 
 
+def stuck_asleep(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
+    rig.bus.controllers[chosen].values["STAT"] = 0
+    return lambda frame: [] if frame.identifier == chosen and len(frame.data) == 6 else [frame]
+
+
 def foreign(rig: Rig, chosen: int) -> Callable[[Frame], list[Frame]]:
     return lambda frame: [frame, frames.get(chosen, 5)] if frame.sender == chosen else [frame]
 
@@ -305,8 +328,7 @@ AT_START: dict[str, tuple[Inject, BusFault]] = {
     "another kind of node": (setting(5, "ROLE"), BusFault.NOT_MOTOR),
     "firmware that is too old": (firmware(20), BusFault.FIRMWARE),
     "two firmwares": (firmware(55), BusFault.MIXED_FIRMWARE),
-    "stays asleep": (on_line(lambda rig, chosen: lambda f: [] if f.identifier == chosen and len(f.data) == 6 else [f]),
-                     BusFault.NOT_AWAKE),
+    "stays asleep": (on_line(stuck_asleep), BusFault.NOT_AWAKE),
     "wrong counts": (setting(1024, "CTS"), BusFault.COUNTS),
     "wrong gain": (setting(500, "IPNM"), BusFault.GAIN),
     "no torque": (setting(0, "MT"), BusFault.LIMIT),
@@ -337,8 +359,6 @@ RUNNING: dict[str, tuple[Inject, BusFault]] = {
 def test_an_arm_that_is_not_right_is_refused_by_name(kind: str, seed: int) -> None:
     inject, fault = AT_START[kind]
     rig = Rig()
-    if kind != "stays asleep":
-        rig.wake()
     inject(rig, random.Random(seed))
     rig.start()
     assert rig.arm.trouble is not None

@@ -81,7 +81,9 @@ class ArmBus:
     @property
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
-        return self.wait.value
+        woken = ", ".join(map(str, self._start.woken))
+        reason = f"; controllers that have lost their counts: {woken}" if woken and self.wait is Wait.HOME else ""
+        return self.wait.value + reason
 
     def release(self) -> None:
         """Let the motors follow their torques."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 _READ: Final[dict[str, Any]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
-ARM: Final[dict[int, dict[str, int]]] = {int(node): values for node, values in _READ["arm"].items()}  # at power-on
+ARM: Final[dict[int, dict[str, int]]] = {int(node): values for node, values in _READ["arm"].items()}  # awake and zeroed
 
 
 @cache

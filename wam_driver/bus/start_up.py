@@ -38,12 +38,13 @@ class StartUp:
     Attributes
     ----------
     is_at_home : a person has confirmed the home pose.
+    woken : controllers that this start has woken.
     """
 
     def __init__(self, host: Host, home: Sequence[float], torque_constant: Sequence[float]) -> None:
         self._host, self._home, self._constant = host, home, torque_constant
         self._motors = range(1, len(home) + 1)
-        self.is_at_home = False
+        self.is_at_home, self.woken = False, list[int]()
 
     def steps(self) -> Generator[Wait, None, list[Motor]]:
         """Go on after each step; yields what the start waits for, and returns the motors as they were read.
@@ -60,7 +61,7 @@ class StartUp:
         yield from self._wake()
         limit = min(self._host.demand(BusNode.SAFETY_MODULE, "TL1"), BUS.largest_torque)
         motors = [self._read(node, limit) for node in self._motors]
-        if self._host.demand(BusNode.SAFETY_MODULE, "ZERO") != 1:
+        if self.woken or self._host.demand(BusNode.SAFETY_MODULE, "ZERO") != 1:
             while not self.is_at_home:
                 yield from self._pause(Wait.HOME, BUS.look)
             self._set_zero(motors)
@@ -107,14 +108,16 @@ class StartUp:
                 self._host.sleep(BUS.between_writes)
 
     def _wake(self) -> Iterator[Wait]:
+        """Wake those that sleep; as they have lost their counts, the zero is unknown, also in later starts."""
         host = self._host
-        asleep = [node for node in self._motors if host.demand(node, "STAT") != BUS.ready]
-        for node in asleep:
+        self.woken = [node for node in self._motors if host.demand(node, "STAT") != BUS.ready]
+        for node in self.woken:
+            host.write(BusNode.SAFETY_MODULE, "ZERO", 0)
             host.write(node, "STAT", BUS.ready)
             host.sleep(BUS.between_writes)
-        if asleep:
+        if self.woken:
             yield from self._pause(Wait.WAKE, BUS.silence)
-        for node in asleep:
+        for node in self.woken:
             host.demand(node, "STAT", [BUS.ready], BusFault.NOT_AWAKE)
         host.write(BusGroup.MOTORS, "MODE", BUS.idle_mode)
 
