@@ -213,7 +213,7 @@ def _is_given(given: argparse.Namespace, option: str) -> bool:
 def take_arm(parser: argparse.ArgumentParser) -> None:
     """Give a command that reads a bag the option --namespace."""
     parser.add_argument(
-        "--namespace", type=namespace, help="namespace of the arm in the bag; default: that with the most topics"
+        "--namespace", type=namespace, help="namespace of the arm in the bag; default: the one with most topics"
     )
 
 
@@ -239,13 +239,13 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each: one process per node; grouped: one each for inner loop, outer loop and recorder; default: all "
-        "nodes in one process, in realtime grouped",
+        help="each: one process per node; grouped: one each for inner loop, outer loop and recorder; default: one "
+        "process for all; in realtime: grouped",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="run with the clock, as a real arm does, without waiting for commands; default: lockstep (timing.mode)",
+        help="follow the wall clock and wait for no command, as a real arm does; default: lockstep (timing.mode)",
     )
     parser.add_argument(
         "--real-time-factor",
@@ -308,7 +308,7 @@ def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
         type=Path,
         default=default_file(name),
         metavar="FILE",
-        help="keep finished runs in this file, and take them from it; default: %(default)s",
+        help="file of finished runs, which are not computed again; default: %(default)s",
     )
     kept.add_argument("--fresh", action="store_true", help="compute every run, keep none")
 
@@ -326,13 +326,13 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
 OTHER_ROBOT = (
     ("--topic", "TOPIC", "analyse this topic only; with --map it may have any type"),
     ("--joint", "JOINT", "analyse this joint only; or give names to the joints of messages without names"),
-    ("--command", "TOPIC", "topic of the commands; default: the reference in the state of a controller"),
+    ("--command", "TOPIC", "topic of the commands; default: the reference in the controller state"),
     (
         "--map",
         "QUANTITY=FIELD",
-        f"field of the messages, as effort=current or stamp=sec,nanosec; {', '.join(MAPPED)}",
+        f"field of the messages, e.g. effort=current or stamp=sec,nanosec; {', '.join(MAPPED)}",
     ),
-    ("--unit", "QUANTITY=UNIT", "unit of a quantity, as position=deg or effort=mA, or a factor as effort=0.12"),
+    ("--unit", "QUANTITY=UNIT", "unit of a quantity, e.g. position=deg or effort=mA; or a factor, e.g. effort=0.12"),
 )
 
 

@@ -29,7 +29,7 @@ TWO_DRIVERS = (
 
 
 class ArmDriver(StackNode):
-    """A driver without its motors; what raises NotImplementedError here is what a driver of your own adds.
+    """A driver without its motors; your own driver adds the methods that raise NotImplementedError.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ LAWS: dict[str, Callable[[Sequence[float], Sequence[float], "FrictionParameters"
 
 @dataclass(frozen=True)
 class FrictionParameters:
-    """How the plant's dry friction depends on velocity, direction and load.  A list has one value for all or one each.
+    """How dry friction depends on velocity, direction and load.  A list has one value for all shafts, or one for each.
 
     F_s and F_d are `static_friction` and `dynamic_friction` of `arm.motors` and `arm.joints`.
     """

@@ -20,7 +20,7 @@ from wam_driver.thresholds import PLANT
 
 
 class SpringOnCover(NamedTuple):
-    """A spring whose lever is on a link that carries a cover."""
+    """A spring with a lever on the link of a cover."""
 
     tendon: int
     body: int

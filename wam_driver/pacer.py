@@ -8,7 +8,7 @@ from wam_driver.thresholds import DRIVER
 
 
 class Pace(NamedTuple):
-    """How fast simulated time passed since the report before.
+    """How fast simulated time has passed since the last report.
 
     Attributes
     ----------

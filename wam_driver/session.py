@@ -7,7 +7,7 @@ from wam_description.status import AWAITED
 
 
 class Session:
-    """A number that no driver before had, and the nodes that have reported that they follow it.
+    """Number of this session, which no driver had before, and the nodes that follow it.
 
     Parameters
     ----------

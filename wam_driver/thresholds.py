@@ -26,7 +26,7 @@ class PlantThresholds:
 
 @dataclass(frozen=True, slots=True)
 class CircuitThresholds:
-    """How finely a cable that ends on its pulleys keeps its load."""
+    """Resolution of the load along a cable that ends on its pulleys."""
 
     wound_part: float = 0.05  # rad of the rotor, wound under one load: half a millimetre of cable on the pinions
     passages: float = 4.0  # times a part takes over the load by a factor of e while it passes: 98 % of it
@@ -52,7 +52,7 @@ class DriverThresholds:
 
 @dataclass(frozen=True, slots=True)
 class BusThresholds:
-    """When the driver of a real arm waits, asks and faults; what the maker's arm has; what a simulated bus does."""
+    """When the driver of a real arm waits, asks and faults; data of the maker's arm; timing of the simulated bus."""
 
     reply: float = 0.005  # s, for a reply at the start; fast computers that waited for 1 ms missed controllers
     attempts: int = 3  # at a reply at the start, since a frame may be lost

@@ -200,7 +200,7 @@ class Processes(Closing):
 
 
 class NodeProcess:
-    """One node of a configuration as a process, which can be ended as SIGTERM does and started again.
+    """One node of a configuration as a process, which can be ended by SIGTERM and started again.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class NoAnswerError(OSError):
 
 
 class StackClient(Closing):
-    """The nodes of one arm; leaving the context leaves the network.
+    """Client of the nodes of one arm; leaving the context disconnects it.
 
     Parameters
     ----------

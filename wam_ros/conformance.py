@@ -13,7 +13,7 @@ ONCE = ("interface", "end", "session")  # a second attempt finds another driver,
 
 
 class ConformanceRow(NamedTuple):
-    """What was found for one row of the contract: ok, WRONG or not tested, and what is wrong."""
+    """Result of one row of the contract: ok, WRONG or not tested, and what is wrong."""
 
     key: str
     verdict: str

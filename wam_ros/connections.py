@@ -70,7 +70,7 @@ class Peers:
 
 
 class StackNode(TolerantNode):
-    """A node on topics; what it does with them is the part of `AdaptedNode`, or of a driver.
+    """A node on topics; `AdaptedNode` or a driver defines what it does with them.
 
     Parameters
     ----------

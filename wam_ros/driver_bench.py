@@ -46,7 +46,7 @@ class Arrived(NamedTuple):
 
 
 class DriverBench(StackClient):
-    """Answers each state with currents that carry the links, with a small one more on the first motor.
+    """Answers each state with currents that carry the links, plus a small one on the first motor.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def problem_of(cause: str, reason: str) -> Event | None:
 
 
 class Health:
-    """The status of one node: what its work reports, with its problems and with the messages that it refuses.
+    """Status of one node: what it reports, its problems and the messages that it refuses.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def copy_name(topic: str) -> str:
 
 
 class DisplayCopy:
-    """Publishes some of the messages of a topic once more.
+    """Publishes some messages of a topic a second time, for viewers.
 
     Parameters
     ----------

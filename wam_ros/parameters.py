@@ -118,7 +118,7 @@ def follow_together(
 
 
 class Follower:
-    """Takes the live values of shared parameters of another node, as the status of that one has them.
+    """Takes live values of shared parameters from the status of another node.
 
     Parameters
     ----------

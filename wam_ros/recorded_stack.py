@@ -16,7 +16,7 @@ _SHARED: Final = frozenset(field.name for field in fields(Shared))
 
 
 class RecordedStack:
-    """The nodes that a recorder records: their parameters, and whether one runs otherwise or is started again.
+    """The nodes that a recorder records: their parameters, and whether one differs or was started again.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ EVERY = "*"
 
 @dataclass(frozen=True)
 class RecorderParameters:
-    """Place and contents of the bag."""
+    """Directory and contents of the bag."""
 
     directory: str = parameter("directory of the bag; created if it is missing")
     name: str = parameter("name of the bag, a new directory; empty: arm, date and time of the start")

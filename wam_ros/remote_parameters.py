@@ -13,7 +13,7 @@ from wam_ros.limits import CALL_LIMITS
 
 
 class RemoteParameters:
-    """Collects all parameters of some nodes, one question each, without ever waiting.
+    """Collects all parameters of some nodes, with one request each, without waiting.
 
     Parameters
     ----------

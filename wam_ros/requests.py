@@ -19,7 +19,7 @@ Request = Call | SetParameters
 
 
 class ServiceRequest(NamedTuple):
-    """Name of a service, relative to the namespace of the stack, its type and the message that it is sent."""
+    """Service name relative to the stack's namespace, its type, and the request message."""
 
     service: str
     kind: Any

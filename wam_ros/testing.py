@@ -132,7 +132,7 @@ class Recorded(Mapping[str, Any]):
 
 
 class RunningArm:
-    """The stack of one test.  What is used first starts it, or `start` with other nodes or values.
+    """The stack of one test.  The first use starts it; `start` starts it with other nodes or values.
 
     Parameters
     ----------

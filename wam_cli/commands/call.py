@@ -36,7 +36,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "tare": ("take the present external torques as zero force", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
     "step": ("pause, then advance by one period", (Call("driver", "pause", True), Call("driver", "step"))),
-    "resume": ("let the time go on", (Call("driver", "pause", False),)),
+    "resume": ("resume the time of the simulated arm", (Call("driver", "pause", False),)),
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 EXAMPLE: Final = "force_loop:force_gain=0.01"

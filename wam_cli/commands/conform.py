@@ -38,7 +38,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=COUNT,
         default=0,
         metavar="VERSION",
-        help="put a simulated arm with this firmware on that bus, as udp_multicast:239.74.163.2, in its own process",
+        help="put a simulated arm with this firmware on that bus, e.g. udp_multicast:239.74.163.2, in its own process",
     )
     parser.add_argument(
         "--dry-run",
@@ -56,21 +56,21 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded(float, unit="A"),
         default=0.4,
         metavar="A",
-        help="current of the first motor in addition to what carries the links, of either sign; default: %(default)s",
+        help="extra current of the first motor, of either sign, above what carries the links; default: %(default)s",
     )
     parser.add_argument(
         "--share",
         type=bounded(float, 0.0, 1.0),
         default=0.9,
         metavar="FRACTION",
-        help="fraction of the periods that need a state; default: %(default)s",
+        help="fraction of the periods in which a state must come; default: %(default)s",
     )
     parser.add_argument(
         "--attempts",
         type=COUNT,
         default=5,
         metavar="N",
-        help="attempts at each row, as a busy machine delays a correct driver; default: %(default)s",
+        help="attempts at each row; a busy computer delays a correct driver; default: %(default)s",
     )
     parser.epilog = (
         "The test releases the brakes several times, and small currents flow. On a real arm, keep its range clear and "

@@ -58,7 +58,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=SEED, help="with --excite: seed of the moves, default 1")
     parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
     parser.add_argument(
-        "--directory", type=writable_directory, help="with --excite: where the bag is made, default bags"
+        "--directory", type=writable_directory, help="with --excite: directory of the bag, default bags"
     )
     parser.add_argument("--write", type=MODEL, metavar="YAML", help="write the model as a configuration")
     parser.add_argument(

@@ -27,7 +27,7 @@ NEEDS = (
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
-    where = "namespace of the stack, default wam; or of the arm in the bag, default that with the most topics"
+    where = "namespace of the stack, default wam; or of the arm in the bag, default the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
     parser.add_argument("--at", type=float, metavar="SECONDS", help="with a bag: show this time, do not play")

@@ -71,8 +71,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--random",
         type=bounded(int, 1, MOST_SETS),
         metavar="RUNS",
-        help="draw this many sets at random, between the two values of each parameter; evenly, or in the logarithm if "
-        "both are above 0; not for whole numbers",
+        help="draw this many random sets between the two values of each parameter: logarithmic if both are above 0, "
+        "else uniform; not for whole numbers",
     )
     parser.add_argument("--seed", type=SEED, help="seed of --random; default: 1")
     parser.add_argument(

@@ -37,7 +37,7 @@ UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a l
 
 
 class Torques(NamedTuple):
-    """External torques of one moment, with what is known of their errors.
+    """External torques at one time, with what is known of their errors.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class _Past(NamedTuple):
 
 
 class ContactFusion:
-    """Keeps the moments of a contact, and their inner products.
+    """Keeps the torques of one contact at several times, and their inner products.
 
     Parameters
     ----------

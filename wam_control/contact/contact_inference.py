@@ -86,7 +86,7 @@ def detection_statistic(torques: Sequence[float], precision: Array) -> float:
 
 
 class ContactInference:
-    """One hypothesis per cover, by the probability of contact positions along it.
+    """Gives one hypothesis per cover, from the probabilities of contact positions along it.
 
     Any joints, links and covers will do.  Where joints meet in a shoulder, with a cover from there to the next joint,
     the elbow, and a cover from that on, reasons name poses of these two.

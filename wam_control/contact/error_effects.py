@@ -15,7 +15,7 @@ Means = tuple[Array, Array, Array, Array]
 
 
 class CentreEffects:
-    """External torques that the weight of links seems to have whose centres of mass are elsewhere.
+    """Apparent external torques of links whose centres of mass differ from the model.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Observation(NamedTuple):
-    """What the observer knows of one moment.
+    """What the observer knows at one time.
 
     Attributes
     ----------

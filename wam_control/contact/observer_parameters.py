@@ -7,7 +7,7 @@ from wam_description.parameters import parameter, require
 
 @dataclass(frozen=True)
 class ObserverParameters:
-    """The observer's nominal model, which differs from the plant, and its uncertainty."""
+    """Nominal model of the observer, and how uncertain that model is."""
 
     time_constant: float = parameter("time in which the estimate reaches 63 % of a step", "s", low=1e-3, high=1.0)
     detection_time: float = parameter(

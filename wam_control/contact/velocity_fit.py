@@ -13,7 +13,7 @@ THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third diff
 
 
 class FittedState(NamedTuple):
-    """State in the middle of the window, `dt` seconds after the one before."""
+    """State in the middle of the window; the state before is `dt` seconds older."""
 
     state: State
     dt: float

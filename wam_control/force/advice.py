@@ -18,7 +18,7 @@ Ways = dict[str, Value]
 
 
 class Advice:
-    """Looks for what would help.
+    """Finds what to change so that a refused force is accepted.
 
     Attributes
     ----------

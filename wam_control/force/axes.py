@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class CommandedAxis(NamedTuple):
-    """One axis in one pose.
+    """One commanded axis in one pose of the arm.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class CommandedAxis(NamedTuple):
 
 
 class TaskAxes:
-    """Makes the axes of the tasks of one arm.
+    """Makes the commanded axes of tasks, for one arm.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ class AxisRun:
 
 
 class Shaking:
-    """How a dithered arm shakes before it moves along a force: the swing of the force that it will make.
+    """How a dithered arm vibrates before it moves along a force, and the force swing that follows from it.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Shaking:
 
 
 class Resting:
-    """Torques of an arm at rest as a force begins: of a surface that is touched, or an error of the model.
+    """Torques of the resting arm when a force begins: from a touched surface, or from a model error.
 
     What a payload explains may always be one.
 

@@ -42,7 +42,7 @@ class ForcePlace(NamedTuple):
 
 
 class ContactPlace:
-    """Where one force acts, and what is kept of that while the contact lasts.
+    """Where one force acts; it is kept while the contact lasts.
 
     A pinned point is one of the world: the link slides along it.  An estimate near its limits would step the measured
     force back and forth, so the last one that was certain is kept.  A position that is not known may be anywhere on

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class FeedForward:
-    """Torques of the joints of one arm, added to those of its velocity loops.
+    """Joint torques of one arm that are added to those of its velocity loops.
 
     Parameters
     ----------

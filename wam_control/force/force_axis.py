@@ -27,7 +27,7 @@ ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 
 @dataclass(frozen=True)
 class SensingParameters:
-    """What disturbs the measured force, and how well it has to be known."""
+    """What disturbs the measured force, and how exactly it has to be known."""
 
     torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3)
     torque_fraction: float = tunable("the same, per torque of the commanded force", high=1.0)
@@ -109,7 +109,7 @@ class ForceAxis(NamedTuple):
 
 
 class PressedForce(NamedTuple):
-    """A force that the arm is to press with, and where.
+    """A force with which the arm is to press, and its position.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class PressedForce(NamedTuple):
 
 
 class ForceAxes:
-    """Makes the axes of one arm.
+    """Makes the force axes of one arm.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class Commands(NamedTuple):
 
 
 class LastGood(Generic[T]):
-    """A command in force: while others are refused, the last good one, for a time.
+    """The last good command; it is used for a time while newer ones are refused.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class LastGood(Generic[T]):
 
 
 class CommandAdmission:
-    """Keeps the last good command in place of one beyond the limits; where a command ends, the arm stays where it is.
+    """Admits commands within the limits; instead of others the last good one is used, or the arm stays where it is.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 class Lasting:
-    """Whether a condition has lasted: some time to begin with, and some time without it to end."""
+    """A condition that starts when it was true for some time, and ends when it was false for some time."""
 
     def __init__(self) -> None:
         self._level, self.is_on = 0.0, False
@@ -43,7 +43,7 @@ class Lasting:
 
 
 class Turns:
-    """How often a signal has turned back by more than a size, within a window; and by how much."""
+    """Counts reversals of a signal that are larger than a size, within a window, and measures them."""
 
     def __init__(self) -> None:
         self._time, self._sense, self._extreme = 0.0, 1, math.nan
@@ -69,7 +69,7 @@ class Turns:
 
 
 class TouchWatch:
-    """Whether something is touched, and whether it was."""
+    """Whether something is touched now, and whether it was before."""
 
     def __init__(self) -> None:
         self.is_there = self.has_been = False
@@ -88,7 +88,7 @@ class TouchWatch:
 
 
 class Oscillation:
-    """Slows the arm down along a force that oscillates, and reports it where that does not help.
+    """Slows the arm along a force that oscillates, and reports the oscillation if that does not help.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Oscillation:
 
 
 class Seen(NamedTuple):
-    """What is seen of a force in a period.
+    """What the watch sees of a force in one period.
 
     Attributes
     ----------
@@ -261,7 +261,7 @@ class ForceWatch:
 
 
 class MotionWatch:
-    """Whether a joint or an axis follows a goal, next to an ideal one with the same speed limit and gain."""
+    """Whether a joint or an axis follows its goal as well as an ideal one with the same speed limit and gain."""
 
     def __init__(self) -> None:
         self._ideal, self._late = math.nan, Lasting()

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class FrictionTrial(NamedTuple):
-    """A loop that is tried.
+    """The loop that is simulated.
 
     Attributes
     ----------

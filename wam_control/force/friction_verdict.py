@@ -25,7 +25,7 @@ class Domain(StrEnum):
 
 
 class PredictedCycle(NamedTuple):
-    """Stiction limit cycle of F_c in which small errors end; zeros where there is no stiction.
+    """Stiction limit cycle of F_c to which small errors lead; zeros without stiction.
 
     `peak_to_peak` N or N m by (5.8), `period` s by (5.9) corrected; `deadband`, half of the first, removes it.
     """

@@ -32,7 +32,7 @@ Triple = tuple[float, float, float]
 
 
 class Supervision:
-    """A parameter set that the guard has let pass; another set needs another object.
+    """A parameter set that the guard has admitted; each set has its own object.
 
     With guard.mode `limit` a set that is not stable is lowered to one that is: the saturation in domain II, else
     the gains.
@@ -138,7 +138,7 @@ class Supervision:
 
 
 class Watch:
-    """Follows the arm and gives the factor of the gains in force.
+    """Follows the arm and gives the factor by which the gains are scaled.
 
     Without scheduling the factor is 1, or less where the parameters would leave their domain.  With it
     the margin stays the one where they were tuned; no factor takes them above `stability_fraction` of it.

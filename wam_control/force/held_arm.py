@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class HeldArm:
-    """Where an arm holds its position while a command is not obeyed.
+    """Position that the arm holds while it does not obey a command.
 
     It goes back there after a push, with no more energy than it may hit something with.
 
@@ -53,7 +53,7 @@ class HeldArm:
 
 
 class PushedArm:
-    """What pushes the arm harder than allowed: it does not move against that, and gives way to it.
+    """A push above the limit: the arm does not move against it, and gives way to it.
 
     Parameters
     ----------

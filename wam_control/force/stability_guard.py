@@ -34,7 +34,7 @@ SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, GUARD.largest_scale, 19).to
 
 @dataclass(frozen=True)
 class GuardParameters:
-    """Assumptions of the guard, and what it does about parameters that are not stable."""
+    """Assumptions of the guard, and its reaction to unstable parameters."""
 
     mode: str = parameter(
         "off: no guard; warn: report; refuse: refuse unstable parameters; limit: lower them, in domain II the "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ForceThresholds:
-    """When a force is touched, kept or reported, and how the arm moves meanwhile."""
+    """When a surface counts as touched, when a force is kept or reported, and how the arm moves meanwhile."""
 
     # measured force
     steady_time: float = 0.1  # s, time constant of the torques that are taken as zero

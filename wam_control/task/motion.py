@@ -76,7 +76,7 @@ def _on(s: float, v: float, a: float, j: float, t: float) -> tuple[float, float,
 
 
 class GoalMotion:
-    """To a posture in a time, along a minimum-jerk path; only its end is promised, so that it has no velocities.
+    """Moves to a posture in a given time, along a minimum-jerk path; without velocities, as only its end is promised.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ BRAKED = (
 
 
 class ScenarioNode:
-    """Streams postures, forces and pushes; requests the driver to enable and to brake.
+    """Streams postures, forces and pushes; releases the brakes and puts them on.
 
     While a request is under way nothing is streamed, so that in lockstep the arm does not move
     until the driver has answered; where it refuses, the scenario has failed and is over.

@@ -23,14 +23,14 @@ class GoalCode(IntEnum):
 
 
 class GoalEnd(NamedTuple):
-    """How a goal ended; the reason is '' where it was reached."""
+    """How a goal ended; the reason is '' if it was reached."""
 
     code: GoalCode
     reason: str
 
 
 class JointTolerance(NamedTuple):
-    """Largest error of a joint, rad and rad/s; 0 for what is usual, below 0 for none."""
+    """Largest error of a joint, rad and rad/s; 0 for the default, below 0 for no limit."""
 
     position: float = 0.0
     velocity: float = 0.0
@@ -115,7 +115,7 @@ class TrajectoryGoal:
 
 
 class TrajectoryPlayer:
-    """Makes postures of trajectories.
+    """Converts trajectories to postures.
 
     Parameters
     ----------

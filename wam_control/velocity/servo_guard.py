@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ServoGuardParameters:
-    """Assumptions about the velocity loop, and what is done about gains that are not stable."""
+    """Assumptions about the velocity loop, and the reaction to unstable gains."""
 
     mode: str = parameter(
         "off: accept any gains; refuse: refuse gains that are not stable or do not hold the arm",

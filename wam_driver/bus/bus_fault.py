@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class BusFault(Enum):
-    """What is wrong, with its sentence, in which the node, and a detail, have a place."""
+    """What is wrong on the bus; the text has fields for the node and a detail."""
 
     # at the start
     NO_SAFETY_MODULE = "motor controllers answer, the safety module, node 10, does not; check the cable to the pendant"
@@ -42,7 +42,7 @@ class BusFault(Enum):
 
 
 class Trouble(Exception):
-    """A fault, of which node it is, and a detail; its text is for people."""
+    """A fault, its node and a detail; its text is for people."""
 
     def __init__(self, fault: BusFault, node: int = 0, detail: object = "") -> None:
         self.fault = fault

@@ -12,7 +12,7 @@ from wam_driver.thresholds import BUS
 
 
 class Cycle:
-    """Torques, positions and modes.
+    """Sends torques and takes positions and modes, in each period.
 
     Parameters
     ----------

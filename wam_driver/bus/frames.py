@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 
 class BusNode(IntEnum):
-    """Nodes that are no motor controllers, which have 1 to 7."""
+    """Nodes other than motor controllers, which have the numbers 1 to 7."""
 
     HOST = 0
     SAFETY_MODULE = 10
@@ -48,7 +48,7 @@ class Frame(NamedTuple):
 
 
 class Value(NamedTuple):
-    """What a node has answered: a property by its number, or, without one, the counts of its motor encoder."""
+    """Answer of a node: a property with its number, or encoder counts without a number."""
 
     node: int
     number: int | None

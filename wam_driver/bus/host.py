@@ -10,7 +10,7 @@ from wam_driver.thresholds import BUS
 
 
 class Host:
-    """One end of a line.
+    """The computer at its end of a line.
 
     Attributes
     ----------

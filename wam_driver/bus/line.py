@@ -89,7 +89,7 @@ def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep:
 
 
 class ServedArm:
-    """A simulated arm that answers on a line, as that to `virtual` or `udp_multicast`, in the time of the line.
+    """A simulated arm on a line such as `virtual` or `udp_multicast`, in the line's time.
 
     Time in which nothing comes from the host is no silence to it, since a computer may hold up the host.
     """

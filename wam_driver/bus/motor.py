@@ -7,7 +7,7 @@ from wam_driver.thresholds import BUS
 
 
 class Motor:
-    """Its angle and velocity, and the current that it is sent.
+    """Angle, velocity and commanded current of one motor.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class SimulatedController:
 
 
 class SimulatedBus:
-    """A line with an arm on it.
+    """A line with a simulated arm.
 
     Parameters
     ----------

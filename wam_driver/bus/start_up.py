@@ -16,7 +16,7 @@ from wam_driver.thresholds import BUS
 
 
 class Wait(Enum):
-    """What the start waits for, in words for the person."""
+    """What the start waits for, as a text for the person at the arm."""
 
     POWER = "nothing answers on the bus: turn on the arm, connect the bus"
     IDLE = "release the E-stop and press Shift-Idle on the pendant"

@@ -55,14 +55,14 @@ def play_case(case: ContactCase) -> ContactScore:
 class ContactStudy(Study[ContactCase, ContactScore]):
     """Scenarios of an arm as stated; and drives of arms and signals with degradations, one at a time and mixed."""
 
-    title: ClassVar[str] = "contact estimation on the whole arm, as its model states it or with degradations"
+    title: ClassVar[str] = "contact estimation on the whole arm, ideal or with degradations"
     page: ClassVar[str] = "docs/contact.md"
 
     contacts: int = option(200, "contacts in motion per seed", 1)
     resting: int = option(30, "contacts at rest per seed", 0)
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
-    degradations: tuple[str, ...] = option((), "of arm and signals", choices=(ALL, *NAMES))
+    degradations: tuple[str, ...] = option((), "degradations of arm and signals", choices=(ALL, *NAMES))
     seconds: float = option(110.0, "length of a recording with degradations", EXTENT.shortest)
 
     def cases(self, seed: int) -> list[ContactCase]:

@@ -62,8 +62,8 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
     seeds: ClassVar[tuple[int, ...]] = (1,)
     over_topics: ClassVar[bool] = True
 
-    kinds: tuple[str, ...] = option(tuple(KINDS), "of faults", choices=tuple(KINDS))
-    trials: int = option(0, "of each kind; 0: those of the page", 0)
+    kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
+    trials: int = option(0, "trials of each kind; 0: as many as on the page", 0)
     short: bool = option(False, "a few trials of each kind, half a minute")
     bag: str = option("bags/sample/wam-touch", "recording that is replayed")
 

@@ -39,8 +39,8 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     seeds: ClassVar[tuple[int, ...]] = (1,)
     count: ClassVar[int | None] = 100
 
-    seconds: float = option(RANGES.seconds, "time of the whole force in each task", 1.0)
-    compare: bool = option(False, "let other controllers do each task, too: four times as long")
+    seconds: float = option(RANGES.seconds, "time at the full force in each task, s", 1.0)
+    compare: bool = option(False, "also run each task with other controllers; takes four times as long")
 
     def cases(self, seed: int) -> Iterator[ForceTaskCase]:
         """Tasks without end."""

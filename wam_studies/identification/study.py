@@ -32,7 +32,7 @@ LIMITS = IdentificationLimits()
 class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     """Every kind of plant with every seed."""
 
-    title: ClassVar[str] = "identified against true friction of many plants"
+    title: ClassVar[str] = "identified and true friction of many plants"
     page: ClassVar[str] = "docs/identify.md"
 
     seconds: float = option(60.0, "length of each motion", 20.0)

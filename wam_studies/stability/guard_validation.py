@@ -80,7 +80,7 @@ def validate(case: NodeSet | TestbedSet) -> ValidationRecord:
 class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
     """Random nodes under random loops, and the testbed with random friction, gain, saturation and delay."""
 
-    title: ClassVar[str] = "verdicts of the stability guard against simulated responses"
+    title: ClassVar[str] = "verdicts of the stability guard compared with simulated responses"
     page: ClassVar[str] = "docs/guard.md"
     seeds: ClassVar[tuple[int, ...]] = (1,)
     base: ClassVar[str] = "testbed"
