@@ -26,6 +26,8 @@ def text(analysis: Analysis, width: int | None = None) -> str:
     wide = min(max(wide, LAYOUT.narrowest), LAYOUT.width)
     lines: list[str] = []
     for section in analysis.sections:
+        if not (section.sentences or section.findings or section.lacking):
+            continue  # the page has charts there
         lines += ["", section.title, "─" * len(section.title)]
         for sentence in section.sentences:
             lines += _wrapped(sentence, wide)
