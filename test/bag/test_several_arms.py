@@ -68,7 +68,7 @@ def test_the_length_is_that_of_the_arm_that_is_analysed(
     bag: Path, chosen: str, length: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     printed, _ = ended(capsys, "analyse", bag, "--namespace", chosen)
-    assert f"{length} of /{chosen}, " in printed
+    assert f"  /{chosen}: {length}." in printed
 
 
 @pytest.mark.parametrize("command", [("replay", "gravity", "--config", "wam"), ("identify",)])
