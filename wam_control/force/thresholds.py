@@ -35,7 +35,7 @@ class ForceThresholds:
     creep: float = 3e-3  # m, least way within the settling time: slower, friction moves the arm in jerks
     rise: float = 6.0  # latencies of the measured force, in which it may rise to the commanded one
     detected: float = 2.0  # latencies of joint sensors, in which a touch is detected at a place that is not known
-    identified_rise: float = 6.0  # s, in which the force may rise at a place that is not known
+    identified_rise: float = 0.3  # s, in which the force may rise at a place that is not known
     finest_motion: float = 1.2e-5  # m, of the arm against its friction: a force is not set more finely
     kept: float = 0.3  # of the tolerance, up to which an error is left alone
     surface_slope: float = 0.01  # of a surface that moves across the force
