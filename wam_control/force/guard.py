@@ -92,7 +92,7 @@ class Supervision:
             ]
         task, found = self._assess(contacts)
         if found.reason and mode == "limit" and found.scale:
-            self.parameters = _accepted(parameters, found)
+            self.parameters = _accepted(parameters, task.law.group, found.stable_error, guard.accepted_scale(found))
             task, found = self._assess(contacts)
         require(not found.reason or mode == "warn", found.reason)
         self.assessment, self.watch = found, Watch(guard, task, found, parameters.schedule == "position")
@@ -269,17 +269,15 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
     return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
 
 
-def _accepted(own: ForceLoopParameters, found: GuardAssessment) -> ForceLoopParameters:
-    """The set that the reason of a refusal advises: a lower saturation in domain II, else lower gains."""
-    group = "torque" if own.mode == "joint_torque" else "force"
+def _accepted(own: ForceLoopParameters, group: str, stable_error: float, scale: float) -> ForceLoopParameters:
+    """The set that the reason of a refusal advises: a lower saturation in domain II, else gains lower by a scale."""
     values: dict[str, Any] = {}
-    if found.stable_error:
+    if stable_error:
         name = f"{group}_error_limit"
-        values[name] = tuple(min(limit, found.stable_error) for limit in getattr(own, name))
+        values[name] = tuple(min(limit, stable_error) for limit in getattr(own, name))
     else:
-        most = (1.0 - GUARD.slack) * own.guard.stability_fraction * found.scale
         for name in (f"{group}_gain", f"{group}_proportional_gain"):
-            values[name] = tuple(most * gain for gain in getattr(own, name))
+            values[name] = tuple(scale * gain for gain in getattr(own, name))
     return replace(own, **values)
 
 

@@ -250,6 +250,10 @@ class StabilityGuard:
         found = GuardAssessment(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
         return found if domain is Domain.I else self._beyond(task, contact, found)
 
+    def accepted_scale(self, found: GuardAssessment) -> float:
+        """Factor of the gains up to which they are accepted as domain I."""
+        return (1.0 - GUARD.slack) * self.parameters.stability_fraction * found.scale
+
     def node(self, task: GuardedTask, contact: GuardedContact, axis: int) -> FrictionNode:
         """The arm as the one friction node of figure 5.4, along the direction or at a joint.
 
@@ -294,7 +298,7 @@ class StabilityGuard:
         found = found._replace(domain=domain, stable_error=error)
         if max(law.error_limit) <= error:
             return found
-        most = (1.0 - GUARD.slack) * share * found.scale
+        most = self.accepted_scale(found)
         allowed = f"{group}_gain up to {listed([rounded_down(most * gain) for gain in law.gain])}"
         if error:
             allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
