@@ -9,8 +9,6 @@ COMMANDED, TRUE, MEASURED, ESTIMATED = "#222222", "#0072b2", "#009e73", "#d55e00
 PREDICTED: Final = "#6b7280"  # by theory
 LIKELY: Final = "#f2a11a"  # where a contact may be
 HAND: Final = "#7a3db8"  # of the user who drags a link
-# outcomes of a trial
-RIGHT, REFUSED, BETWEEN, WRONG = "#4d7c0f", "#9aa3ad", "#a16207", "#be185d"
 INK: Final = "#222222"  # text and axes
 # shafts, axes and other things side by side; none of the meanings above
 SHAFTS: Final = ("#7b3f9e", "#c2410c", "#0f766e", "#a16207", "#be185d", "#4d7c0f", "#475569", "#1d4ed8")

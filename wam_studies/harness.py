@@ -93,9 +93,9 @@ class Study(ABC, Generic[Case, Record]):
     def score(self, records: Sequence[Record]) -> Scores:
         """What follows from the records of all seeds, or of one."""
 
-    def picture(self, records: Sequence[Record], file: Path) -> bool:
-        """Draw the records into a file; False where the study has no picture."""
-        return False
+    def panels(self, records: Sequence[Record]) -> Sequence[Any]:
+        """What is drawn of the records, as `wam_studies.figures.panels.Panel`; none where the study has no picture."""
+        return ()
 
     def failure(self, record: Record) -> str:
         """Why a case is to be looked at; '' where it is as it should be."""

@@ -22,6 +22,7 @@ from wam_studies.contact.outcomes import ContactOutcome, ContactScore, Estimated
 from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
 from wam_studies.contact.simulation import Played, play, score, spans, torques_of
 from wam_studies.contact.study import ContactCase, ContactStudy
+from wam_studies.figures.panels import draw_panels
 from wam_studies.harness import evaluate
 from wam_studies.scores import Interval, events, quantile, rms, share
 
@@ -287,8 +288,8 @@ def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
 @pytest.mark.slow
 def test_the_scores_have_a_picture(tmp_path: Path) -> None:
     scores = synthetic(error=0.025, latency=0.04, right=0.93)
-    assert STUDY.picture(scores, tmp_path / "page" / "benchmark.png")
-    assert (tmp_path / "page" / "benchmark.png").stat().st_size > 20_000
+    draw_panels(STUDY.panels(scores), tmp_path / "benchmark.png", 2)
+    assert (tmp_path / "benchmark.png").stat().st_size > 20_000
 
 
 @pytest.mark.slow

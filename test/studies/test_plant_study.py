@@ -14,22 +14,16 @@ PROMISED = {
     "torque control": 1e-2,  # (6.22) is first order in the strain
     "pretension": 1e-3,
     "ripple": 1e-6,
-    "linear surface": 2e-3,  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
     "hardening surface": 2e-3,
     "impact": 5e-3,  # (3.1) 0.5 %
     "backlash in the loop": 1e-2,
     "backlash in a torque loop": 2e-3,  # a step of the plant is a thousandth of a cycle
-    "cycle by backlash in a torque loop, peak to peak": 2e-2,  # which is half a step of delay
     "sensor noise, 20 000 readings": 2e-2,  # 1/sqrt(2 n) is 0.5 %
     "stiction cycle": 5e-2,  # a step of 0.25 ms lets the motor go on within a slip; zeta 0.05
     "stiction cycle at 0.5 ms": 0.1,
-    "impact on a damped surface": 5e-3,
-    "impact on a damped surface at 0.5 ms": 1e-2,  # a contact begins between two steps
     "terminated cables": 2e-2,  # parts of 0.05 rad of 6 rad
     "gross slip": 1e-6,
     "cover in series": 2e-3,
-    "current loop": 1e-9,
-    "friction of a warm motor": 1e-3,
 }
 
 

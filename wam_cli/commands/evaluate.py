@@ -146,9 +146,14 @@ def _texts(value: Any) -> tuple[str, ...]:
 
 def _write(given: argparse.Namespace, measured: Measurement) -> None:
     """Write the section, and the picture into a folder of the page's name."""
-    page, study = Path(given.write), measured.study
-    picture = page.with_suffix("") / f"{given.part}.png"
-    shown = f"{picture.parent.name}/{picture.name}" if study.picture(measured.total, picture) else ""
+    page, study, shown = Path(given.write), measured.study, ""
+    if panels := study.panels(measured.total):
+        from wam_studies.figures.panels import draw_panels  # matplotlib is slow to import
+
+        picture = page.with_suffix("") / f"{given.part}.png"
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        draw_panels(panels, picture, 2)
+        shown = f"{picture.parent.name}/{picture.name}"
     repeats = _words(given, study)
     numbers = " ".join(map(str, given.seeds))
     command = f"{repeats} --seeds {numbers}" + (f" --cases {given.cases}" if given.cases else "") + f" --write {page}"

@@ -2,8 +2,7 @@
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from wam_description.configuration import Configuration
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
@@ -108,14 +107,11 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         """Why a case ended early."""
         return record.failure
 
-    def picture(self, records: Sequence[ContactScore], file: Path) -> bool:
+    def panels(self, records: Sequence[ContactScore]) -> Sequence[Any]:
         """Position errors and calibration on the arm as stated."""
         from wam_studies.contact.picture import panels_of  # matplotlib is slow to import
-        from wam_studies.figures.panels import draw_panels
 
-        file.parent.mkdir(parents=True, exist_ok=True)
-        draw_panels(panels_of(_of_both(records)[0], self.configuration.shared.arm), file, 2)
-        return True
+        return panels_of(_of_both(records)[0], self.configuration.shared.arm)
 
 
 def _of_both(records: Sequence[ContactScore]) -> tuple[list[ContactScore], list[ContactScore]]:

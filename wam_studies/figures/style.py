@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from wam_analysis.drawing import SHAFTS, STYLE, WRONG
+from wam_analysis.drawing import SHAFTS, STYLE
 
-GREY, UNSTABLE = "#777777", WRONG
+GREY = "#777777"
 SHADES = (*SHAFTS[1:5], SHAFTS[0])
 DPI = 200
 

@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
-from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from wam_studies.force_benchmark.groupings import (
     FEEDBACK,
@@ -69,12 +68,11 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
         kinds = " and ".join(_kinds(record))
         return f"{kinds}: {', '.join(what)}, {_numbers(record)}" if kinds else ""
 
-    def picture(self, records: Sequence[ForceTrial], file: Path) -> bool:
-        """True against commanded force, outcomes by class, peaks."""
-        from wam_studies.force_benchmark.picture import draw as draw_picture  # matplotlib is slow to import
+    def panels(self, records: Sequence[ForceTrial]) -> Sequence[Any]:
+        """True force over the commanded one by outcome, and peaks over stiffness."""
+        from wam_studies.force_benchmark.picture import panels_of  # matplotlib is slow to import
 
-        draw_picture(records, file)
-        return True
+        return panels_of(records)
 
     def details(self, record: ForceTrial) -> str:
         """A task and its result in full."""

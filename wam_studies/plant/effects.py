@@ -211,7 +211,8 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
     """
     depths = np.linspace(1e-4, 0.01, 25)
     below = 0.01  # m below the link, which then touches with its tip only
-    floor = _floor(below, 4e3, 0.0, hardening)
+    law = (4e3,), (0.0,), (hardening,), (0.0,)
+    floor = Obstacles(("floor",), ("plane",), (0.0, 0.0, -0.0254 - below), (0.0,) * 3, (2.0, 2.0, 0.0), *law)
     plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS, cover_stiffness=cover))
     forces = []
     for depth in depths:
@@ -221,13 +222,6 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
         (load,) = plant.loads()
         forces.append(float(np.linalg.norm(load.force)))
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
-
-
-def _floor(below: float, stiffness: float, damping: float, hardening: float) -> Obstacles:
-    """A plane this far below the link, m."""
-    position = (0.0, 0.0, -0.0254 - below)
-    law = (stiffness,), (damping,), (hardening,), (0.0,)
-    return Obstacles(("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), *law)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
@@ -334,33 +328,6 @@ def stiction_cycle(step: float = RUN_STEP) -> PlantCurve:
     return level(float(np.ptp(found.force[late])), float(np.ptp(exact.contact_force[late])))
 
 
-def damped_impact(step: float = RUN_STEP, damping: float = 20.0) -> PlantCurve:
-    """Greatest force of a tip that runs into a damped surface at 0.5 rad/s, over its stiffness, N/m, at a step, s.
-
-    The force of m x'' + b x' + k x = 0 with the mass m of (3.1); the cable is so long that the rotor has no effect.
-    """
-    arm, stiffness, below = ideal_testbed(), np.array([1e3, 4e3, 1.6e4]), 0.01
-    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
-    speed, mass, found, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, [], []
-    for k in stiffness.tolist():
-        floor = _floor(below, k, damping, 0.0)
-        plant = released_plant(arm, World(floor, NO_SPRINGS), step)
-        q = -float(np.arcsin(below / LEVER))
-        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), (-7.0, -0.5)
-        natural, decay = float(np.sqrt(k / mass)), damping / (2.0 * mass)
-        times = np.arange(0.0, np.pi / natural, 0.1 * step)
-        swing = np.sqrt(natural**2 - decay**2)
-        x = speed / swing * np.exp(-decay * times) * np.sin(swing * times)
-        v = speed * np.exp(-decay * times) * (np.cos(swing * times) - decay / swing * np.sin(swing * times))
-        expected.append(float((k * x + damping * v).max()))
-        forces = []
-        for _ in range(round(np.pi / natural / step)):
-            plant.step([0.0])
-            forces += [float(np.linalg.norm(load.force)) for load in plant.loads()]
-        found.append(max(forces))
-    return PlantCurve(stiffness, np.array(found), np.array(expected))
-
-
 def pretension(coefficient: float = 1e-4) -> PlantCurve:
     """Breakaway torque of the motor over the pretension, N m over N: what active pretension would lower, (6.5)."""
     arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
@@ -371,3 +338,38 @@ def pretension(coefficient: float = 1e-4) -> PlantCurve:
         plant = released_plant(less, tension_friction=(coefficient,))
         found.append(breakaway(plant, 0.9 * coefficient * 2.0 * value))
     return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)
+
+
+def terminated_creep() -> PlantCurve:
+    """Creep, rad, over the motor's travel, rad, out and back twice: half of (6.19) on the first way, then no more."""
+    found = creep_out_and_back(seconds=6.0, rounds=2, terminated=True)
+    first = found.x <= found.x[-1] / 4.0
+    return found._replace(theory=0.5 * np.minimum(found.theory, found.theory[first][-1]))
+
+
+def gross_slip(wrap: float = 3.0 * np.pi, friction: float = 0.2) -> PlantCurve:
+    """Torque of the motor on a link that does not move, N m, over its angle times k_tr, N m; (6.16).
+
+    Parameters
+    ----------
+    wrap : of the cable on the pinion, rad.
+    friction : its coefficient.
+    """
+    arm = ideal_testbed(rotor=IMMOVABLE, friction=(1e4, 1e4))
+    (circuit,) = arm.circuits
+    plant, speed = released_plant(arm, capstan=wrap * friction), 1.0
+    most = 2.0 * circuit.pretension * circuit.radius * float(np.tanh(0.5 * wrap * friction))
+    plant.data.qvel[0] = speed
+    wanted, found = [], []
+    for _ in range(round(1.5 * most / circuit.stiffness / speed / STEP)):
+        wanted.append(circuit.stiffness * plant.theta[0])
+        plant.step([0.0])
+        found.append(plant.circuit_torque[0])
+    expected = np.array(wanted)
+    return PlantCurve(expected, np.array(found), np.minimum(expected, most))
+
+
+def soft_cover(cover: float = 2000.0) -> PlantCurve:
+    """Force, N, over depth, m, of a surface of 4000 N/m under a cover of this stiffness, N/m, in series (1.1.1)."""
+    found = surface(0.0, cover)
+    return found._replace(theory=found.theory / (1.0 + 4000.0 / cover))
