@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -26,6 +25,7 @@ from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import Request, refusal_of, service_request
 from wam_ros.run import Closing, Connection
+from wam_ros.tolerance import LeavingNode
 from wam_ros.topics import NAMESPACE, listening, qos
 from wam_ros.wire import decoder, deserialized, encoder, stamp_of
 
@@ -73,7 +73,7 @@ class StackClient(Closing):
     ) -> None:
         self.connection = connection or Connection()
         self._is_own = connection is None
-        self.node = self.connection.add(Node(name, context=self.connection.context, namespace=namespace))
+        self.node = self.connection.add(LeavingNode(name, context=self.connection.context, namespace=namespace))
         self.statuses: dict[str, NodeStatus] = {}
         self.shared: Any = shared
         self.topics = Interface(shared).topics if shared else BY_NAME
@@ -372,7 +372,7 @@ class StackClient(Closing):
 
 def run_next_to(
     namespace: str,
-    make: Callable[[Any, Shared], Node],
+    make: Callable[[Any, Shared], Any],
     until: Callable[[], bool],
     between: Callable[[Any], object] = lambda node: None,
 ) -> None:

@@ -22,7 +22,16 @@ from wam_ros.process_signals import leaving
 _READABLE: Final = frozenset(kind.value for kind in Parameter.Type)
 
 
-class TolerantNode(Node):
+class LeavingNode(Node):
+    """Leaves the network within the time of `leaving`."""
+
+    def destroy_node(self) -> None:
+        """As that of rclpy."""
+        with leaving(self.context):
+            super().destroy_node()
+
+
+class TolerantNode(LeavingNode):
     """Callbacks that raise are reported, once a second at most, and the node goes on.
 
     A node that ends at an exception leaves the arm enabled until a watchdog sees it, and anybody could end it who
@@ -41,8 +50,7 @@ class TolerantNode(Node):
     def destroy_node(self) -> None:
         """As that of rclpy; what the executor still has for this node is of no use any more."""
         self._has_ended = True
-        with leaving(self.context):
-            super().destroy_node()
+        super().destroy_node()
 
     def take_fault(self, reason: str) -> None:
         """Report a fault of this node; '' where it is over."""

@@ -270,7 +270,7 @@ def bring_up():
 enable.wait_for_service(60.0)
 bring_up()
 spin(60.0, lambda: seen["mode"] == "fault")
-spin(0.2)
+spin(20.0, lambda: seen["zero"] > seen["flow"])
 print(f"{seen['mode']} {seen['zero'] > seen['flow']} {seen['fault']}", flush=True)
 sys.stdin.readline()
 flowed = seen["flow"]

@@ -25,6 +25,7 @@ from wam_live.push import push
 from wam_ros.client import START, Reply, StackClient
 from wam_ros.limits import CALL_LIMITS
 from wam_ros.messages import plain
+from wam_ros.process_signals import bound_leaving
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "enable": ("release the brakes", (Call("driver", "enable", True),)),
@@ -86,10 +87,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Make the request and print its answer."""
     others = {"get": _get, "set": _set, "echo": _echo, "push": _push}
+    failure = ""
     with StackClient(given.namespace) as stack:
-        if given.request in others:
-            return others[given.request](given, stack)
-        return _stated(list(map(stack.request, SERVICES[given.request][1])))
+        bound_leaving(stack.connection.context, lambda: failure)
+        try:
+            if given.request in others:
+                return others[given.request](given, stack)
+            return _stated(list(map(stack.request, SERVICES[given.request][1])))
+        except Exception as error:
+            failure = str(error)
+            raise
 
 
 def _stated(replies: Sequence[Reply]) -> int:
