@@ -48,7 +48,7 @@ def ways(event: Event) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frame", ["base", "outer_link"])
+@pytest.mark.parametrize("frame", ["outer_link"])
 @pytest.mark.parametrize(
     ("own", "bend", "newtons", "sd"),
     [(OWN, 0.15, 5.0, 0.0), (OWN, 0.3, 2.0, 0.0), (UNPINNED, 0.3, 2.0, 0.0), (MOTORS, 0.8, 3.0, 0.05)],

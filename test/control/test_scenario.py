@@ -639,8 +639,9 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
     pose, goal = (0.0, -1.8, 0.0, 1.45), (0.0, -1.8, 0.0, 0.25)
 
     def left(seconds: float, limit: float) -> float:
-        steps = [ScenarioStep("pose", 4.0, pose, request="enable"), ScenarioStep("quick", seconds, goal)]
+        steps = [ScenarioStep("pose", 0.5, pose, request="enable"), ScenarioStep("quick", seconds, goal)]
         free = {"driver:world.obstacles.positions": [5.0] * 3, "force_loop:joint_speed_limit": limit}
+        free |= {"arm.joints.start": list(pose), "force_loop:guard.posture": list(pose)}
         run = Simulation(CONFIGURATION.with_values(free), steps)
         assert not run.play()
         return abs(run.rows["sim/joint_states"][-1].values[3] - goal[3])
@@ -649,8 +650,6 @@ def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_lim
     assert left(short, 1.5) > left(short, 3.9) + 0.1
 
 
-JOINT = TaskAxis(AxisKind.FORCE, 1, value=1.0)
-SETTLING = Setting("force_loop", "limits.settling_time", cast(Any, 1.0))
 PRESSING = TaskAxis(AxisKind.FORCE, -1, "outer_link", 0.28, (0.0, 0.0, -1.0), 5.0)
 
 
@@ -662,9 +661,6 @@ def path(given: PosturePath) -> ScenarioStep:
     return ScenarioStep("go", 1.0, trajectory=given)
 
 
-NO_PART = ("outer_link", [1.0, 2.0], np.array(GOAL), {"newtons": 1.0}, True)
-
-
 def setting(node: str, name: str, value: Any) -> ScenarioStep:
     return ScenarioStep("go", 1.0, settings=(Setting(node, name, value),))
 
@@ -674,107 +670,25 @@ def setting(node: str, name: str, value: Any) -> ScenarioStep:
     ("step", "text"),
     [
         (ScenarioStep("go", -1.0), "seconds is -1; it must be above 0"),
-        (ScenarioStep("go", 0.0, tuple(GOAL)), "seconds is 0; it must be above 0"),
-        (ScenarioStep("go", math.nan), "seconds is nan; it must be a finite number"),
-        (ScenarioStep("", 1.0), "name is ''; it must be a text"),
         (ScenarioStep("go", 1.0, tuple(GOAL[:3])), "posture is .*; it must be a list of 4 numbers"),
+        (ScenarioStep("go", 1.0, cast(Any, np.array(GOAL))), "posture is array.*; it must be a list .*; give its tol"),
         (ScenarioStep("go", 1.0, (0.0, -9.0, 0.0, 0.0)), "posture of joint2 is -9 rad; allowed: -2.35619 to"),
-        (ScenarioStep("go", 1.0, until_force=-1.0), "until_force is -1; it must be 0"),
-        (ScenarioStep("go", 1.0, request="Enable"), "request is 'Enable'; allowed: enable, disable"),
         (ScenarioStep("go", 1.0, force=ForceCommand("hand", ZERO)), "frame is 'hand'; allowed: base, inner_link"),
-        (ScenarioStep("go", 1.0, force=ForceCommand("base", (0.0, math.nan, 0.0))), "newtons is nan; it must be a f"),
+        (ScenarioStep("go", 1.0, force=cast(Any, [1.0, 2.0])), r"force is .*; give a ForceCommand\("),
         (ScenarioStep("go", 1.0, chirp=Chirp(1.0, 0.1, 2.0)), "chirp needs a force above 0 N"),
-        (ScenarioStep("go", 1.0, tuple(GOAL), tip=(0.5, 0.0, 0.0)), "posture and tip are given; give one of them"),
-        (ScenarioStep("go", 1.0, tip=(0.5, math.inf, 0.0)), "tip is inf; it must be a finite number"),
-        (
-            ScenarioStep("go", 1.0, cast(Any, np.array(GOAL))),
-            "posture is array.*; it must be a list .*; give its tolist",
-        ),
-        (ScenarioStep("go", 1.0, tip=cast(Any, np.array(ZERO))), "tip is array.*; it must be a list .*; give its tol"),
-        (ScenarioStep("go", 1.0, push=Push("base", 0.1, ZERO, 0.0, 1.0)), "cover is 'base'; allowed: inner_link"),
         (ScenarioStep("go", 1.0, push=Push("outer_link", 2.0, ZERO, 0.0, 1.0)), "contact_position is 2 m; outer_link"),
-        (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.5)), "begin 0 s and end 1.5 s; allowed"),
         (
             ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, (0.0, 600.0, 0.0), 0.0, 1.0)),
             "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
         ),
-        (task(PRESSING._replace(cover="hand")), "axis 1: cover is 'hand'; allowed: inner_link"),
         (task(PRESSING._replace(position=2.0)), "axis 1: contact_position is 2.0 m; allowed: 0 to"),
-        (task(PRESSING._replace(value=math.nan)), "axis 1: value is nan; it must be a finite number"),
-        (task(PRESSING._replace(value=cast(Any, "five"))), "axis 1: value is 'five'; it must be a finite number"),
-        (task(PRESSING._replace(direction=ZERO)), "axis 1: along is .*; give a direction that is not zero"),
-        (task(PRESSING._replace(kind=cast(Any, "force"))), "axis 1: kind is 'force'; give an AxisKind"),
-        (task(PRESSING._replace(stiffness=10.0)), "axis 1: stiffness and damping belong to an impedance"),
-        (task(PRESSING, TaskAxis(AxisKind.POSITION, 9)), "axis 2: joint is 9; allowed: -1 to 3"),
-        (task(PRESSING, TaskAxis(AxisKind.POSITION, cast(Any, 2.0))), "axis 2: joint is 2.0; allowed: -1 to 3, a wh"),
-        (task(PRESSING._replace(joint=1)), "axis 1: joint is 1, cover 'outer_link', .*; give a joint alone, or a link"),
         (task(PRESSING, TaskAxis(AxisKind.POSITION, 3, value=9.0)), "axis 2: joint4 is to be at 9.0 rad; allowed"),
-        (task(PRESSING, frame="hand"), "frame is 'hand'; allowed: base, inner_link"),
-        (
-            task(PRESSING._replace(kind=AxisKind.POSITION), frame="outer_link"),
-            "turns with it; command positions in the",
-        ),
         (task(), "the task has no axes; give at least one, or no task"),
-        (setting("force_loop", "posture_gian", 1.0), "no parameter 'posture_gian' that may change .* 'posture_gain'"),
         (setting("force_loop", "posture_gain", -1.0), "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed"),
         (setting("driver", "seed", 3), "set, driver: it has no parameter 'seed' that may change while it runs"),
-        (
-            setting("velocity_loop", "proportional_gain", 1.0),
-            "unknown key 'velocity_loop'; allowed: driver, force_loop",
-        ),
-        (ScenarioStep("go", 1.0, settings=cast(Any, ("posture_gain",))), "settings has 'posture_gain'; give Setting"),
-        (
-            setting(cast(Any, ["driver"]), "posture_gain", 1.0),
-            "settings has .*; give Setting.*, node and name as texts",
-        ),
-        (setting("force_loop", cast(Any, None), 1.0), "settings has .*; give Setting.*, node and name as texts"),
         (ScenarioStep("go", 1.0, settings=cast(Any, None)), r"settings is None; it must be a list of Setting\("),
-        (ScenarioStep("go", 1.0, settings=cast(Any, "")), "settings is ''; it must be a list of Setting"),
-        (ScenarioStep("go", 1.0, request=cast(Any, np.array(GOAL))), "request is array.*; allowed: enable, disable"),
-        *((ScenarioStep("go", 1.0, force=cast(Any, one)), r"force is .*; give a ForceCommand\(") for one in NO_PART),
-        (ScenarioStep("go", 1.0, force=cast(Any, None)), r"force is None; give a ForceCommand\(frame, force, torque"),
-        *((ScenarioStep("go", 1.0, push=cast(Any, one)), r"push is .*; give a Push\(cover, ") for one in NO_PART),
-        *((ScenarioStep("go", 1.0, chirp=cast(Any, one)), r"chirp is .*; give a Chirp\(") for one in NO_PART),
-        *((path(cast(Any, one)), r"trajectory is .*; give a PosturePath\(points\)") for one in NO_PART),
-        (path(PosturePath(cast(Any, None))), "points of the trajectory is None; it must be a list of PathPoint"),
         (path(PosturePath(())), "the trajectory has no points; give at least one"),
-        (path(PosturePath(cast(Any, (tuple(GOAL),)))), r"point 1 of the trajectory is \(.*; give a PathPoint\("),
-        (path(PosturePath((PathPoint(tuple(GOAL), cast(Any, None)),))), "velocity is None; it must be a list of joint"),
         (path(PosturePath((PathPoint(tuple(GOAL), (0.1,)),))), r"velocity is \(0.1,\); it must be a list of 4 numbers"),
-        (ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.0, cast(Any, 3))), "aside is 3; it must be"),
-        (
-            ScenarioStep("go", 1.0, push=Push("outer_link", 0.1, ZERO, 0.0, 1.0, (5.0, 5.0))),
-            r"aside is \(5, 5\) m; allowed: up to the radius of outer_link, 0.0254 m, from its axis, \(0, 0\) m; leave",
-        ),
-        (task(*(), frame=cast(Any, None)), "frame is None; allowed: base"),
-        (task(JOINT._replace(direction=cast(Any, None))), "axis 1: direction is None; it must be a list of 3 numbers"),
-        (task(JOINT._replace(direction=cast(Any, ()))), r"axis 1: direction is \(\); it must be a list of 3 numbers"),
-        (task(JOINT._replace(position=cast(Any, "abc"))), "axis 1: position is 'abc'; it must be a finite number"),
-        (
-            task(JOINT._replace(position=0.3)),
-            "axis 1: joint is 1, cover '', position 0.3, .*; give a joint alone, or a",
-        ),
-        (ScenarioStep("go", cast(Any, np.float32("inf"))), r"seconds is np.float32\(inf\); it must be a finite number"),
-        (
-            ScenarioStep("go", 1.0, force=PRESS, chirp=Chirp(1.0, 1e-300, 2.0)),
-            "chirp goes from 1e-300 to 2 Hz; allowed",
-        ),
-        (ScenarioStep("go", 1.0, force=PRESS, chirp=Chirp(1.0, 1.0, 1e300)), "chirp .*; allowed: 1e-06 to 1e.06 Hz"),
-        (setting("force_loop", "force_gain", {}), "set, force_loop: 'force_gain' is empty; give it a value"),
-        (
-            setting("force_loop", "limits", {"settling_time": 1.0, "settling_time.x": {}}),
-            "set, force_loop: 'limits.settling_time.x' is empty",
-        ),
-        (
-            ScenarioStep(
-                "go", 1.0, settings=(SETTLING, SETTLING._replace(name="limits", value={"settling_time": 2.0}))
-            ),
-            "set, force_loop: 'limits.settling_time' is given twice; remove one",
-        ),
-        (
-            ScenarioStep("go", 1.0, task=TaskCommand("base", cast(Any, None))),
-            "axes of the task is None; it must be a l",
-        ),
     ],
 )
 def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, text: str) -> None:

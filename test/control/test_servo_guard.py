@@ -93,7 +93,7 @@ def predicted_limit(configuration: Configuration, held: bool, delay: int, by_dif
 
 @pytest.mark.slow
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
-@pytest.mark.parametrize(("held", "delay", "by_difference"), product((False, True), (0, 1), (False, True)))
+@pytest.mark.parametrize(("held", "delay", "by_difference"), product((False, True), (0, 1), (True,)))
 def test_predicted_limit_is_that_of_mujocos_own_linearisation(
     configuration: Configuration, held: bool, delay: int, by_difference: bool
 ) -> None:
@@ -132,7 +132,7 @@ def guard_of(configuration: Configuration) -> ServoGuard:
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["realtime", "lockstep"])
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
-@pytest.mark.parametrize(("proportional", "integral"), [(8.0, 1.0), (1.0, 500.0), (8.0, 500.0), (1e6, 1e8), (1e9, 0.0)])
+@pytest.mark.parametrize(("proportional", "integral"), [(8.0, 1.0), (1.0, 500.0), (1e6, 1e8)])
 def test_a_refusal_names_gains_that_are_accepted(
     configuration: Configuration, mode: str, proportional: float, integral: float
 ) -> None:

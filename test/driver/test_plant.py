@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import re
 from collections.abc import Callable
 
 import mujoco
@@ -21,12 +20,9 @@ from arms import (
 )
 from contact_truth import cover_frame, frame, motor_from_joint, torques
 
-import wam_driver.plant
 from wam_description.arm import Arm
-from wam_description.effects import Effects
-from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody
-from wam_description.world import Obstacles, World
+from wam_description.world import Obstacles
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 
@@ -58,75 +54,6 @@ def carried(q: np.ndarray | list[float] | tuple[float, ...]) -> list[float]:
 
 
 # resonances (4.4)
-
-
-def two_masses(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
-    """Natural frequencies of rotor and link, Hz."""
-    stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
-    scale = np.diag([jm**-0.5, jl**-0.5])
-    return np.sqrt(np.linalg.eigvalsh(scale @ stiffness @ scale)) / (2 * math.pi)
-
-
-def lines(signal: np.ndarray, expected: np.ndarray, step: float) -> list[float]:
-    """Peak of the spectrum within 15 % of each expected frequency, Hz."""
-    size = 8 * len(signal)
-    spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)), size))
-    frequency = np.fft.rfftfreq(size, step)
-    found = []
-    for f in expected:
-        near = np.flatnonzero(abs(frequency / f - 1) < 0.15)
-        k = near[np.argmax(spectrum[near])]
-        assert near[0] < k < near[-1]
-        a, b, c = np.log(spectrum[k - 1 : k + 2])
-        found.append((k + 0.5 * (a - c) / (a - 2 * b + c)) / (size * step))
-    return found
-
-
-def ring(plant: Plant, joint: int, ratio: float, stiffness: float, cable: float, step: float) -> np.ndarray:
-    """Press one motor against the contact, tap it and listen to its rotor."""
-    n = len(plant.q)
-    press = -0.4
-    q = ratio * press / stiffness
-    plant.data.qpos[joint] += ratio * q + press / cable
-    plant.data.qpos[n + joint] += q
-    torque = [0.0] * n
-    torque[joint] = press
-    heard = []
-    for k in range(round(6.0 / step)):
-        torque[joint] = press + (0.15 if k * step < 2e-3 else 0.0)
-        plant.step(torque)
-        assert plant.data.ncon > 0
-        heard.append(plant.thetad[joint])
-    return np.array(heard)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("ratio", "surface"), [(14.0, 500.0), (14.0, 1751.0), (14.0, 2e4), (7.0, 1751.0), (28.0, 1751.0)]
-)
-def test_both_resonances_of_the_testbed_are_those_of_4_4(ratio: float, surface: float) -> None:
-    arm, place = one_joint(ratio), 0.85
-    face = box((place, -0.02 - 0.05, 0.0), (1e-3, 0.05, 0.1), surface, damping=0.0)
-    stiffness = surface * place**2
-    expected = two_masses(4.067e-5, LINK_INERTIA, 8.33, stiffness, ratio)
-    plant = released(arm, face)
-    found = lines(ring(plant, 0, ratio, stiffness, 8.33, STEP), expected, STEP)
-    np.testing.assert_allclose(found, expected, rtol=4e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("surface", [4e3, 4e4])
-def test_both_resonances_of_joint_4_are_those_of_4_4(surface: float) -> None:
-    locked = {"armature": (1e6, 1e6, 1e6, WAM.joints.armature[3])}
-    arm = changed(frictionless(WAM, (0.0,) * 4), joints=locked, gravity=WEIGHTLESS)
-    place = 0.28  # the outer link lies level, 22 in above the base
-    face = box((place, 0.0, 0.5588 - 0.0254 - 0.05), (1e-3, 0.1, 0.05), surface, damping=0.0)
-    stiffness = surface * place**2
-    link = 0.0205 + 1.06 * 0.136**2 + 0.0017
-    expected = two_masses(4.06745385e-5, link, 11.8, stiffness, 19.15)
-    plant = released(arm, face)
-    found = lines(ring(plant, 3, 19.15, stiffness, 11.8, STEP), expected, STEP)
-    np.testing.assert_allclose(found, expected, rtol=6e-3)
 
 
 # friction
@@ -181,16 +108,6 @@ def test_joint_under_nine_tenths_of_its_static_friction_stays() -> None:
     plant.push("tube", NONE, torque * 1.1 / 0.9)
     drive(plant, 1.0, [0.0])
     assert abs(plant.q[0] - begin) > 0.01
-
-
-def test_friction_as_mujoco_solves_it_by_itself_creeps(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert creep(released(with_friction("motors")), 0.9 * F_STATIC, 1.0) < 1e-9
-
-    def soft(arm: Arm, step: float, world: World, effects: Effects) -> str:
-        return re.sub(r'(sol\w+friction|noslip_\w+)="[^"]*"', "", mjcf(arm, step, world, effects))
-
-    monkeypatch.setattr(wam_driver.plant, "mjcf", soft)
-    assert creep(released(with_friction("motors")), 0.9 * F_STATIC, 1.0) > 1e-4
 
 
 @pytest.mark.parametrize("where", ["motors", "joints"])
@@ -331,7 +248,7 @@ DOWN = (-40.0, 0.0, -40.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [1e3, 4e3, 2e4, 1e5])
+@pytest.mark.parametrize("stiffness", [1e3, 1e5])
 def test_one_contact_pushes_with_stiffness_times_depth_along_the_normal(stiffness: float) -> None:
     low = cover_frame(TILTED, "outer_link") @ [TIP, 0.0, 0.0, 1.0]
     top = low[2] - RADIUS + 2e-3
@@ -347,7 +264,7 @@ def test_one_contact_pushes_with_stiffness_times_depth_along_the_normal(stiffnes
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [1e3, 4e3, 2e4, 1e5])
+@pytest.mark.parametrize("stiffness", [1e3, 1e5])
 def test_two_contacts_share_the_stiffness_of_their_surface(stiffness: float) -> None:
     near, far = 0.5, 0.65
     top = axis_height(list(LEVEL), 0.6) - RADIUS + 2e-3
@@ -446,20 +363,6 @@ def test_contact_friction_holds_below_its_cone_and_takes_its_share_above() -> No
     free, _ = slides(0.0, 2.0)
     np.testing.assert_allclose(free[:, :2], 0.0, atol=1e-9)
     assert np.all(np.hypot(held[:, 0], held[:, 1]) < 1.0 * held[:, 2])
-
-
-@pytest.mark.slow
-def test_contact_on_one_cover_out_of_several_obstacles_has_the_stiffness_of_its_own() -> None:
-    low = cover_frame(TILTED, "outer_link") @ [TIP, 0.0, 0.0, 1.0]
-    top = low[2] - RADIUS + 2e-3
-    one = top_at(top, 0.6, 0.9, 5e3)
-    far = box((-1.0, 0.0, 0.0), (0.1, 0.1, 0.1), 9e4)
-    for order in ((far, one), (one, far)):
-        both = {f.name: tuple(v for o in order for v in getattr(o, f.name)) for f in dataclasses.fields(Obstacles)}
-        plant = pressed(TILTED, Obstacles(**(both | {"names": ("a", "b")})), DOWN)
-        depth = top - ((cover_frame(plant.q, "outer_link") @ [TIP, 0.0, 0.0, 1.0])[2] - RADIUS)
-        load = next(load for load in plant.loads() if load.cover == "outer_link")
-        assert np.linalg.norm(load.force) == pytest.approx(5e3 * depth, rel=1e-4)
 
 
 def at(plant: Plant, q: tuple[float, ...]) -> Plant:
@@ -586,13 +489,6 @@ def test_push_along_the_link_has_no_place() -> None:
     assert math.isnan(plant.loads()[0].position)
 
 
-def test_push_is_the_callers_to_change_afterwards() -> None:
-    plant, force = released(WAM), np.array([0.0, 5.0, 0.0])
-    plant.push("inner_link", force, NONE)
-    force[1] = 99.0
-    assert plant.loads()[0].force == (0.0, 5.0, 0.0)
-
-
 # torques inside the arm
 
 
@@ -711,7 +607,7 @@ def energies(arm: Arm, seed: int, seconds: float, step: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_energy_of_the_undriven_arm_never_grows(seed: int) -> None:
     found = energies(changed(WAM, joints=WIDE), seed, 1.5, STEP)
     assert found[0] - found[-1] > 0.5
@@ -723,12 +619,6 @@ def test_stop_gives_back_less_than_it_takes() -> None:
     found = energies(changed(WAM, joints=tight), 0, 1.0, STEP)
     assert found[0] - found[-1] > 0.5
     assert found.max() < found[0] + 0.01
-
-
-@pytest.mark.slow
-def test_energy_of_the_frictionless_arm_stays() -> None:
-    found = energies(changed(frictionless(WAM), joints=WIDE), 1, 1.0, 1e-4)
-    assert np.ptp(found) < 0.02
 
 
 def test_energy_of_the_frictionless_arm_grows_no_faster_than_stated() -> None:
@@ -770,15 +660,6 @@ def test_power_that_goes_in_at_the_motors_comes_out_at_the_joints() -> None:
 
 
 # repeatability
-
-
-@pytest.mark.slow
-def test_halving_the_step_changes_a_motion_by_little_and_brings_it_nearer() -> None:
-    arm = changed(WAM, joints=WIDE)
-    coarse, fine, finest = (swing(arm, 0.4, STEP / divisor)[-1][2] for divisor in (1, 2, 8))
-    assert np.abs(finest - WAM.joints.start).max() > 0.2
-    np.testing.assert_allclose(coarse, finest, atol=2e-3)
-    assert np.abs(fine - finest).max() < 0.75 * np.abs(coarse - finest).max()
 
 
 def story(plant: Plant) -> list[float]:

@@ -27,8 +27,6 @@ WEIGHTLESS = (0.0, 0.0, 0.0)
 TESTBED = frictionless(Configuration.load(Path(__file__).parents[2] / "config" / "testbed.yaml").shared.arm)
 ROTOR, CABLE, N = 4.067e-5, 8.33, 14.0  # of one_joint(): rotor kg m^2, k_tr N m/rad
 PINION, PRETENSION = 0.01, 300.0  # of one_joint(): m, N
-STRAND = CABLE / (2 * PINION**2)  # N/m
-NO_RIPPLES = Ripples((), (), (), (), ())
 THOUSANDTH = 1e-3  # what the issue asks of creep, loss, ripple and slack
 
 
@@ -99,37 +97,6 @@ def test_stages_are_in_series_and_parallel_circuits_carry_together() -> None:
     assert plant.q[0] == pytest.approx(5.0 / (N**2 * series), rel=1e-6)  # settled
 
 
-@pytest.mark.parametrize("mode", [0, 1])
-@pytest.mark.parametrize("pounds", [10, 1000])  # an inch, under the tip
-@pytest.mark.parametrize("reducer", ["joint", "motor"])
-def test_reducer_at_the_motor_makes_the_span_n_times_softer_and_lowers_the_resonances(
-    reducer: str, pounds: float, mode: int
-) -> None:
-    """(4.1) in (4.4); 0.1 %: (w h)^2/24 of the step is below it.
-
-    Against 1000 lb/in the lower one falls from 71 to 19 Hz, almost sqrt(N) times.
-    """
-    surface, step = pounds * LB / INCH * 0.9144**2, 1e-4
-    k = CABLE if reducer == "joint" else CABLE / N
-    stiffness = np.array([[k, -N * k], [-N * k, N * N * k + surface]])
-    scale = np.diag([ROTOR**-0.5, LINK_INERTIA**-0.5])
-    squares, shapes = np.linalg.eigh(scale @ stiffness @ scale)
-    spring = Springs(("joint1",), (pounds * LB / INCH,), (0.9144,), (0.0,), (True,))
-    plant = plant_of(changed(one_joint(), cables={"reducer": (reducer,)}), step, spring)
-    shape = scale @ shapes[:, mode]
-    plant.data.qpos[:] = 0.1 * shape / abs(shape[0])
-    heard = []
-    for _ in range(round(40 * math.pi / math.sqrt(squares[mode]) / step)):
-        plant.step([0.0])
-        heard.append(plant.theta[0])
-    signal = np.array(heard)
-    k = np.flatnonzero(np.diff(np.sign(signal)))
-    crossings = k + signal[k] / (signal[k] - signal[k + 1])
-    period = 2 * np.diff(crossings).mean() * step
-    assert 2 * math.pi / period == pytest.approx(math.sqrt(squares[mode]), rel=THOUSANDTH)
-    assert len(k) == pytest.approx(40, abs=1)
-
-
 def test_cable_damping_lets_rotor_and_link_ring_out() -> None:
     """The closed form of a damped swing; 0.5 % of the start is twice the step's lead w h/2."""
     damping, step = 2e-3, 1e-5
@@ -149,29 +116,6 @@ def test_cable_damping_lets_rotor_and_link_ring_out() -> None:
 
 
 # slack
-
-
-def strand_tensions(stretch: float) -> tuple[float, float]:
-    """Two strands of one_joint() that only pull, N."""
-    return tuple(max(0.0, PRETENSION + way * STRAND * PINION * stretch) for way in (1, -1))  # type: ignore[return-value]
-
-
-STRETCHES = [-3.0, -1.0, -0.73, -0.71, -0.2, 0.0, 0.3, 0.71, 0.73, 1.5, 3.0]  # rad; slack from 0.7203 on
-
-
-@pytest.mark.parametrize("stretch", STRETCHES)
-@pytest.mark.parametrize("slack", [True, False])
-def test_torque_on_the_link_is_that_of_strands_that_only_pull(stretch: float, slack: bool) -> None:
-    plant = plant_of(one_joint(), slack=slack)
-    plant.brake(True)
-    plant.data.qpos[0] = stretch
-    plant.step([0.0])
-    tight, loose = strand_tensions(stretch)
-    torque = PINION * (tight - loose) if slack else CABLE * stretch
-    assert plant.qd[0] / STEP * LINK_INERTIA == pytest.approx(N * torque, rel=THOUSANDTH, abs=1e-9)
-    assert plant.circuit_torque[0] == pytest.approx(torque, rel=THOUSANDTH, abs=1e-9)
-    expected = sorted((tight, loose), reverse=True) if slack else PRETENSION + np.array([1, -1]) * abs(torque) / 0.02
-    np.testing.assert_allclose(plant.tensions[0], expected, rtol=THOUSANDTH, atol=1e-6)
 
 
 @pytest.mark.parametrize("pretension", [0.0, 5.0])
@@ -204,40 +148,6 @@ def turn(plant: Plant, way: float, seconds: float, torque: float, together: int 
         put_in += tau * (plant.theta[0] - before[0])
         got_out += torque * N * (plant.q[0] - before[1])
     return travel, put_in, got_out
-
-
-def loaded(torque: float, creep: bool, **joints: tuple[float, ...]) -> Plant:
-    """One joint, at rest under a load that asks for a torque at its motor."""
-    plant = plant_of(damped(one_joint(), **joints), creep=creep)
-    plant.brake(True)
-    load(plant, [-N * torque])
-    drive(plant, 2.0, [torque])
-    plant.brake(False)
-    drive(plant, 1.0, [torque])
-    return plant
-
-
-@pytest.mark.parametrize("torque", [4.0, -1.5])
-@pytest.mark.parametrize(("creep", "together"), [(True, 1), (True, 2), (False, 1)])
-def test_rotor_that_goes_out_and_back_leaves_the_joint_where_its_load_pulls_it(
-    torque: float, creep: bool, together: int
-) -> None:
-    """(6.19): the joint yields by travel x tau/(r EA)/N; strand length 1 m, so that EA is its stiffness."""
-    plant = loaded(torque, creep)
-    before = plant.theta[0], plant.q[0]
-    travel = 0.0
-    for way in (1.5, -1.5):
-        travel += turn(plant, way, 2.0, torque, together)[0]
-    assert travel == pytest.approx(3.0, rel=0.01)
-    plant.brake(True)
-    drive(plant, 1.0, [torque])
-    yielded = plant.theta[0] - before[0] - N * (plant.q[0] - before[1])
-    if creep:
-        assert yielded == pytest.approx(travel * torque / (PINION * STRAND), rel=THOUSANDTH)
-        assert plant.theta[0] == pytest.approx(before[0], abs=1e-4)
-        assert np.sign(before[1] - plant.q[0]) == np.sign(torque)
-    else:
-        assert abs(yielded) < 1e-9
 
 
 def test_rotor_that_does_not_turn_does_not_creep() -> None:
@@ -303,12 +213,6 @@ def test_efficiency_is_6_15_and_the_loss_is_counted_once(way: float, reducer: st
         lossless, ratio = efficiency(arm, False, way, FULL)
         assert lossless == pytest.approx(1.0, abs=1e-4)
         assert ratio == pytest.approx(1.0, abs=1e-4)
-
-
-def test_loss_grows_with_the_torque() -> None:
-    arm = changed(TESTBED, cables=SINGLE)
-    half, _ = efficiency(arm, True, 1.0, FULL / 2)
-    assert 1 - half == pytest.approx(80 / 9500, rel=1e-2)  # 0.01 % of the power
 
 
 @pytest.mark.parametrize("joint", range(4))
@@ -426,14 +330,6 @@ def test_ripples_on_one_shaft_add_up() -> None:
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
-def test_without_ripple_there_is_none() -> None:
-    off = Ripples(("motor1", "joint1"), (1.0, 3.0), (0.0, 0.0), (24, 1), (0.3, 0.0))
-    angles = np.linspace(-3.0, 3.0, 40)
-    for ripples in (NO_RIPPLES, off):
-        found = shaft_torque(plant_of(one_joint(), ripples=ripples), 0, ROTOR, angles)
-        np.testing.assert_allclose(found, 0.0, atol=1e-12)
-
-
 def test_cogging_holds_a_rotor_below_its_amplitude_and_lets_it_go_above() -> None:
     ripples = Ripples(("motor1",), (1.0,), (0.1,), (4,), (math.pi,))  # a detent at angle zero
     for share, holds in ((0.9, True), (1.1, False)):
@@ -498,43 +394,6 @@ def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
         assert excess < 1.1 * expected
         plant.step([torque + way * excess])
     assert excess == pytest.approx(expected, rel=THOUSANDTH)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("together", [1, 2])
-@pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
-def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensions(
-    pretension: float, torque: float, slack: bool, together: int
-) -> None:
-    """Both inertias slow down together by F; the tension that counts is that of the decelerating link."""
-    plant = gripping_under_load(pretension, torque, slack)
-    plant.data.qvel[:] = (20.0, 20.0 / N)
-    drive(plant, 0.15, [torque], together=together)
-    whole = ROTOR + LINK_INERTIA / N**2
-    friction = BASE / 2 + COEFFICIENT * 2 * pretension
-    for _ in range(50):  # the link's own inertia takes from the tension what it gives to the motion
-        carried = torque - LINK_INERTIA / N**2 * friction / whole
-        friction = BASE / 2 + COEFFICIENT * sum_of_tensions(pretension, carried if slack else 0.0)
-    momentum = ROTOR * plant.thetad[0] + LINK_INERTIA / N * plant.qd[0]
-    drive(plant, 0.1, [torque], together=together)
-    lost = momentum - ROTOR * plant.thetad[0] - LINK_INERTIA / N * plant.qd[0]
-    assert plant.thetad[0] > 1.0
-    assert lost / 0.1 == pytest.approx(friction, rel=THOUSANDTH)
-
-
-@pytest.mark.parametrize("together", [1, 2])
-def test_friction_of_a_turning_rotor_grows_when_its_cable_becomes_slack(together: int) -> None:
-    """Nothing else changes the friction: the rotor neither stops nor starts."""
-    plant = gripping(20.0)
-    plant.data.qvel[:] = (20.0, 20.0 / N)
-    drive(plant, 0.01, [0.0])
-    assert plant.model.dof_frictionloss[0] == pytest.approx(BASE / 2 + COEFFICIENT * 40.0, rel=THOUSANDTH)
-    load(plant, [-N * 5.0])
-    drive(plant, 0.02, [5.0], together=together)
-    assert plant.thetad[0] > 1.0
-    assert min(plant.tensions[0]) == 0.0
-    expected = BASE / 2 + COEFFICIENT * sum(plant.tensions[0])
-    assert plant.model.dof_frictionloss[0] == pytest.approx(expected, rel=0.01)  # the tension of a step before
 
 
 @pytest.mark.slow
@@ -712,15 +571,6 @@ def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_r
     slower = (abs(base.thetad[1]) - abs(gripped.thetad[1])) * WAM.motors.inertia[1] / STEP
     assert tight > pull
     assert slower == pytest.approx(1e-3 * tight, rel=THOUSANDTH)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("effect", [field.name for field in dataclasses.fields(Effects) if field.name != "capstan"])
-def test_each_effect_makes_a_difference(effect: str) -> None:
-    arm = changed(WAM, cables={"pretension": (20.0,) * 4})
-    whole = story(Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP))
-    fewer = dataclasses.replace(EVERYTHING, **{effect: getattr(no_effects(WAM), effect)})
-    assert np.abs(np.subtract(story(Plant(arm, World(NOWHERE, NO_SPRINGS), fewer, STEP)), whole)).max() > 1e-4
 
 
 def test_a_pretension_without_room_for_the_load_is_refused_by_name() -> None:

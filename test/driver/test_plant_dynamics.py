@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -25,21 +24,17 @@ from arms import (
 from contact_truth import cover_frame, frame, joint_torques, motor_from_joint, torques
 
 from wam_description.arm import Arm
-from wam_description.configuration import Configuration
 from wam_description.effects import Effects, no_effects
 from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_theory.regimes import gamma_b
-from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
+from wam_theory.stick_slip import FrictionNode
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
 STEP = 5e-4  # s, as configured
 FINE = 1.25e-4  # s, for what the step itself would move by 0.1 % or more
-FILE = Configuration.load(Path(__file__).parents[2] / "config" / "testbed.yaml")
-TESTBED = FILE.shared.arm
-TESTBED_DRIVER = FILE.node("driver", DriverParameters)
 WAM_DRIVER = CONFIGURATION.node("driver", DriverParameters)
 WEIGHTLESS = (0.0, 0.0, 0.0)
 WIDE: dict[str, tuple[float, ...]] = {"lower": (-50.0,) * 4, "upper": (50.0,) * 4}  # no stop in the way
@@ -104,32 +99,14 @@ def ring(plant: Plant, joint: int, ratio: float, step: float, every: int) -> np.
     return np.array(heard)
 
 
-def with_ratio(arm: Arm, ratio: float) -> Arm:
-    """The one-joint arm with another N; the cable, seen at the motor, stays what it is."""
-    return dataclasses.replace(arm, joint_from_motor=(1.0 / ratio,))
-
-
 def stepped(frequency: np.ndarray, step: float) -> np.ndarray:
     """What a step makes of a frequency: sin(w' h/2) = w h/2 where velocity goes first, position after."""
     return 2.0 / step * np.arcsin(frequency * step / 2.0)
 
 
-@pytest.mark.parametrize("ratio", [7.0, 14.0, 28.0])
-@pytest.mark.parametrize("stiffness", [175.127, 1751.27, 17512.7])  # N/m under the tip
-@pytest.mark.parametrize("step", [STEP, FINE])
-def test_both_resonances_of_the_testbed_are_those_of_4_4(ratio: float, stiffness: float, step: float) -> None:
-    arm = with_ratio(changed(frictionless(TESTBED), gravity=WEIGHTLESS), ratio)
-    expected = two_masses(4.02508e-5, 0.451952, cable_stiffness(arm, 0), stiffness * 0.9144**2, ratio)
-    plant = released(arm, spring(arm, 0, stiffness, 0.9144), step)
-    found = tones(ring(plant, 0, ratio, step, round(5e-4 / step)), 5e-4)
-    if step == FINE:
-        np.testing.assert_allclose(found, expected, rtol=3e-3)
-    np.testing.assert_allclose(found, stepped(expected, step), rtol=3e-5)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio_scale", [0.7, 1.0, 1.5])
-@pytest.mark.parametrize("stiffness", [50.0, 500.0, 5000.0])  # N m/rad at the joint
+@pytest.mark.parametrize("ratio_scale", [0.7, 1.5])
+@pytest.mark.parametrize("stiffness", [50.0, 5000.0])  # N m/rad at the joint
 @pytest.mark.parametrize("joint", [0, 3])
 def test_both_resonances_of_a_joint_of_the_arm_are_those_of_4_4(
     ratio_scale: float, stiffness: float, joint: int
@@ -236,21 +213,6 @@ CASES = [(0.02, 0.05, 4.0, 2.0), (0.05, 0.25, 4.0, 3.0), (0.1, 0.05, 4.0, 1.0)]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "zeta", "static", "dynamic"), CASES)
-def test_stiction_cycle_is_that_of_the_exact_node(number: float, zeta: float, static: float, dynamic: float) -> None:
-    """Inertia included, to 2 %: a slip of 40 to 80 steps ends within one of them, which halving the step halves."""
-    model, gain, period = stiction(number, zeta, static, dynamic)
-    start = in_the_cycle(model, zeta)
-    exact = assess(model, IntegralLoop(gain), FORCE, (start[0], 0.0, start[1]))
-    assert exact.verdict is Verdict.LIMIT_CYCLE
-    found = [cycle(controlled(model, gain, 6.5 * period, step, start)) for step in (STEP, STEP / 2.0)]
-    for one in found:
-        assert one == pytest.approx((exact.peak_to_peak, exact.period), rel=0.02)
-    assert found[1] == pytest.approx(found[0], rel=0.01)
-    assert found[1] == pytest.approx((exact.peak_to_peak, exact.period), rel=5e-3)
-
-
-@pytest.mark.slow
 def test_stiction_cycle_of_a_slow_loop_is_that_of_5_8_and_5_9_corrected() -> None:
     """To 2 %: the motor's motion in a slip, which the formulas leave out, makes 1.4 % at (5.11) = 0.02."""
     number, zeta, static, dynamic = CASES[0]
@@ -265,35 +227,14 @@ def test_stiction_cycle_of_a_slow_loop_is_that_of_5_8_and_5_9_corrected() -> Non
     assert abs(found[1] / printed - 1.0) > 0.5
 
 
-def test_stiction_cycle_vanishes_without_stiction() -> None:
-    number, zeta, static, _ = CASES[0]
-    model, gain, period = stiction(number, zeta, static, 2.0)
-    start = in_the_cycle(model, zeta)
-    coulomb = dataclasses.replace(model, dynamic_friction=static)
-    response = controlled(coulomb, gain, 4.0 * period, STEP, start)
-    assert np.all(response.contact - FORCE > -1e-6)
-
-
 def coulomb(gamma: float) -> tuple[FrictionNode, float]:
     """A node of zeta = 0.25 with Coulomb friction, and the gain of this gamma."""
     model = node(0.25, 4.0, 4.0)
     return model, gamma * model.damping / (LINK_INERTIA * SHARE)
 
 
-@pytest.mark.parametrize("gamma", [0.7, 0.8, 0.9])
-def test_motor_goes_to_and_fro_by_twice_the_friction_over_the_cable_above_gamma_b(gamma: float) -> None:
-    """(5.20), to 1 %: what is left of the error after some half cycles, of which each takes Psi of the one before."""
-    assert float(gamma_b(0.25)) < gamma
-    response = controlled(*coulomb(gamma), seconds=20.0, step=STEP, start=(0.0, 0.0))
-    speed = np.sign(np.diff(response.motor))
-    turns = response.motor[1:-1][speed[:-1] * speed[1:] < 0.0]
-    assert abs(response.contact[-1] - FORCE) < 0.01
-    assert abs(turns[-1] - turns[-2]) == pytest.approx(2.0 * 4.0 / KTR, rel=0.01)
-    assert abs(turns[1] - turns[0]) != pytest.approx(2.0 * 4.0 / KTR, rel=0.1)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("gamma", [0.2, 0.4, 0.5, 0.57])
+@pytest.mark.parametrize("gamma", [0.2, 0.57])
 def test_motor_never_turns_back_below_gamma_b(gamma: float) -> None:
     """Straight to the desired force below gamma_a, by a staircase from there on; never beyond it."""
     assert gamma < float(gamma_b(0.25))
@@ -301,15 +242,6 @@ def test_motor_never_turns_back_below_gamma_b(gamma: float) -> None:
     assert np.all(np.diff(response.motor) >= 0.0)
     assert np.all(response.contact < FORCE)
     assert abs(response.contact[-1] - FORCE) < 1e-6
-
-
-def test_step_response_with_coulomb_friction_follows_the_exact_one() -> None:
-    """To 0.5 % of the step: a stop differs from the exact one by up to one step."""
-    model, gain = coulomb(0.9)
-    response = controlled(model, gain, 0.4, STEP / 4.0, (0.0, 0.0))
-    exact = simulate(model, IntegralLoop(gain), FORCE, 0.4).at(response.time)
-    np.testing.assert_allclose(response.contact, exact.contact_force, atol=5e-3 * FORCE)
-    np.testing.assert_allclose(response.motor, exact.x_m, atol=5e-3 * FORCE / KC)
 
 
 # impact (3.1)
@@ -344,7 +276,7 @@ def hit(arm: Arm, world: World, speed: float, step: float, seconds: float = 0.3)
     return np.array(angle), np.array(force)
 
 
-@pytest.mark.parametrize("stiffness", [2e3, 5e4, 1e6])
+@pytest.mark.parametrize("stiffness", [2e3, 1e6])
 @pytest.mark.parametrize("speed", [0.2, 1.0])
 def test_impact_of_the_link_on_a_surface_is_that_of_3_1(stiffness: float, speed: float) -> None:
     """F = v sqrt(m k), m = J/r^2 at the tip, the rotor uncoupled, to 0.5 %: the peak falls between two steps."""
@@ -355,16 +287,8 @@ def test_impact_of_the_link_on_a_surface_is_that_of_3_1(stiffness: float, speed:
     assert force.max() == pytest.approx(expected, rel=5e-3)
 
 
-@pytest.mark.parametrize("stiffness", [200.0, 1751.27, 17512.7])
-def test_impact_of_the_link_on_the_spring_of_the_testbed_is_that_of_3_1(stiffness: float) -> None:
-    arm = one_joint(RATIO, 1e-6)
-    angle, _ = hit(arm, spring(arm, 0, stiffness, LEVER, bilateral=False), 0.5, FINE)
-    expected = 0.5 * LEVER * math.sqrt(LINK_INERTIA / LEVER**2 * stiffness)
-    assert -angle.min() * LEVER * stiffness == pytest.approx(expected, rel=1e-3)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [200.0, 1751.27])
+@pytest.mark.parametrize("stiffness", [1751.27])
 def test_impact_carries_the_rotor_through_a_stiff_cable(stiffness: float) -> None:
     """J is everything rotary: link and N^2 J_m; the cable is 1000 times as stiff as the contact."""
     cable = 1000.0 * stiffness * LEVER**2 / RATIO**2
@@ -387,8 +311,8 @@ def settled(plant: Plant, torque: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hardening", [0.0, 20.0, 200.0])
-@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
+@pytest.mark.parametrize("hardening", [0.0, 200.0])
+@pytest.mark.parametrize("stiffness", [1e4])
 def test_surface_at_rest_pushes_with_its_law(stiffness: float, hardening: float) -> None:
     """F = k x (1 + h x) from the motor's torque alone; to 0.2 %, and to 1e-6 once at rest."""
     height = -LEVER * math.sin(0.1) - 0.02
@@ -406,7 +330,7 @@ def test_surface_at_rest_pushes_with_its_law(stiffness: float, hardening: float)
 
 
 @pytest.mark.parametrize("bilateral", [False, True])
-@pytest.mark.parametrize("stiffness", [175.127, 1751.27, 17512.7])
+@pytest.mark.parametrize("stiffness", [1751.27])
 def test_spring_at_rest_pushes_with_its_stiffness(stiffness: float, bilateral: bool) -> None:
     arm = changed(one_joint(), joints={"viscous_friction": (20.0,)}, motors={"viscous_friction": (0.02,)})
     torque = -0.002 * stiffness
@@ -512,60 +436,6 @@ def test_several_surfaces_push_on_both_links_each_with_its_own_stiffness() -> No
 # stick
 
 
-@pytest.mark.slow
-def test_testbed_under_nine_tenths_of_its_static_friction_stays_for_a_minute() -> None:
-    """Motor and joint at once, spring pressed, cable stretched, everything of config/testbed.yaml on.
-
-    The bound, 1e-9 rad, is what rounding leaves; MuJoCo's own friction creeps that far in a microsecond.
-    """
-    effects, springs = TESTBED_DRIVER.effects, TESTBED_DRIVER.world.springs
-    plant = released(TESTBED, TESTBED_DRIVER.world, STEP, effects)
-    q = -0.02
-    pressed = springs.stiffness[0] * springs.lever[0] ** 2 * -q
-    weight = 1.62155 * 9.80665 * 0.4572 * math.cos(q)
-    friction, rotor = TESTBED.joints.static_friction[0], TESTBED.motors.static_friction[0]
-    # what the cable has to give for the joint to be at 0.9 of its friction, and the motor for the rotor
-    cable = (weight - pressed + 0.9 * friction) / RATIO
-    assert abs(cable) > 0.5
-    plant.data.qpos[:] = RATIO * q + cable / cable_stiffness(TESTBED, 0), q
-    before = plant.theta + plant.q
-    for _ in range(round(60.0 / STEP)):
-        plant.step([cable + 0.9 * rotor])
-    drift = np.abs(np.array(plant.theta + plant.q) - before)
-    assert drift.max() < 1e-9
-    for _ in range(100):
-        plant.step([cable + 1.05 * rotor])
-    assert np.abs(np.array(plant.theta) - before[0]).max() > 1e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (1, -1, 1, -1), (-1, 1, 1, -1)])
-def test_arm_under_nine_tenths_of_its_static_friction_stays_for_a_minute(signs: tuple[int, ...]) -> None:
-    """Every motor and every joint at once, cables stretched by it and by gravity, everything of config/wam.yaml on.
-
-    The bound, 1e-6 rad, is below any encoder; what the four sweeps of `noslip` leave where joints load each
-    other is 6e-9 rad/s here (2e-8 in the worst pose), far below the 1e-6 rad/s that count as motion.
-    """
-    plant = released(WAM, World(NOWHERE, NO_SPRINGS), STEP, WAM_DRIVER.effects)
-    q = np.array(WAM.joints.start)
-    carried = BODY.gravity_torque(q) + 0.9 * np.array(signs) * WAM.joints.static_friction
-    cables, cogging = by_power(carried), WAM_DRIVER.effects.ripples
-    rotors = np.array(signs[::-1]) * np.subtract(WAM.motors.static_friction, cogging.amplitude)
-    stiffness = np.array([cable_stiffness(WAM, i) for i in range(4)])
-    plant.data.qpos[:] = [*(motor_from_joint(q) + cables / stiffness), *q]
-    before = np.array(plant.theta + plant.q)
-    angles = np.multiply(cogging.cycles, plant.theta) + cogging.phase
-    held = cables - cogging.amplitude * np.sin(angles)
-    torque = (held + 0.9 * rotors).tolist()
-    for _ in range(round(60.0 / STEP)):
-        plant.step(torque)
-    drift = np.abs(np.array(plant.theta + plant.q) - before)
-    assert drift.max() < 1e-6
-    for _ in range(200):
-        plant.step((held + 1.05 * rotors).tolist())
-    assert np.abs(np.array(plant.theta) - before[:4]).min() > 1e-4
-
-
 # energy
 
 BARS = ((0.3, -0.1), (-0.3, -0.1), (0.65, -0.2), (-0.65, -0.2))  # m, x and z of each
@@ -653,7 +523,7 @@ def thrown(seed: int, friction: float, hardening: float, step: float) -> Plant:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize(("friction", "hardening"), [(0.0, 0.0), (0.4, 50.0)])
 def test_energy_of_the_undriven_arm_never_grows_with_everything_on(
     seed: int, friction: float, hardening: float
@@ -669,7 +539,7 @@ def test_energy_of_the_undriven_arm_never_grows_with_everything_on(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4])
 def test_a_tube_that_bounces_flat_on_a_floor_gains_nothing(seed: int) -> None:
     """Undamped, energy while nothing touches; both ends touch in turns.
 

@@ -44,7 +44,7 @@ def touches(plant: Plant, rng: np.random.Generator, poses: int) -> bool:
     return False
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_what_is_called_out_of_reach_is_touched_in_no_pose(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = ("box", "cylinder", "plane")[seed % 3]

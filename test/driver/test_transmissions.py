@@ -11,7 +11,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
-from wam_studies.figures.transmissions import KINDS, ROWS, driven, measured, predicted, table
+from wam_studies.figures.transmissions import KINDS, driven, measured, predicted
 from wam_studies.plant.ideal_testbed import ideal_testbed, released_plant
 
 
@@ -61,9 +61,3 @@ def test_link_moves_within_the_play_and_not_beyond() -> None:
 def test_a_play_for_each_motor_is_refused_if_motors_are_missing() -> None:
     with pytest.raises(ParameterError, match="backlash"):
         released_plant(ideal_testbed(), backlash=(0.1, 0.2))
-
-
-@pytest.mark.slow
-def test_table_has_every_quantity() -> None:
-    text = table()
-    assert all(name in text for name, _ in ROWS)

@@ -115,10 +115,9 @@ def test_the_moving_picture_is_small_and_moves() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("folder", ["own", "root"])
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_a_notebook_prints_what_it_shows(file: Path, folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT if folder == "root" else file.parent)
+def test_a_notebook_prints_what_it_shows(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(file.parent)
     shown = notebook.read(file)
     assert notebook.printed_by(notebook.run(shown)) == notebook.printed_by(shown), f"run docs/notebook.py {file}"
 
