@@ -118,6 +118,7 @@ setup(
     package_data={
         "": ["py.typed"],
         "wam_bag": ["messages.json"],
+        "wam_description": ["constants.yaml"],
         "wam_driver.bus": ["properties.json"],
         "wam_ros": ["this_machine.xml"],
         "wam_analysis.findings": ["charts.js", "uplot/*"],

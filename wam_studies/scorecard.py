@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
-from wam_description.constants import ARM_PRINTED
+from wam_description.constants import constants
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
@@ -24,7 +24,7 @@ DIRECTIONS = 180
 
 def printed(meaning: str) -> tuple[float, ...]:
     """A constant printed in the thesis, SI."""
-    (row,) = (row for row in ARM_PRINTED if row.meaning == meaning)
+    (row,) = (row for row in constants("wam") if row.source and row.meaning == meaning)
     return row.si
 
 
