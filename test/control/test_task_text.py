@@ -211,31 +211,3 @@ def test_the_example_presses_slides_moves_straight_and_is_led() -> None:
     at = [int(np.searchsorted(times, led + t)) for t in (0.65, 1.4)]
     moved = np.linalg.norm(tips[at[1]] - tips[at[0]])
     assert moved > 3e-3, "0.7 N lead the arm"
-
-
-@pytest.mark.slow
-def test_a_scenario_keeps_the_outer_link_on_a_line_while_it_slides(tmp_path: Path) -> None:
-    """The line through the link at the start; what it does not hold lets the link slide along it."""
-    level, body = (-0.031, -1.083, -1.826, -0.482), RigidBody(ARM)
-    start = body.point(level, "outer_link", (0.0, 0.0, 0.0))
-    along = body.cover_pose(level, "outer_link").rotation[:, 0]
-    line = {"line": "outer_link", "point": start.tolist(), "along": along.tolist()}
-    line["hold"] = ["start_up", "end_side", "end_up"]
-    slide = {"velocity": 0.04, "along": along.tolist(), "cover": "outer_link", "contact_position": 0.2}
-    release = ScenarioStep("release", 0.3, request="enable")
-    configuration = CONFIGURATION.with_values(
-        {
-            "arm.joints.start": list(level),
-            "driver:world.obstacles.positions": [3.0, 3.0, 3.0],
-        }
-    )
-    run = Simulation(configuration, [release, step_of(tmp_path, seconds=1.5, task={"axes": [line, slide]})])
-    off, slid = [], 0.0
-    while not run.step():
-        ends = [body.point(run.driver.plant.q, "outer_link", (place, 0.0, 0.0)) - start for place in (0.0, 0.4064)]
-        off.append([float(np.linalg.norm(end - (end @ along) * along)) for end in ends])
-        slid = float(ends[0] @ along)
-    assert slid == pytest.approx(0.06, rel=0.1), "m"
-    worst = np.max(off, axis=0)
-    assert worst[1] < 2e-3
-    assert worst[0] < 0.05, "one of its parts is given up for the motion along the line"

@@ -88,29 +88,6 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
 
 
 @pytest.mark.slow
-def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
-    summary = AnalysedRecording(
-        recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0])
-    )
-    (answer,) = (one for one in verdict(summary) if "commands" in one.question)
-    words = "1 not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 2 s"
-    assert str(answer) == f"commands carried out: NO (1 refused), {words}"
-
-
-@pytest.mark.slow
-def test_a_settling_time_that_a_step_sets_is_that_of_the_report(tmp_path: Path) -> None:
-    """It ends the watch of the torque."""
-    slow = TORQUES.replace("seconds: 3.0", "seconds: 3.0, set: {force_loop: {limits.settling_time: 60.0}}")
-    bag = recorded(tmp_path, slow)
-    (answer,) = (one for one in verdict(AnalysedRecording(bag)) if "commands" in one.question)
-    words = "not assessed: force, torque or motion of a task commanded for no longer than limits.settling_time, 60 s"
-    assert words in str(answer)
-    assert "not reached" not in str(answer)
-    sections = {section.key: section for section in analyse_bag(bag, lambda stage: None).sections}
-    assert any(words in line for line in sections["steps"].wrong)
-
-
-@pytest.mark.slow
 def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
     spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
     values = {f"driver:world.springs.{key}": value for key, value in spring.items()}

@@ -10,13 +10,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-import yaml
 from arms import NOWHERE
 
-from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.identification.regressor import about_origin
-from wam_analysis.recording import AnalysedRecording
-from wam_bag.bag import Bag, JointColumns
 from wam_cli.main import main
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
 from wam_control.contact.contact_inference import ContactInference
@@ -26,10 +22,8 @@ from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
-from wam_description.urdf import urdf
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.limit_watch import LimitWatch
-from wam_ros.testing import RunningArm
 from wam_studies.contact.scenarios import ScenarioGenerator
 
 # alpha / pi, a, d: joint i turns about z of frame i-1, then d along it, a along x, alpha about x
@@ -162,13 +156,6 @@ def test_no_motor_may_give_more_than_its_controller_and_the_safety_module_let_it
     assert all(torque < 1.001 * peak for torque, peak in zip(found, PEAK, strict=False)), "the published ones"
 
 
-def test_the_exported_urdf_has_them_too(arm: Arm, written: pin.Model, poses: np.ndarray) -> None:
-    exported = pin.buildModelFromXML(urdf(arm))
-    for q in poses[:10]:
-        expected = pin.crba(written, written.createData(), q)
-        np.testing.assert_allclose(pin.crba(exported, exported.createData(), q), expected, rtol=0, atol=1e-9)
-
-
 def test_the_identified_model_keeps_the_products_of_inertia(arm: Arm) -> None:
     for i, mass in enumerate(arm.links.mass):
         centre = np.array(arm.links.centre[3 * i : 3 * i + 3])
@@ -242,44 +229,3 @@ def test_contacts_of_the_benchmark_are_on_every_link() -> None:
 
 
 # pressing with the wrist while the elbow moves, in lockstep
-
-STEPS = {"lower onto the box": 3.0, "press 5 N": 3.0, "move the elbow, press 10 N": 3.0}
-
-
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Bag:
-    """Part of the demonstration, by the nodes, beginning just above the box."""
-    folder, base = tmp_path_factory.mktemp("barrett"), CONFIGURATIONS["barrett_wam7"]
-    every = yaml.safe_load(packaged("barrett-wam7_scenario", "scenario").read_text())["steps"]
-    own = [{**step, "seconds": STEPS[step["name"]]} for step in every if step["name"] in STEPS]
-    steps = [{"name": "release", "seconds": 0.3, "request": "enable"}, *own]
-    start = [0.0, 0.92, 0.0, 1.35, 0.0, -0.4, 0.0]
-    return RunningArm(domain_of_module, folder).play(steps, configuration=base, arm={"joints.start": start})
-
-
-@pytest.mark.slow
-def test_the_wrist_presses_within_ten_percent_while_the_elbow_moves(pressed: Bag) -> None:
-    found = AnalysedRecording(pressed)
-    assert found.outcome == "done"
-    assert found.mode == "lockstep"
-    assert [held.hold.name for held in found.held] == ["press 5 N", "move the elbow, press 10 N"]
-    for held in found.held:
-        assert abs(held.true_accuracy.bias) < 0.1 * held.hold.commanded
-    assert {contact.estimate.link for contact in found.contacts} == {"wrist"}
-    body = RigidBody(CONFIGURATIONS["barrett_wam7"].shared.arm)
-    last = found.holds[-1]
-    truth = pressed.topics["/wam/sim/joint_states"]
-    assert isinstance(truth, JointColumns)
-    before, after = (truth.position[np.searchsorted(truth.stamp_ns, at)] for at in (last.end - 3 * 10**9, last.end))
-    elbow, wrist = (
-        float(np.linalg.norm(body.point(after, name, (0, 0, 0)) - body.point(before, name, (0, 0, 0))))
-        for name in ("forearm", "wrist")
-    )
-    assert elbow > 0.05
-    assert wrist < 0.02
-
-
-@pytest.mark.slow
-def test_the_dither_is_no_limit_cycle(pressed: Bag) -> None:
-    (section,) = [one for one in analyse_bag(pressed, lambda doing: None).sections if one.key == "stability"]
-    assert "no limit cycle detected" in section.sentences[0]

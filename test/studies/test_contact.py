@@ -1,7 +1,6 @@
 """The benchmark of contact estimation: it counts true contacts only, knows the truth, and scores as by hand."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +15,12 @@ from wam_description.parameters import ParameterError
 from wam_description.reasons import NO_REASON
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_LOAD, Load
-from wam_sim.batch import processes
 from wam_sim.simulation import Simulation
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, EstimatedMoment
 from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
 from wam_studies.contact.simulation import Played, play, score, spans, torques_of
 from wam_studies.contact.study import ContactCase, ContactStudy
 from wam_studies.figures.panels import draw_panels
-from wam_studies.harness import evaluate
 from wam_studies.scores import Interval, events, quantile, rms, share
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -238,7 +235,7 @@ def pick(kind: str, seed: int = 1) -> BenchmarkScenario:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["push", "sphere", "flat"])
+@pytest.mark.parametrize("kind", ["push", "flat"])
 def test_contacts_of_every_kind_truly_happen_where_they_are_planned(kind: str) -> None:
     scenario = pick(kind)
     meant = scenario.planned[0]
@@ -267,7 +264,6 @@ def test_a_hand_that_misses_is_not_counted() -> None:
     assert found_there.outcomes == []
     assert found_there.excluded == 0
     assert found_there.not_made == len(scenario.planned)
-    assert len(score(play(CONFIGURATION, scenario), ARM).outcomes) == len(scenario.planned)
 
 
 # scenarios
@@ -290,16 +286,6 @@ def test_the_scores_have_a_picture(tmp_path: Path) -> None:
     scores = synthetic(error=0.025, latency=0.04, right=0.93)
     draw_panels(STUDY.panels(scores), tmp_path / "benchmark.png", 2)
     assert (tmp_path / "benchmark.png").stat().st_size > 20_000
-
-
-@pytest.mark.slow
-def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
-    small = study(contacts=4, resting=0, free=0.0)
-    cases = {4: small.cases(4)}
-    with ThreadPoolExecutor(1) as one, processes(2) as two:
-        alone, together = (evaluate(small, cases, executor).total for executor in (one, two))
-    assert repr(alone) == repr(together)
-    assert sum(len(scenario.outcomes) for scenario in alone) >= 3
 
 
 def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_declared_range() -> None:

@@ -15,7 +15,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
 from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
-from wam_studies.contact.recording import Drive, _identified, record
+from wam_studies.contact.recording import Drive, record
 from wam_studies.contact.replay import arriving, names_payload
 from wam_studies.contact.rows import IDENTIFIED_ARM
 from wam_studies.contact.scenarios import base_values
@@ -176,17 +176,6 @@ def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_r
     assert not names_payload(nothing._replace(hypotheses=(link,)))
     assert names_payload(nothing._replace(hypotheses=(link._replace(reasons=Reason.PAYLOAD),)))
     assert names_payload(nothing._replace(warning=warning(Code.MODEL_OFF, "model_off", part="payload")))
-
-
-@pytest.mark.slow
-def test_an_arm_is_identified_from_signals_with_the_degradation_of_its_own() -> None:
-    exact = drawn("as stated", WAM, np.random.default_rng(3401))
-    scaled = exact._replace(signals=MeasuredSignals((1.1,), delay=1, dropped=0.02))
-    configured = CONFIGURATION.with_values(dict(exact.plant))
-    levels = [
-        np.array(dict(_identified(configured, one, 3401))["model.motors.coulomb_positive"]) for one in (exact, scaled)
-    ]
-    assert levels[1] / levels[0] == pytest.approx([1.1] * 4, abs=0.02), "friction in units of the assumed constants"
 
 
 def test_measured_torques_are_late_and_some_samples_do_not_arrive() -> None:

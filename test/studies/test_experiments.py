@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,8 @@ from recordings import forces, joints, recorded
 from wam_bag.bag import BagError, PointColumns
 from wam_cli.main import main
 from wam_control.task import scenario
-from wam_control.velocity.transform import CreepEstimate, Transform
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_description.signals import State
 from wam_description.units import si
 from wam_studies.figures.panels import Panel
 from wam_studies.page import END, section_of
@@ -36,9 +33,8 @@ from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.one_link import growth, one_link, played
 from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
-from wam_studies.thesis.rows import Comparison, Result, markdown, plain
+from wam_studies.thesis.rows import Comparison, Result
 from wam_studies.thesis.sweeping import SweptRun, record_run
-from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 
 LEVER = 0.9144  # m
@@ -63,13 +59,6 @@ def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played
         shared = configuration.shared  # refuses what does not fit together
         steps = scenario.load(tmp_path / f"{run.name}.yaml", shared)
         assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
-
-
-def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
-    needed = "testbed-5.6 stiction-limit-cycle actuator-limit-cycle step-response frequency-response"
-    needed += " stiffness-allocation efficiency creep wam-press wam-slide testbed-5.6-as-described force-accuracy"
-    needed += " quantised-force active-pretension wam-along-link wam-grope inner-loops"
-    assert set(needed.split()) <= set(names())
 
 
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
@@ -108,12 +97,6 @@ def test_a_row_agrees_within_its_bound_and_never_with_what_could_not_be_measured
     assert not Comparison("x", "settled", "diverged").agrees
     assert Comparison("x", 1.0, 9.0, bound=math.nan).agrees
     assert not Result([Comparison("x", 1.0, 1.0), Comparison("x", 1.0, 2.0, bound=0.1)], []).agrees
-
-
-def test_tables_say_what_was_missed() -> None:
-    rows = [Comparison("period", 2.0, 2.5, "s", 0.02, "(5.9)"), Comparison("a|b", "settled", "settled")]
-    assert "+25.00 %  2.00 %  (5.9)     MISSED" in plain(rows)
-    assert "| a\\|b | settled | settled |" in markdown(rows)
 
 
 # measuring
@@ -418,27 +401,6 @@ def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
             function_of(wrong)
 
 
-@pytest.mark.slow
-def test_an_experiment_without_curves_has_no_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    root = Path(__file__).resolve().parents[2]
-    monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "my_laboratory_without_curves.py").write_text(
-        "from wam_studies.thesis.rows import Comparison, Result\n"
-        "def steps(runs):\n    return Result([Comparison('steps', 9.0, 9.0, '', 0.01)], [])\n"
-    )
-    mine, page = tmp_path / "mine.yaml", tmp_path / "page.md"
-    creep = (root / "config" / "experiments" / "creep.yaml").read_text()
-    mine.write_text(creep.replace("evaluation: cables.creeping", "evaluation: my_laboratory_without_curves:steps"))
-    page.write_text(f"# Title\n<!-- written: experiments -->\n{END}\n")
-    bag = str(root / "bags" / "sample" / "creep")
-    assert run_command(str(mine), "--evaluate", bag, "--directory", str(tmp_path), "--write", str(page)) == 0
-    assert "picture" not in capfd.readouterr().out
-    assert "| steps | 9 | 9 |" in page.read_text()
-    assert ".png" not in page.read_text()
-
-
 def test_documentation_shows_every_experiment() -> None:
     docs = Path(__file__).resolve().parents[2] / "docs"
     text = section_of(docs / "experiments.md", "experiments")
@@ -543,17 +505,6 @@ def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
     assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err
     with pytest.raises(BagError):
         recorded(load("creep"), 0, {}, (), tmp_path).step("out")
-
-
-def test_list_names_every_experiment(capfd) -> None:
-    assert run_command("--list") == 0
-    said = capfd.readouterr().out
-    assert all(name in said and load(name).title in said for name in names())
-
-
-def test_nothing_to_run_is_refused(capfd) -> None:
-    assert run_command() == 1
-    assert "name an experiment, or give --all" in capfd.readouterr().err
 
 
 def test_force_without_feedback_is_measured_as_a_play_of_its_friction(tmp_path: Path) -> None:
@@ -664,30 +615,3 @@ def test_joint_angles_that_keep_their_creep_are_not_taken_as_corrected(tmp_path:
     assert rigid.agrees
     assert rigid.measured == pytest.approx(1e3 * per_radian * 11.2, rel=1e-3)
     assert not corrected.agrees
-
-
-def test_creep_estimate_adds_up_out_and_back() -> None:
-    arm = Configuration.load(packaged("testbed")).shared.arm
-    estimate, loss = CreepEstimate(arm), arm.circuits[0].loss_per_torque
-    for angle in (0.0, 1.0, 2.0, 1.0, 0.0):
-        found = estimate.step([angle], [3.0])
-    assert found == pytest.approx([4.0 * loss * 3.0])
-    plain, corrected = Transform(arm), Transform(arm, creep_correction=True)
-    for angle in (0.0, 2.0):
-        states = [one.joint_state(State([angle], [0.0], [3.0])) for one in (plain, corrected)]
-    assert states[0].position[0] - states[1].position[0] == pytest.approx(2.0 * loss * 3.0 / 14.0)
-
-
-@pytest.mark.slow
-def test_margin_with_friction_is_where_errors_at_rest_neither_grow_nor_shrink(tmp_path: Path) -> None:
-    run = load("testbed-5.6-as-described")
-    added = {"driver:effects.added_coulomb_friction": [0.949]}
-    recording = recorded(run, 2, {}, (Step("press", 0.0, 1.0, added),), tmp_path)
-    link = one_link(recording, added)
-    margin = testbed.friction_margin(link, 0.3)
-    assert 3.3 < margin / link.margin.gain < 3.5  # docs/errata.md: settles at 3.3, diverges at 3.5
-    for factor, grows in ((0.99, False), (1.01, True)):
-        loop = replace(link.loop, gain=factor * margin)
-        rests = simulate(link.node, loop, 0.3 * LEVER, 4.0).events
-        errors = [abs(0.3 * LEVER - event.contact_force) for event in rests if event.kind is Kind.STICK]
-        assert (errors[3] > errors[1]) is grows

@@ -84,7 +84,7 @@ def test_the_page_is_what_the_index_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["step-response", "wam-press"])
+@pytest.mark.parametrize("name", ["step-response"])
 def test_other_readers_see_the_same(name: str) -> None:
     bag = read(BAGS / "sample" / name)
     counts, sums = dict.fromkeys(bag.topics, 0), dict.fromkeys(bag.topics, 0)

@@ -1,10 +1,7 @@
 """The scorecard of chapter 3: the arm's numbers by other ways, and verdicts that follow the numbers."""
 
 import math
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,11 +192,3 @@ def test_bandwidth_is_the_lowest_eigenvalue_of_any_joint(arm: Measures) -> None:
 def test_another_arm_is_refused() -> None:
     with pytest.raises(ValueError, match="arm 'testbed' has other joints or links"):
         report(Configuration.load(packaged("testbed")))
-
-
-@pytest.mark.slow
-def test_the_command_prints_the_table(configuration: Configuration) -> None:
-    command = [sys.executable, "-m", "wam_cli.main", "model", "scorecard"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).resolve().parents[2])
-    assert done.stdout == report(configuration)
-    assert done.stdout.count("| yes") == 14
