@@ -466,7 +466,7 @@ DRAWN = {
 
 
 def main() -> None:
-    """Write the pages, then the pictures."""
+    """Draw the pictures, then write the pages."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=DRAWN, default="", help="nothing but these pictures, and what goes with them")
     parser.add_argument("--pages", action="store_true", help="pages only, without demonstration")
@@ -476,12 +476,11 @@ def main() -> None:
         return
     if not given.pages:
         measure_forces()
-    for path, text in pages().items():
-        path.write_text(text, encoding="utf-8")
-        print(path.relative_to(ROOT))
-    if not given.pages:
         for draw in DRAWN.values():
             draw()
+    for path, text in pages().items():  # last: they have numbers of the demonstration
+        path.write_text(text, encoding="utf-8")
+        print(path.relative_to(ROOT))
 
 
 if __name__ == "__main__":
