@@ -162,7 +162,7 @@ def test_a_node_that_ends_is_an_escape_and_the_next_trial_has_all_nodes(
     domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
-    case = FaultCase(in_lockstep(), "planted", 1, 0, "")
+    case = FaultCase(in_lockstep(), "planted", 1, 0)
 
     def end_a_node(stack: WatchedStack) -> int:
         stack.commander.node.create_timer(0.001, lambda: 1 // 0)  # a node without tolerance
@@ -186,7 +186,7 @@ def test_nothing_escapes_in_the_short_form(domain_id: int) -> None:
 @pytest.mark.slow
 def test_ctrl_c_leaves_nothing(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
-    assert run_fault(FaultCase(CONFIGURATION, "interruptions", 1, 1, "")).escapes == ()
+    assert run_fault(FaultCase(CONFIGURATION, "interruptions", 1, 1)).escapes == ()
 
 
 @pytest.mark.slow

@@ -293,12 +293,6 @@ def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None
         assert bool(spans[-1] < 0.2 * step) is stable, spans
 
 
-def test_domain_one_takes_every_step_and_domain_three_none() -> None:
-    for step in (1e-2, 1.0, 30.0, 1e3):
-        assert assess(unit_node(), IntegralLoop(0.97), step).verdict is Verdict.SETTLED
-        assert assess(unit_node(), IntegralLoop(2.20), step).verdict is Verdict.DIVERGED
-
-
 def test_a_size_that_has_not_converged_is_no_limit_cycle() -> None:
     node = FrictionNode(1.0, 1.5012051, 2.1646104, 43.5124522, 1.0, 1.0)
     loop = IntegralLoop(0.2164, 0.56938673, sample_period=0.7614, delay_samples=4)
@@ -343,17 +337,6 @@ def test_standstills_ever_nearer_to_the_target_are_rest_and_not_a_cycle_of_round
     assert assess(node, loop, 0.0, start).verdict is Verdict.SETTLED
 
 
-def test_a_response_that_outgrows_friction_is_given_up_early() -> None:
-    early = assess(unit_node(), IntegralLoop(1.5), 40.0)
-    assert early.verdict is Verdict.DIVERGED
-    assert early.events < 10
-
-
-def test_routh_limit_without_friction() -> None:
-    assert assess(unit_node(0.0), IntegralLoop(0.99), 1.0).verdict is Verdict.SETTLED
-    assert assess(unit_node(0.0), IntegralLoop(1.01), 1.0).verdict is Verdict.DIVERGED
-
-
 def test_slip_slower_than_gamma_a_never_ends() -> None:
     slow = simulate(unit_node(), IntegralLoop(0.30), 4.0, 1e4)
     assert slow.ended
@@ -364,35 +347,6 @@ def test_slip_slower_than_gamma_a_never_ends() -> None:
 
 
 # ---------------------------------------------------------------------------- stiction limit cycle
-@pytest.mark.parametrize(("damping", "overshoot"), [(1.0, 1.4443), (2.0, 1.1630), (0.2, 1.8540)])
-def test_slow_loop_has_the_stiction_cycle_of_5_8_and_5_9(damping: float, overshoot: float) -> None:
-    # k_tr = k_c = 2, dF = 0.3, F_s = 1.3: jump of F_c = overshoot * 0.15, period by hand
-    gain = 5e-4
-    outcome = assess(FrictionNode(1.0, damping, 2.0, 2.0, 1.0, 1.3), IntegralLoop(gain), 0.5, REST, 1e-6)
-    assert outcome.verdict is Verdict.LIMIT_CYCLE
-    assert outcome.peak_to_peak == pytest.approx(overshoot * 0.15, rel=1e-3)
-    assert outcome.period == pytest.approx(4.0 / (gain * 2.0) * 2.0 * (2.6 / (overshoot * 0.3) - 1.0), rel=2e-3)
-
-
-def test_exact_cycle_comes_nearer_to_the_formula_as_the_loop_slows() -> None:
-    jump = (1.0 + math.exp(-math.pi * 0.25 / math.sqrt(1.0 - 0.0625))) * 0.15
-    off = [
-        abs(assess(unit_node(1.0, 1.3), IntegralLoop(gain), 0.5, REST, 1e-7).peak_to_peak / jump - 1.0)
-        for gain in (1e-1, 1e-2, 2e-3)
-    ]
-    assert off[0] > 5.0 * off[1] > 15.0 * off[2]
-
-
-def test_deadband_of_half_the_stiction_cycle_ends_it_from_every_step_and_a_smaller_one_does_not() -> None:
-    node = unit_node(1.0, 1.3)
-    steps = [0.5 + 0.02 * n for n in range(12)]
-    half = assess(node, IntegralLoop(0.02), 0.5).peak_to_peak / 2.0
-    for share, cycles in ((0.0, True), (0.5, True), (1.05, False)):
-        verdicts = {assess(node, IntegralLoop(0.02, deadband=share * half), step).verdict for step in steps}
-        assert (Verdict.LIMIT_CYCLE in verdicts) is cycles
-        assert verdicts <= {Verdict.LIMIT_CYCLE, Verdict.SETTLED}
-
-
 def test_saturation_lets_a_destabilising_step_survive() -> None:
     for step in (4.0, 40.0):
         assert assess(unit_node(), IntegralLoop(1.5), step).verdict is Verdict.DIVERGED
@@ -445,20 +399,6 @@ def test_sampled_loop_without_friction_diverges_beyond_its_linear_limit(delay: i
     assert growth_at_50_hz(0.999 * margin, delay) < 1.0 < growth_at_50_hz(1.001 * margin, delay)
     for factor, verdict in ((0.98, Verdict.SETTLED), (1.02, Verdict.DIVERGED)):
         assert assess(testbed(0.0), IntegralLoop(factor * margin, math.inf, 0.0, 0.02, delay), 36.0).verdict is verdict
-
-
-def test_friction_raises_the_gain_that_takes_small_steps_about_3_2_times() -> None:
-    def verdict(factor: float) -> Verdict:
-        return assess(testbed(8.4), IntegralLoop(factor * TESTBED_MARGIN[0], sample_period=0.02), 4.0).verdict
-
-    assert verdict(3.1) is Verdict.SETTLED
-    assert verdict(3.6) is Verdict.DIVERGED
-
-
-def test_friction_at_one_and_a_half_times_the_margin_takes_small_steps_and_not_8_2_lb() -> None:
-    loop = IntegralLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
-    assert assess(testbed(8.4), loop, 8.0 * 36.0).verdict is Verdict.SETTLED
-    assert assess(testbed(8.4), loop, 8.2 * 36.0).verdict is Verdict.DIVERGED
 
 
 def test_one_sample_more_reverses_what_friction_does() -> None:

@@ -120,24 +120,10 @@ def covered(found: Contacts) -> Interval:
     return share_of([one.in_set for one in found if one.detected])
 
 
-def detected(found: Contacts) -> Interval:
-    """Contacts that are detected in the end."""
-    return share_of([one.detected for one in found])
-
-
 def rough(found: Contacts) -> list[ContactOutcome]:
     """Strong contacts with the greatest friction."""
     low, high = STATED.rough_force
     return [one for one in found if abs(one.friction - RANGES.rough) < 1e-9 and low <= one.force <= high]
-
-
-def z_scores(found: Contacts) -> list[float]:
-    """Error over reported standard deviation of every estimated position."""
-    return [
-        one.error / one.position_sd
-        for one in found
-        if one.right_link and math.isfinite(one.error) and one.position_sd > 0.0
-    ]
 
 
 def position_rows(links: str, limits: ContactLimits, found: Contacts) -> Iterator[Row]:
@@ -206,23 +192,6 @@ def stated_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
     yield Row("false alarms in free motion with stops", quiet, "", 1.0, NONE_AT_ALL, NONE_AT_ALL, STATED.quiet)
     yield from position_rows(outer_links(arm), STATED, on_outer_link(scores, arm))
     yield from link_rows(STATED, contacts_of(scores))
-
-
-def further_rows(scores: Scores, arm: Arm) -> Iterator[Row]:
-    """What is not required of it."""
-    links, outer = outer_links(arm), on_outer_link(scores, arm)
-    yield percent(f"90 % set contains the truth, {links}", covered(outer))
-    yield Row("position: 68 % quantile of error over reported sd", quantile(z_scores(outer), 0.683))
-    yield Row("torque: rms of error over reported sd, in motion", torque_z(in_groups(scores, *IN_MOTION)))
-    yield Row("false alarms between contacts", false_alarms(in_groups(scores, "moving", "rest", "dither")))
-    yield from torque_rows(scores, arm, "at rest", ("rest",), "still")
-    for group, when in (("rest", "at rest"), ("dither", DITHERED)):
-        resting = on_outer_link(scores, arm, group)
-        for force in RANGES.levels:
-            name, own = f"{force:.0f} N on the {links}", near(resting, force)
-            yield percent(f"{name} detected {when}", detected(own))
-            yield centimetres(f"position, {name} {when}, median error", error_of(own))
-        yield percent(f"90 % set contains the truth {when}", covered(contacts_of(scores, group)))
 
 
 def torque_rows(scores: Scores, arm: Arm, when: str, groups: Sequence[str], state: str) -> Iterator[Row]:

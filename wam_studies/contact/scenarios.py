@@ -72,7 +72,7 @@ class BenchmarkScenario(NamedTuple):
 
     Attributes
     ----------
-    group : 'moving', 'rest', 'dither' or 'free'.
+    group : 'moving', 'dither' or 'free'.
     values : override the configuration.
     steps : of the scenario.
     planned : contacts.
@@ -129,9 +129,9 @@ class ScenarioGenerator:
         """Scenarios with `count` contacts in motion, two per scenario."""
         return [self._moving(i) for i in range((count + 1) // 2)]
 
-    def resting(self, count: int, dither: Mapping[str, Any] | None = None) -> list[BenchmarkScenario]:
-        """Scenarios with `count` contacts at rest, two per scenario; equal with and without dither."""
-        return [self._resting(i, dither) for i in range((count + 1) // 2)]
+    def resting(self, count: int) -> list[BenchmarkScenario]:
+        """Scenarios with `count` contacts at rest with dither, two per scenario; none without it."""
+        return [self._resting(i) for i in range((count + 1) // 2)] if dither_values(self._configuration) else []
 
     def free(self, seconds: float) -> list[BenchmarkScenario]:
         """Motion with stops and reversals and an unmodelled payload, without contact."""
@@ -157,7 +157,7 @@ class ScenarioGenerator:
         values = self._values(random, start, planned)
         return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
 
-    def _resting(self, i: int, dither: Mapping[str, Any] | None) -> BenchmarkScenario:
+    def _resting(self, i: int) -> BenchmarkScenario:
         random = self._random(1, i)
         start = self._moves.pose(random)
         (move,) = self._moves.moves(random, start, 1)
@@ -170,10 +170,8 @@ class ScenarioGenerator:
             push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(ScenarioStep(f"rest {number + 1}", RANGES.rest + RANGES.rest_hold + 0.2, push=push))
             now += steps[-1].seconds
-        still = dict.fromkeys(dither_values(self._configuration), 0)
-        values = self._values(random, start, planned) | (still if dither is None else dict(dither))
-        group = "rest" if dither is None else "dither"
-        return BenchmarkScenario(f"seed {self._seed} {group} {i}", group, values, tuple(steps), tuple(planned))
+        values = self._values(random, start, planned) | dither_values(self._configuration)
+        return BenchmarkScenario(f"seed {self._seed} dither {i}", "dither", values, tuple(steps), tuple(planned))
 
     def _free(self, i: int) -> BenchmarkScenario:
         random = self._random(2, i)

@@ -10,8 +10,8 @@ from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactScore
 from wam_studies.contact.recording import CONTACTS, Drive, record
 from wam_studies.contact.replay import replay
-from wam_studies.contact.rows import IDENTIFIED_ARM, further_rows, stated_rows
-from wam_studies.contact.scenarios import BenchmarkScenario, ScenarioGenerator, dither_values
+from wam_studies.contact.rows import IDENTIFIED_ARM, stated_rows
+from wam_studies.contact.scenarios import BenchmarkScenario, ScenarioGenerator
 from wam_studies.contact.simulation import play, score
 from wam_studies.harness import Study, option
 from wam_studies.scores import Row, Scores, ScoreTable
@@ -58,7 +58,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
     page: ClassVar[str] = "docs/contact.md"
 
     contacts: int = option(200, "contacts in motion per seed", 1)
-    resting: int = option(30, "contacts at rest per seed", 0)
+    resting: int = option(30, "contacts at rest, with dither, per seed", 0)
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
     degradations: tuple[str, ...] = option((), "degradations of arm and signals", choices=(ALL, *NAMES))
@@ -72,11 +72,9 @@ class ContactStudy(Study[ContactCase, ContactScore]):
     run = staticmethod(play_case)
 
     def scenarios(self, seed: int) -> list[BenchmarkScenario]:
-        """Contacts in motion, free motion, contacts at rest, and these with dither if the velocity loop has it."""
+        """Contacts in motion, free motion, and contacts at rest with dither if the velocity loop has it."""
         generator = ScenarioGenerator(self.configuration, seed, self.joint_sensors)
-        dither = dither_values(self.configuration)
-        found = generator.contacts(self.contacts) + generator.free(self.free) + generator.resting(self.resting)
-        return found + generator.resting(self.resting, dither) if dither else found
+        return generator.contacts(self.contacts) + generator.free(self.free) + generator.resting(self.resting)
 
     def drives(self, seed: int) -> Iterator[Drive]:
         """Drives of each degradation.
@@ -100,7 +98,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         """Rows of the arm as stated, then of degradations."""
         arm = self.configuration.shared.arm
         scenarios, drives = _of_both(records)
-        rows: list[Row] = [*stated_rows(scenarios, arm), *further_rows(scenarios, arm), *degraded_rows(drives)]
+        rows: list[Row] = [*stated_rows(scenarios, arm), *degraded_rows(drives)]
         return Scores(rows, [_extent(scenarios), *degraded_tables(drives)])
 
     def failure(self, record: ContactScore) -> str:

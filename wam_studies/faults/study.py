@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple
 
 from wam_studies.faults import bags, disks, interruptions, losses, messages, parameter_sets, second_publishers
@@ -44,7 +43,6 @@ KINDS: Final = {
     "publishers-realtime": FaultKind("publishers", 90, 4, second_publishers.play, REALTIME),
     "disks": FaultKind("disks", 12, 1, disks.play, LOCKSTEP),
     "bags": FaultKind("bags", 3000, 60, bags.play, LOCKSTEP),
-    "replays": FaultKind("replays", 60, 2, second_publishers.replay, REALTIME),
     "interruptions": FaultKind("interruptions", 100, 0, interruptions.play, {}),
 }
 
@@ -66,19 +64,16 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
     kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
     trials: int = option(0, "trials of each kind; 0: as many as on the page", 0)
     short: bool = option(False, "a few trials of each kind, half a minute")
-    bag: str = option("bags/sample/wam-touch", "recording that is replayed")
 
     run = staticmethod(run_fault)
 
     def cases(self, seed: int) -> Iterator[FaultCase]:
-        """The trials, kind by kind; none of replays without the recording."""
+        """The trials, kind by kind."""
         for name in self.kinds:
-            if name == "replays" and not Path(self.bag).exists():
-                continue
             kind = KINDS[name]
             configuration = self.configuration.with_values(kind.values)
             for number in range(self.trials or (kind.short if self.short else kind.full)):
-                yield FaultCase(configuration, name, seed, number, self.bag)
+                yield FaultCase(configuration, name, seed, number)
 
     def own_values(self, case: FaultCase) -> Mapping[str, Any]:
         """Those of the kind."""

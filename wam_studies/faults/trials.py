@@ -31,7 +31,6 @@ class FaultLimits:
     after: float = 0.03  # s of the arm's time after the last
     streamed: float = 0.15  # s of the arm's time with two publishers
     after_publishers: float = 0.05  # s of the arm's time that is watched afterwards
-    replayed: int = 300  # messages of each topic of a bag
 
     noticed: float = 5.0  # s, in which a loss must be reported
     recovered: float = 20.0  # s, in which an operator gets an enabled arm again
@@ -65,7 +64,6 @@ class FaultCase(NamedTuple):
     kind: str
     seed: int
     number: int
-    bag: str  # that is replayed
 
     def __str__(self) -> str:
         return f"{self.kind} {self.number}, seed {self.seed}"
