@@ -9,7 +9,7 @@ import pytest
 from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
 from wam_control.force.force_law import ForceLaw
-from wam_control.force.force_loop import ForceCommand, ForceLoop, ForceOutput
+from wam_control.force.force_loop import ForceCommand, ForceOutput
 from wam_description.event import refused
 from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
@@ -49,15 +49,6 @@ def test_each_axis_has_a_law_of_its_own() -> None:
         )  # fmt: skip
         out = ask(force_loop(ARM, own), World(400.0), [9.0 * c for c in n])
         assert lever(POSE, n) @ out.velocity == pytest.approx(expected, rel=1e-6)
-
-
-def test_each_joint_has_a_law_of_its_own() -> None:
-    own = replace(
-        OWN, mode="joint_torque", torque_gain=(1.0, 2.0, 3.0, 4.0), torque_error_limit=(9.0,),
-        torque_deadband=(0.0, 0.5, 0.0, 1.0),
-    )  # fmt: skip
-    out = ask(force_loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -0.4, 1.3])
-    assert out.velocity == pytest.approx([1.0, 1.0, -1.2, 1.2], rel=1e-5)
 
 
 def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> None:
@@ -102,18 +93,6 @@ def test_laws_that_do_not_fit_are_refused_whole(change: dict[str, Any], text: st
     with pytest.raises(ParameterError, match=text):
         loop.tune(replace(OWN, **change, posture_gain=1.0))
     assert loop.parameters == OWN
-
-
-def largest_jump(loop: ForceLoop, changes: list[Any]) -> float:
-    """Largest change of a joint's velocity from one period to the next, rad/s, in a world that stands still."""
-    world, last, jump = World(400.0, force=2.0), np.zeros(4), 0.0
-    for change in changes:
-        if isinstance(change, dict):
-            loop.tune(replace(loop.parameters, **change))
-            continue
-        velocity = np.array(ask(loop, world, change).velocity)
-        jump, last = max(jump, float(np.abs(velocity - last).max())), velocity
-    return jump
 
 
 def test_the_saturation_holds_along_every_direction() -> None:

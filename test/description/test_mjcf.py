@@ -107,12 +107,6 @@ def test_tubes_reach_from_start_to_end_of_their_cover() -> None:
             np.testing.assert_allclose(ends, [start, end], atol=1e-9)
 
 
-def test_gravity_torque_is_that_of_pinocchio() -> None:
-    model = compiled()
-    for q in poses(200):
-        np.testing.assert_allclose(placed(model, q).qfrc_bias[4:], BODY.gravity_torque(q), atol=1e-9)
-
-
 def full_mass(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return np.array([_product(model, data, e) for e in np.eye(model.nv)]).T
 

@@ -9,7 +9,6 @@ import pytest
 from arms import WAM
 
 from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 
@@ -89,14 +88,6 @@ def test_winding_cools_with_its_time_constant_and_gives_peak_again() -> None:
     assert amp.step([PEAK, *REST], DT)[0] == PEAK
 
 
-def test_reset_forgets_the_heat() -> None:
-    amp = amplifier()
-    heat_up(amp)
-    amp.reset()
-    assert amp.heat == [0.0] * 4
-    assert amp.step([PEAK, *REST], DT)[0] == PEAK
-
-
 def test_motor_of_the_testbed_gives_60_inch_pounds_for_a_while_and_15_for_ever() -> None:
     """Four times the continuous current heats to 1 in T ln(16/15), 1.29 s; one period of 1 ms late at most."""
     testbed = Configuration.load(Path(__file__).parents[2] / "config" / "testbed.yaml")
@@ -153,13 +144,6 @@ def test_current_noise_has_its_standard_deviation_and_no_offset() -> None:
     np.testing.assert_allclose(np.corrcoef(normal.T), np.eye(3), atol=0.03)
 
 
-@pytest.mark.slow
-def test_current_noise_is_that_of_the_seed() -> None:
-    commanded = [1.0, -2.0, 1.0, 3.0]
-    np.testing.assert_array_equal(noisy(5, commanded), noisy(5, commanded))
-    assert np.all((noisy(5, commanded) != noisy(6, commanded))[:, [0, 1, 3]])
-
-
 def test_no_noise_flows_where_nothing_is_asked_for() -> None:
     assert not noisy(1, [0.0] * 4).any()
     assert not noisy(1, [0.1, -0.1, 0.1, 0.1], deadband=(0.2,) * 4).any()
@@ -171,9 +155,3 @@ def test_noise_does_not_go_beyond_the_peak() -> None:
     flowing = noisy(1, [PEAK, -PEAK, 0.0, 0.0])[:100]
     assert np.abs(flowing).max() == PEAK
     assert np.abs(flowing[:, 0]).min() < PEAK
-
-
-@pytest.mark.parametrize("name", ["deadband", "torque_ripple", "ripple_cycles", "current_noise", "torque_offset"])
-def test_wrong_number_of_values_is_refused_by_name(name: str) -> None:
-    with pytest.raises(ParameterError, match=rf"'amplifier\.{name}' has 3 values; 4 names need 4"):
-        amplifier(**{name: getattr(PERFECT, name)[:3]})

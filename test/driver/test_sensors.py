@@ -100,37 +100,3 @@ def test_noise_of_the_strain_gauges_has_its_standard_deviation_and_leaves_the_an
     np.testing.assert_allclose(error.std(axis=0), deviation, rtol=0.02)
     assert np.all(np.abs(error.mean(axis=0)) <= 0.02 * np.array(deviation))
     assert all(state.position == [1.0] * 4 and state.velocity == [2.0] * 4 for state in states)
-
-
-NOISY = {
-    "encoder_resolution": (1e-4,) * 4,
-    "encoder_noise": (1e-3,) * 4,
-    "joint_encoder_noise": (1e-3,) * 4,
-    "strain_noise": (0.1,) * 4,
-}
-
-
-def test_noise_is_that_of_the_seed() -> None:
-    def readings(seed: int) -> list[object]:
-        read = sensors(seed, **NOISY)
-        return [f([1.0] * 4, ZERO, ZERO, DT) for _ in range(50) for f in (read.motors, read.joints)]
-
-    assert readings(7) == readings(7)
-    assert readings(7) != readings(8)
-
-
-def test_after_a_reset_no_speed_is_made_of_the_way_back() -> None:
-    read = sensors(encoder_resolution=(1e-4,) * 4, joint_encoder_noise=(1e-9,) * 4)
-    for reset in (False, True):
-        read.motors([50.0] * 4, ZERO, ZERO, DT)
-        read.joints([2.0] * 4, ZERO, ZERO, DT)
-        if reset:
-            read.reset()
-        speeds = [f(ZERO, ZERO, ZERO, DT).velocity for f in (read.motors, read.joints)]
-        assert (speeds == [ZERO, ZERO]) is reset
-
-
-@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(PERFECT)])
-def test_wrong_number_of_values_is_refused_by_name(name: str) -> None:
-    with pytest.raises(ParameterError, match=rf"'sensors\.{name}' has 3 values; 4 names need 4"):
-        sensors(**{name: (0.0,) * 3})
