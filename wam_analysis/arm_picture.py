@@ -10,17 +10,15 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
 from wam_analysis.thresholds import LAYOUT
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, ObjectState
 from wam_description.world import World
-
-Array = NDArray[np.float64]
 
 OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
@@ -29,8 +27,8 @@ LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 class Tube(NamedTuple):
     """A cover: a cylinder with rounded ends between two points of the base frame, m."""
 
-    start: Array
-    end: Array
+    start: Numbers
+    end: Numbers
     radius: float
     colour: str
 
@@ -38,8 +36,8 @@ class Tube(NamedTuple):
 class Face(NamedTuple):
     """A flat face: corners (k, 3) in m and outward normal (3,), base frame, the shape that has it, and its colour."""
 
-    corners: Array
-    normal: Array
+    corners: Numbers
+    normal: Numbers
     shape: str
     colour: str
 
@@ -64,12 +62,12 @@ class View(NamedTuple):
 
     azimuth: float
     elevation: float
-    centre: Array
+    centre: Numbers
     width: float
     height: float
 
     @property
-    def axes(self) -> Array:
+    def axes(self) -> Numbers:
         """Right, up and forward as rows, (3, 3), base frame."""
         azimuth, elevation = math.radians(self.azimuth), math.radians(self.elevation)
         cos, sin = math.cos(azimuth), math.sin(azimuth)
@@ -77,10 +75,9 @@ class View(NamedTuple):
         right = [sin, -cos, 0.0]
         return np.array([right, np.cross(right, forward), forward])
 
-    def project(self, points: Array) -> Array:
+    def project(self, points: Numbers) -> Numbers:
         """Picture coordinates (..., 2), m from the middle, of points (..., 3) of the base frame."""
-        projected: Array = (points - self.centre) @ self.axes[:2].T
-        return projected
+        return (points - self.centre) @ self.axes[:2].T
 
 
 def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
@@ -98,7 +95,7 @@ def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
     ]
 
 
-def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[Array, Array]:
+def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[Numbers, Numbers]:
     """Point of a contact on the surface of its cover, and its force, base frame, m and N.
 
     Parameters
@@ -141,13 +138,13 @@ def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectSta
     return SideScene([*tubes(arm, q), *balls], faces, floor)
 
 
-def _faces(shape: str, size: Array, rotation: Array, centre: Array, colour: str) -> Iterator[Face]:
+def _faces(shape: str, size: Numbers, rotation: Numbers, centre: Numbers, colour: str) -> Iterator[Face]:
     """The faces of a solid; round ones in facets."""
     for corners, normal in _corners(shape, size):
         yield Face(corners @ rotation.T + centre, rotation @ normal, shape, colour)
 
 
-def _corners(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
+def _corners(shape: str, size: Numbers) -> Iterator[tuple[Numbers, Numbers]]:
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     if shape == "plane":
         yield np.column_stack([square * size[:2], np.zeros(4)]), np.array([0.0, 0.0, 1.0])
@@ -174,7 +171,7 @@ def side_view(
     margin: float = 0.08,
     azimuth: float = 112.0,
     elevation: float = -14.0,
-    more: Sequence[Array] = (),
+    more: Sequence[Numbers] = (),
 ) -> View:
     """A view from the side and a little from above that shows a scene and points; aspect: width by height."""
     points = [point for tube in shown.tubes for point in (tube.start, tube.end)]
@@ -211,7 +208,7 @@ def draw(axes: Axes, shown: SideScene, view: View) -> None:
         _draw_tube(axes, view, tube, 4.1 + 0.1 * depth)
 
 
-def arrow(axes: Axes, tail: Array, tip: Array, colour: str, width: float) -> None:
+def arrow(axes: Axes, tail: Numbers, tip: Numbers, colour: str, width: float) -> None:
     """An arrow in the picture plane, (2,) each, above the arm; a thin one is above a thick one."""
     style = {"arrowstyle": "-|>,head_width=0.35,head_length=0.7", "color": colour, "linewidth": width}
     axes.annotate(
@@ -245,7 +242,7 @@ def _draw_tube(axes: Axes, view: View, tube: Tube, zorder: float, inside: Polygo
         _stadium(axes, at, tube.radius * (1.0 - part), inside, facecolor=bright, edgecolor="none", zorder=zorder)
 
 
-def _stadium(axes: Axes, ends: Array, radius: float, inside: Polygon | None = None, **style: Any) -> None:
+def _stadium(axes: Axes, ends: Numbers, radius: float, inside: Polygon | None = None, **style: Any) -> None:
     begin, end = ends
     angle = math.atan2(end[1] - begin[1], end[0] - begin[0])
     half = np.linspace(-math.pi / 2.0, math.pi / 2.0, 25)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import Mask, Times, held_for, rows_before_gaps
+from wam_analysis.held_messages import held_for, rows_before_gaps
+from wam_bag.arrays import Mask, Times
 from wam_bag.bag import TableColumns, WrenchColumns
 from wam_bag.losses import Losses
 from wam_sim.recording import RecordedRun, RecordedStep

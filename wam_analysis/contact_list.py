@@ -6,22 +6,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import held_rows
 from wam_analysis.measures.runs import runs
 from wam_analysis.thresholds import TOUCH
-from wam_analysis.traces import (
-    HYPOTHESIS,
-    NAN,
-    ForceSignal,
-    Mask,
-    Names,
-    Numbers,
-    Times,
-    Traces,
-    most_probable,
-)
+from wam_analysis.traces import HYPOTHESIS, NAN, ForceSignal, Traces, most_probable
+from wam_bag.arrays import Index, Mask, Names, Numbers, Times
 from wam_description.event_text import REASONS
 from wam_sim.recording import RecordedRun, RecordedStep
 
@@ -293,7 +283,7 @@ def _listed(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep],
     )
 
 
-def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Estimate:
+def estimate(traces: Traces, certainty: Certainty, rows: Index) -> Estimate:
     """What was estimated in some rows, in all of which a contact was."""
     estimated = traces.estimated
     link = most(estimated.frame[rows])

@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
+from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 from wam_sim.recording import RecordedRun
-
-Times = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 
 def held_for(stamps: Times) -> int:
@@ -24,7 +22,7 @@ def held_for(stamps: Times) -> int:
     )
 
 
-def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
+def held_rows(stamps: Times, base: Times) -> tuple[Index, Mask]:
     """Row of the last message at or before each instant, and whether there is one and it is still held."""
     row = np.searchsorted(stamps, base, side="right") - 1
     known = row >= 0
@@ -32,7 +30,7 @@ def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
     return row, known & (base - stamps[row] <= held_for(stamps))
 
 
-def rows_before_gaps(stamps: Times) -> NDArray[np.intp]:
+def rows_before_gaps(stamps: Times) -> Index:
     """Rows of the messages after which none comes for longer than one is held."""
     return np.flatnonzero(np.diff(stamps) > held_for(stamps))
 
@@ -43,22 +41,22 @@ def with_holes(stamps: Times) -> Times:
     return np.sort(np.concatenate([stamps, last + held_for(stamps) + 1])) if len(last) else stamps
 
 
-def at_stamps(columns: JointColumns, stamps: Times) -> tuple[Mask, NDArray[np.intp]]:
+def at_stamps(columns: JointColumns, stamps: Times) -> tuple[Mask, Index]:
     """Whether there is a message with each of some stamps, and its row; columns must be sorted by stamp."""
     row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
     return columns.stamp_ns[row] == stamps, row
 
 
-def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> NDArray[np.float64] | None:
+def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> Numbers | None:
     """Columns of a field in the order of some names, (k, n); None if a name is missing."""
-    values: NDArray[np.float64] = getattr(columns, field)
+    values: Numbers = getattr(columns, field)
     if not values.shape[1] or any(name not in columns.names for name in names):
         return None
     order = [columns.names.index(name) for name in names]
     return values if order == list(range(values.shape[1])) else values[:, order]
 
 
-def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, NDArray[np.float64]] | None:
+def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     """Stamps, (k,), ns, and angles of the joints, (k, n), rad, of the best topic that has them; None without any."""
     for topic in ("sim/joint_states", "joint_sensors", "joint_states", "motor_states"):
         columns, is_motors = run.joints(topic), topic == "motor_states"

@@ -5,16 +5,14 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.task_forces import TaskForce
 from wam_analysis.thresholds import HOLD
 from wam_analysis.traces import Traces
+from wam_bag.arrays import Numbers
 from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
 from wam_sim.recording import RecordedRun, RecordedStep
-
-Numbers = NDArray[np.float64]
 
 
 class Hold(NamedTuple):

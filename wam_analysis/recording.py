@@ -3,7 +3,6 @@
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.command_gaps import CommandGap, command_gaps
 from wam_analysis.contact_list import ListedContact, TouchedLink, listed_contacts, true_contacts
@@ -16,6 +15,7 @@ from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_analysis.task_forces import RecordedTask, TaskForce, task_forces, tasks_of
 from wam_analysis.traces import Traces, traces_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
+from wam_bag.arrays import Mask
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import CUT, Losses, losses
 from wam_control.task.scenario import FORCE_LOOP
@@ -238,7 +238,7 @@ class AnalysedRecording:
         return listed_contacts(self.run, self.traces, self.steps)
 
     @cached_property
-    def blind(self) -> NDArray[np.bool_]:
+    def blind(self) -> Mask:
         """Whether nothing can be estimated at each instant: under the brakes, where the motors alone are observed."""
         blind = np.zeros(len(self.traces.stamp), dtype=bool)
         try:

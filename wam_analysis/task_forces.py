@@ -5,9 +5,9 @@ from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import rows_before_gaps
+from wam_bag.arrays import Numbers, Times
 from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
@@ -15,8 +15,6 @@ from wam_description.signals import Table
 from wam_sim.recording import RecordedRun
 from wam_sim.replay import tables
 
-Numbers = NDArray[np.float64]
-Times = NDArray[np.int64]
 RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns
 
 

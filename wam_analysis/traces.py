@@ -4,22 +4,17 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import held_rows, joint_angles, with_holes
 from wam_analysis.task_forces import TaskForce
 from wam_analysis.thresholds import TOUCH
+from wam_bag.arrays import Mask, Names, Numbers, Times
 from wam_description.arm import Arm
 from wam_description.event import Code
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_sim.reactions import RecordedReaction
 from wam_sim.recording import RecordedRun
-
-Numbers = NDArray[np.float64]
-Names = NDArray[np.str_]
-Times = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _Points = tuple[Times, Numbers]  # stamps, ns, and positions along a link, m, (k,)
 
@@ -71,8 +66,7 @@ class ForceSignal(NamedTuple):
     @property
     def is_lower_bound(self) -> Mask:
         """Whether an estimated force is the least one that explains the torques, (k,): its position is unknown."""
-        unknown: Mask = self.acts & self.is_placed & np.isnan(self.position)
-        return unknown
+        return self.acts & self.is_placed & np.isnan(self.position)
 
     def unknown(self, rows: Mask) -> "ForceSignal":
         """The same without its values in some rows, (k,)."""

@@ -8,7 +8,8 @@ import numpy as np
 from wam_analysis.command_gaps import COMMANDS, CommandGap
 from wam_analysis.held_messages import held_rows
 from wam_analysis.thresholds import TOUCH
-from wam_analysis.traces import NAN, Mask, Numbers, Traces
+from wam_analysis.traces import NAN, Traces
+from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.task.scenario import FORCE_LOOP
@@ -130,8 +131,7 @@ def _planned(run: RecordedRun, traces: Traces) -> Mask:
     if not np.any(acts):
         return acts
     last = np.maximum.accumulate(np.where(acts, traces.stamp, 0))
-    planned: Mask = (last > 0) & (traces.stamp - last <= TOUCH.after_command)
-    return planned
+    return (last > 0) & (traces.stamp - last <= TOUCH.after_command)
 
 
 def _of_task(run: RecordedRun, traces: Traces) -> Mask:
@@ -140,5 +140,4 @@ def _of_task(run: RecordedRun, traces: Traces) -> Mask:
     if columns is None:
         return np.zeros(len(traces.stamp), bool)
     row, known = held_rows(columns.stamp_ns, traces.stamp)
-    commanded: Mask = known & np.isin(row, columns.message)
-    return commanded
+    return known & np.isin(row, columns.message)

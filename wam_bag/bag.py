@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mcap.records import Attachment, Channel
 
+from wam_bag.arrays import Times
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
 from wam_bag.cdr import Decoder
 from wam_bag.columns import (
@@ -35,7 +36,6 @@ from wam_bag.columns import (
 from wam_bag.contents import add_attachments, merge
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
-from wam_bag.message_groups import Times
 from wam_bag.message_search import NEVER, log_times, messages
 
 __all__ = [

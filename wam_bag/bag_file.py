@@ -12,10 +12,11 @@ import yaml
 from mcap.records import Channel
 
 from wam_bag import safe_yaml
+from wam_bag.arrays import Bytes
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import McapFile
-from wam_bag.mcap_records import MAGIC, Bytes
+from wam_bag.mcap_records import MAGIC
 from wam_bag.message_search import NEVER, Found, MessageBatch, together
 from wam_bag.message_text import Fields, definitions
 

@@ -14,16 +14,15 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_bag.arrays import Bytes, Index, Mask, Numbers, Texts, Times
 from wam_bag.cdr import Decoder, Definitions
 from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
-from wam_bag.mcap_records import Bytes
-from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
+from wam_bag.message_groups import Decoded, Group, Grouping
 from wam_bag.message_search import DATA, Found, log_times, messages
 from wam_bag.message_text import definitions
 from wam_bag.point_clouds import table_columns, tables
 
-Texts = NDArray[np.object_]
 Series = dict[str, NDArray[Any]]
 AXES = ("x", "y", "z")
 JOINT_FIELDS = ("position", "velocity", "effort")
@@ -107,7 +106,7 @@ class BoolColumns(NamedTuple):
     """std_msgs/Bool, k messages."""
 
     log_time_ns: Times
-    data: NDArray[np.bool_]
+    data: Mask
 
 
 @_brief

@@ -63,8 +63,7 @@ def type_hash(name: str) -> str:
 
 @cache
 def _copies() -> dict[str, Any]:
-    copies: dict[str, Any] = json.loads(Path(__file__).with_name("messages.json").read_text(encoding="utf-8"))
-    return copies
+    return json.loads(Path(__file__).with_name("messages.json").read_text(encoding="utf-8"))
 
 
 def _copy(name: str) -> Any:

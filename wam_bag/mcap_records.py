@@ -11,18 +11,15 @@ from io import BytesIO
 from typing import Any, Final
 
 import lz4.frame
-import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 
+from wam_bag.arrays import Bytes
 from wam_bag.errors import Damage, TooLargeError
-
-Bytes = NDArray[np.uint8]
 
 MAGIC: Final[bytes] = MCAP0_MAGIC
 HEAD: Final = struct.Struct("<BQ")  # opcode and length of a record
@@ -73,8 +70,7 @@ def serialized(*items: records.McapRecord) -> bytes:
     builder = RecordBuilder()
     for item in items:
         item.write(builder)
-    data: bytes = builder.end()  # type: ignore[no-untyped-call]
-    return data
+    return builder.end()  # type: ignore[no-untyped-call]
 
 
 def walk(data: bytes) -> Iterator[tuple[int, int, int]]:

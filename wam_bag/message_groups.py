@@ -6,16 +6,13 @@ from typing import Any, Final, NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_bag.arrays import Bytes, Index, Mask, Numbers, Rows, Times
 from wam_bag.cdr import ENCAPSULATION, Decoder, Definitions, Layout
 from wam_bag.errors import BagError, Damage
 from wam_bag.limits import READING_LIMITS
-from wam_bag.mcap_records import Bytes
-from wam_bag.message_search import Offsets, at
+from wam_bag.message_search import at
 
-Index = NDArray[np.intp]
 Words = NDArray[np.uint64]
-Times = NDArray[np.int64]
-Numbers = NDArray[np.float64]
 
 BEFORE: Final = 8 - ENCAPSULATION  # bytes before a message that align its numbers to multiples of eight
 
@@ -74,7 +71,7 @@ class Known(NamedTuple):
         spans = [(a, b, masks[a:b], wants[a:b]) for a, b in edges.reshape(-1, 2).tolist()]
         return Known(size, layout, spans)
 
-    def fits(self, words: Words) -> NDArray[np.bool_] | None:
+    def fits(self, words: Words) -> Mask | None:
         """Which rows are of this layout; None if all are."""
         wrong = [((words[:, a:b] & mask) != want) for a, b, mask, want in self.spans]
         if not any(each.any() for each in wrong):
@@ -95,7 +92,7 @@ class Grouping:
         self._kind, self._definitions = kind, definitions
         self._known: list[Known] = []
 
-    def __call__(self, buffer: Bytes, starts: Offsets, sizes: Offsets) -> Iterator[Group]:
+    def __call__(self, buffer: Bytes, starts: Rows, sizes: Rows) -> Iterator[Group]:
         """Groups of the messages that begin at these places of a buffer and have these sizes."""
         for size in [int(sizes[0])] if len(sizes) and (sizes == sizes[0]).all() else np.unique(sizes).tolist():
             rows = np.flatnonzero(sizes == size)

@@ -8,10 +8,10 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
+from wam_bag.arrays import Bytes, Rows, Times
 from wam_bag.errors import Damage
-from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, Bytes, walk
+from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, walk
 
-Offsets = NDArray[np.int64]
 NEVER: Final = 2**63  # ns; later than every log time
 DATA: Final = HEAD.size + 22  # bytes of a message record before its data: head, channel, sequence, two times
 _INDEX_HEAD: Final = HEAD.size + 6  # bytes of a message index record before its entries
@@ -23,8 +23,8 @@ Define = Callable[[int, bytes], None]
 class Found(NamedTuple):
     """Messages in a buffer in the order of the file: where their records start, and the bytes of each message."""
 
-    offsets: Offsets
-    sizes: Offsets
+    offsets: Rows
+    sizes: Rows
 
 
 class MessageBatch(NamedTuple):
@@ -58,7 +58,7 @@ def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | N
             return None
         define(opcode, part[content:end].tobytes())
         start = end
-    entries: dict[int, Offsets] = {}
+    entries: dict[int, Rows] = {}
     try:
         for opcode, record, end in walk(index):
             first = record + _INDEX_HEAD
@@ -108,14 +108,14 @@ def _by_walking(data: bytes, define: Define) -> dict[int, Found]:
     return {channel: Found(*np.array(found, np.int64).T) for channel, found in places.items()}
 
 
-def at(buffer: Bytes, offsets: Offsets, dtype: str) -> NDArray[Any]:
+def at(buffer: Bytes, offsets: Rows, dtype: str) -> NDArray[Any]:
     """Values of a type that start at these places of a buffer."""
     kind = np.dtype(dtype)
     view: NDArray[Any] = np.ndarray((max(len(buffer) - kind.itemsize + 1, 0),), kind, buffer, strides=(1,))
     return view[offsets]
 
 
-def log_times(buffer: Bytes, found: Found) -> NDArray[np.int64]:
+def log_times(buffer: Bytes, found: Found) -> Times:
     """Log times of messages, ns."""
     times = at(buffer, found.offsets + 15, "<u8")
     if (times >= NEVER).any():

@@ -6,8 +6,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_bag.arrays import Bytes, Index
 from wam_bag.errors import Damage
-from wam_bag.message_groups import Group, Index
+from wam_bag.message_groups import Group
 
 TYPES: Final = dict(enumerate(("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"), 1))  # of the numbers in PointField
 _SIZES: Final = ("height", "width", "is_bigendian", "point_step", "row_step")
@@ -43,7 +44,7 @@ def tables(group: Group) -> list[PointTable]:
     return found
 
 
-def _points(data: NDArray[np.uint8], names: list[str], described: list[int]) -> NDArray[Any]:
+def _points(data: Bytes, names: list[str], described: list[int]) -> NDArray[Any]:
     """Bytes of m messages as points, (m, p), from the values of `_SIZES` and the three of each field."""
     height, width, is_bigendian, step, row_step = described[: len(_SIZES)]
     fields = [described[i : i + 3] for i in range(len(_SIZES), len(described), 3)]

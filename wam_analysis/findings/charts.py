@@ -6,7 +6,6 @@ from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, SHAFTS
 from wam_analysis.findings.analysis import Analysis
@@ -15,8 +14,7 @@ from wam_analysis.foreign.sources import Source, longest, pieces
 from wam_analysis.measures.lines import amplitudes
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT, STREAM
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 FORCES = {**COLOURS, "at least": LIKELY}
 TIME, FORCE, FIRST, SIGNALS = "time [s]", "force [N]", "happened", "signals"

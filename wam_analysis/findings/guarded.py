@@ -6,19 +6,17 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
+from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import force_law, task_of
 from wam_control.force.friction_verdict import Domain
 from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
 from wam_control.force.thresholds import GUARD
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-
-Numbers = NDArray[np.float64]
 
 
 class Guarded(NamedTuple):

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.contact_list import most
 from wam_analysis.findings.guarded import Guarded, guarded
@@ -22,14 +21,13 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_analysis.traces import ForceSignal, Traces
+from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
 from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
-
-Numbers = NDArray[np.float64]
 
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan)
@@ -212,7 +210,7 @@ def _touched(traces: Traces, parameters: PredictionParameters, hold: Hold) -> tu
     return (loop.contact_cover, loop.contact_position) if loop is not None else ("", math.nan)
 
 
-def _median_position(signal: ForceSignal, rows: NDArray[np.bool_]) -> tuple[str, float]:
+def _median_position(signal: ForceSignal, rows: Mask) -> tuple[str, float]:
     if not np.any(rows):
         return "", math.nan
     cover = most(signal.frame[rows])

@@ -4,7 +4,6 @@ import cmath
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.transmission import turning
@@ -14,8 +13,6 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
-
-Numbers = NDArray[np.float64]
 
 ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import Finding, Section, shown, stated
 from wam_analysis.findings.transmission_signals import TransmissionSignals
@@ -12,9 +11,8 @@ from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
-
-Numbers = NDArray[np.float64]
 
 
 def power_section(recording: AnalysedRecording) -> Section | None:
@@ -64,8 +62,7 @@ def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
     loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
     loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
     creep = np.array([circuit.loss_per_torque for circuit in arm.circuits])
-    result: Numbers = loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
-    return result
+    return loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
 
 
 def _backdrive(arm: Arm, friction: Mapping[str, Friction], joints: Mapping[str, Friction]) -> list[Finding]:

@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_theory import linear_loop, regimes, stiction
-
-Numbers = NDArray[np.float64]
 
 
 class Node(NamedTuple):

@@ -4,18 +4,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
 from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns
 from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
-
-Numbers = NDArray[np.float64]
 
 
 class Swinging(NamedTuple):

@@ -6,7 +6,6 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.contact_list import median
 from wam_analysis.findings.finding import Finding, Section, shown
@@ -14,10 +13,9 @@ from wam_analysis.foreign.sources import Source
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.recording import RATE, STAMPED, AnalysedRecording
 from wam_analysis.thresholds import SHAFT, STREAM
+from wam_bag.arrays import Times
 from wam_bag.losses import RECORDING
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
-
-Times = NDArray[np.int64]
 
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 

@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
@@ -15,10 +14,9 @@ from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
+from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Arm
 from wam_sim.recording import RecordedRun
-
-Numbers = NDArray[np.float64]
 
 
 class TransmissionFindings(NamedTuple):
@@ -170,6 +168,6 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
     return found
 
 
-def turning(signals: TransmissionSignals, motor: int) -> NDArray[np.bool_]:
+def turning(signals: TransmissionSignals, motor: int) -> Mask:
     """The samples in which a motor turns."""
     return (np.abs(signals.velocity[:, motor]) > SHAFT.motor_rest) & signals.use & signals.sampled

@@ -4,16 +4,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import at_stamps, by_names
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import SHAFT
+from wam_bag.arrays import Mask, Numbers, Times
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 from wam_sim.recording import RecordedRun
-
-Numbers = NDArray[np.float64]
 
 CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"
@@ -45,8 +43,8 @@ class TransmissionSignals(NamedTuple):
     torque: Numbers
     load: Numbers
     load_from: str
-    use: NDArray[np.bool_]
-    sampled: NDArray[np.bool_]
+    use: Mask
+    sampled: Mask
     joint_velocity: Numbers
     cable_torque: Numbers
     strain: Numbers
@@ -105,7 +103,7 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
     )
 
 
-def _braked(run: RecordedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _braked(run: RecordedRun, stamps: Times) -> Mask:
     """Whether the brakes held, which is not friction; extended until the cables have taken the load."""
     braked = np.zeros(len(stamps), dtype=np.bool_)
     since: int | None = None
@@ -120,7 +118,7 @@ def _braked(run: RecordedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
     return braked if since is None else braked | (stamps >= since)
 
 
-def _touched(run: RecordedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _touched(run: RecordedRun, stamps: Times) -> Mask:
     """Whether something pushes or touches the arm, or does shortly before or after."""
     touched = np.zeros(len(stamps), dtype=np.bool_)
     for topic in TOUCHES:
@@ -152,12 +150,12 @@ def _period(run: RecordedRun) -> float:
     return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
 
 
-def _recorded_at(run: RecordedRun, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _recorded_at(run: RecordedRun, topic: str, stamps: Times) -> Mask:
     columns = run.joints(topic)
     return np.zeros(len(stamps), dtype=np.bool_) if columns is None else at_stamps(columns, stamps)[0]
 
 
-def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
+def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: Times) -> Numbers:
     """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages and in their gaps."""
     result = np.full((len(stamps), len(names)), np.nan)
     columns = run.joints(topic)

@@ -5,12 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
+from wam_bag.arrays import Times
 from wam_bag.bag import JointColumns, WrenchColumns
-
-Times = NDArray[np.int64]
 
 CLOCK_SET = "stamps of a clock that was set or never set; times of reception are used"
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Piece, Source, longest, pieces
 from wam_analysis.held_messages import row_at
@@ -13,8 +12,7 @@ from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import SpectralLine, spectral_lines
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1e-2, "A": 1e-3}  # peak to peak
 
@@ -163,8 +161,7 @@ def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
     slow = [_slowed(desired, period / (period + tau)) for tau in CYCLE.command_filters]
     columns = np.column_stack([np.ones(len(desired)), *late, *slow])
-    rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]
-    return rest
+    return value - columns @ np.linalg.lstsq(columns, value, rcond=CYCLE.singular)[0]
 
 
 def _slowed(value: Numbers, share: float) -> Numbers:
@@ -199,8 +196,7 @@ def _begins_after(command: Source, begin: float) -> bool:
 
 def held(command: Source, quantity: str, time: Numbers) -> Numbers:
     """The last command before each of some times, before the first one that, (n,)."""
-    values: Numbers = command.values[quantity][row_at(command.time, time)]
-    return values
+    return command.values[quantity][row_at(command.time, time)]
 
 
 def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
@@ -208,8 +204,7 @@ def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
     most = min(CYCLE.harmonics, int(0.5 / (frequency * float(time[1] - time[0]))) - 1)
     angles = 2.0 * np.pi * frequency * np.outer(time - time[0], np.arange(1, most + 1))
     columns = np.column_stack([np.ones(len(time)), time - time[0], np.cos(angles), np.sin(angles)])
-    rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
-    return rest
+    return value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
 
 
 def lines(source: Source) -> list[tuple[str, str, SpectralLine]]:

@@ -3,14 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Source, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.thresholds import HOLD
-
-Numbers = NDArray[np.float64]
 
 FORCE = ("force.x", "force.y", "force.z")
 

@@ -5,14 +5,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, resolution
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.thresholds import SHAFT
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Mask, Numbers, Rows
 
 WEIGHT, DRAG, FILTER = "weight", "drag", "filter"
 
@@ -81,10 +79,9 @@ def _only_turns(phases: Phases, velocity: Numbers) -> bool:
     return rest < SHAFT.brief * motion
 
 
-def _turns(sticks: NDArray[np.int64], velocity: Numbers) -> NDArray[np.bool_]:
+def _turns(sticks: Rows, velocity: Numbers) -> Mask:
     """Whether the motion after each rest goes against the one before it; not all turns of a motion are rests."""
-    opposed: NDArray[np.bool_] = velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
-    return opposed
+    return velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
 
 
 def _rest(piece: Piece, least: float) -> float:
@@ -264,7 +261,7 @@ class _Acceleration(NamedTuple):
 
     value: Numbers
     noise: float
-    rows: NDArray[np.bool_]
+    rows: Mask
 
     @classmethod
     def of(cls, velocity: Numbers, sd: float, rest: float, width: int, period: float) -> "_Acceleration":

@@ -15,17 +15,15 @@ from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
-from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
+from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
 from wam_bag.columns import UNNAMED, irregularities, joint_names
 from wam_bag.contents import contents
-
-Numbers = NDArray[np.float64]
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 JOINT_FIELDS = {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"}
@@ -314,7 +312,7 @@ def _at(topic: str, message: Any, path: str) -> Any:
     return value
 
 
-def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> NDArray[np.int64]:
+def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> Times:
     """Stamps of the messages, ns; times of reception where they have none."""
     path = fields.get("stamp", "header.stamp")
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
@@ -345,7 +343,7 @@ def _integers(topic: str, columns: Messages, path: str) -> list[int]:
     return [int(row[0]) for row in _numbers(topic, columns, path)]
 
 
-def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], received: NDArray[np.int64]) -> None:
+def _refuse_other_pace(topic: str, path: str, stamps: Times, received: Times) -> None:
     """Refuse numbers as seconds where the receptions show that they are others."""
     took, numbers = np.ptp(received) / 1e9, np.ptp(stamps) / 1e9
     if took > 0.0 and numbers > STREAM.faster * took:
@@ -356,7 +354,7 @@ def _refuse_other_pace(topic: str, path: str, stamps: NDArray[np.int64], receive
         )
 
 
-def _frames(columns: Messages) -> NDArray[np.object_]:
+def _frames(columns: Messages) -> Texts:
     heads = [getattr(message, "header", None) for message in columns.messages]
     return np.array([str(getattr(head, "frame_id", "")).removeprefix("/") for head in heads], object)
 

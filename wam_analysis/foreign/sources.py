@@ -7,7 +7,6 @@ from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.foreign.clocks import Clock, clocks
 from wam_analysis.foreign.reading import COMMAND
@@ -15,11 +14,8 @@ from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import SHAFT, STREAM
+from wam_bag.arrays import Index, Mask, Numbers, Times
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
-
-Numbers = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Times = NDArray[np.int64]
 
 AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
@@ -175,7 +171,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
 class _Timed(NamedTuple):
     """Messages of a sender in the order of their times, s, each once."""
 
-    rows: NDArray[np.intp]
+    rows: Index
     time: Numbers
     treated: tuple[Treated, ...]
 
@@ -284,7 +280,7 @@ def _parts(
     ]
 
 
-def _received(rows: NDArray[np.intp], stamps: Times, received: Times, treated: Treated) -> _Timed:
+def _received(rows: Index, stamps: Times, received: Times, treated: Treated) -> _Timed:
     """Messages at their times of reception, less what these are later than the stamps at least."""
     arrived = received[rows]
     order = np.argsort(arrived, kind="stable")
@@ -431,8 +427,7 @@ def at_times(wanted: Numbers, time: Numbers, value: Numbers) -> Numbers:
     lesser = np.where(left * right > 0.0, np.sign(left) * np.minimum(np.abs(left), np.abs(right)), 0.0)
     row = np.clip(np.searchsorted(time, wanted, side="right") - 1, 0, len(time) - 2)
     after = wanted - time[row]
-    found: Numbers = value[row] + after * (slope[row] + lesser[row] * (wanted - time[row + 1]))
-    return found
+    return value[row] + after * (slope[row] + lesser[row] * (wanted - time[row + 1]))
 
 
 def longest(some: list[Piece]) -> Piece | None:

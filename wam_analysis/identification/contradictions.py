@@ -10,16 +10,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import DIRECTIONS
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.thresholds import IDENTIFY
+from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
-
-Array = NDArray[np.float64]
 
 
 class Mistake(StrEnum):
@@ -111,14 +109,14 @@ class _Fit:
         self._shared, self._unknowns = shared, found.unknowns
         self._stribeck = np.array(shared.model.motors.stribeck_velocity)
 
-    def torques(self, motion: MotionSamples) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def torques(self, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
         """Of the configured arm and as recorded, N m, and where they count, (k, n) each."""
         equations = Regressor(self._shared, self._unknowns, motion, self._stribeck).equations(self._unknowns.present)
         model = equations.columns @ self._unknowns.present + motion.torque - equations.torque
         return model, motion.torque, equations.is_used
 
     @staticmethod
-    def misfit(model: Array, torque: Array, used: NDArray[np.bool_]) -> float:
+    def misfit(model: Numbers, torque: Numbers, used: Mask) -> float:
         """Rms difference per rms torque of the model, the mean over motors."""
         counts = np.maximum(used.sum(0), 1)
         left, size = (np.sqrt((each**2 * used).sum(0) / counts) for each in (torque - model, model))
@@ -126,7 +124,7 @@ class _Fit:
         return float(np.mean(left[moved] / np.maximum(size[moved], IDENTIFY.least_friction))) if moved.any() else 0.0
 
 
-def _ratio(model: Array, torque: Array, used: NDArray[np.bool_]) -> float:
+def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
     """How many times the torques of the model the recorded ones are; 1 where that is not known."""
     product, square = float((model * torque * used).sum()), float((model**2 * used).sum())
     return product / square if square and product else 1.0

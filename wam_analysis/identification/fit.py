@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns, with_kept_weight
@@ -19,10 +18,9 @@ from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_ve
 from wam_analysis.identification.tracked_errors import TrackedErrors, tracked_errors
 from wam_analysis.identification.uncertainty import Uncertainty
 from wam_analysis.thresholds import IDENTIFY
+from wam_bag.arrays import Mask, Numbers, Rows
 from wam_description.arm import Shared
 from wam_description.transmission_map import TransmissionMap
-
-Array = NDArray[np.float64]
 
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
 
@@ -47,32 +45,31 @@ class Identification(NamedTuple):
     """
 
     unknowns: Unknowns
-    values: Array
+    values: Numbers
     uncertainty: Uncertainty
-    alone: Array
-    stribeck_velocity: Array
-    residual: Array
-    held_out: Array
-    before: Array
-    seconds: Array
+    alone: Numbers
+    stribeck_velocity: Numbers
+    residual: Numbers
+    held_out: Numbers
+    before: Numbers
+    seconds: Numbers
     condition: float
     rank: int
-    both_directions: Array
+    both_directions: Numbers
     tracked: TrackedErrors
 
     @property
-    def covariance(self) -> Array:
+    def covariance(self) -> Numbers:
         """(p, p), of the values."""
         return self.uncertainty.covariance(np.eye(len(self.values)))
 
     @property
-    def sd(self) -> Array:
+    def sd(self) -> Numbers:
         """(p,), standard deviations of the values."""
-        found: Array = np.sqrt(self.covariance.diagonal())
-        return found
+        return np.sqrt(self.covariance.diagonal())
 
     @property
-    def offset_if_alike(self) -> tuple[Array, Array]:
+    def offset_if_alike(self) -> tuple[Numbers, Numbers]:
         """Torque offset of each motor if its friction were alike in both directions, and its standard error.
 
         (n,) each, N m, true less reported torque.  No recording shows which of both a difference of the directions is.
@@ -84,12 +81,12 @@ class Identification(NamedTuple):
         return 0.5 * (self.values[negative] - self.values[positive]), 0.5 * np.sqrt(np.maximum(both, 0.0))
 
     @property
-    def is_identified(self) -> NDArray[np.bool_]:
+    def is_identified(self) -> Mask:
         """(p,), whether the motion shows a parameter by itself."""
         return self.sd <= IDENTIFY.identified * self.unknowns.prior_sd
 
     @property
-    def is_combined(self) -> NDArray[np.bool_]:
+    def is_combined(self) -> Mask:
         """(p,), whether the motion shows a parameter only together with others."""
         return ~self.is_identified & (self.alone <= IDENTIFY.identified * self.unknowns.prior_sd)
 
@@ -97,21 +94,21 @@ class Identification(NamedTuple):
 class _Normal(NamedTuple):
     """Normal equations by part of the motion: (parts, p, p) and (parts, p)."""
 
-    information: Array
-    vector: Array
+    information: Numbers
+    vector: Numbers
 
 
 class _Estimate(NamedTuple):
     """One fit, with the v_s of its regressor; `errors` (parts, n) are squared ones of held-out motion."""
 
     equations: Equations
-    part: NDArray[np.int64]
-    values: Array
-    without: Array  # (parts, p), estimates without each part
-    prior_sd: Array
+    part: Rows
+    values: Numbers
+    without: Numbers  # (parts, p), estimates without each part
+    prior_sd: Numbers
     normal: _Normal
-    held_out: Array
-    errors: Array
+    held_out: Numbers
+    errors: Numbers
 
 
 def identify(shared: Shared, motion: MotionSamples) -> Identification:
@@ -130,7 +127,7 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     sought = unknowns(shared)
     present = np.array(shared.model.motors.stribeck_velocity)
 
-    def estimate(velocity: Array, start: Array | None = None) -> _Estimate:
+    def estimate(velocity: Numbers, start: Numbers | None = None) -> _Estimate:
         return _estimate(Regressor(shared, sought, motion, velocity), sought, start)
 
     still = _still(shared, Regressor(shared, sought, motion, present).equations(sought.present))
@@ -163,15 +160,14 @@ def _still(shared: Shared, equations: Equations) -> list[int]:
     return [j for j, row in enumerate(matrix) if (seconds[row != 0.0] < IDENTIFY.least_motion).any()]
 
 
-def _through(shared: Shared) -> Array:
+def _through(shared: Shared) -> Numbers:
     """Friction of a joint with a motor of its own at that motor, (n,), N m, as far as the present arm has it."""
     matrix = TransmissionMap.of(shared.arm).joint_from_motor
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(len(matrix))]
-    found: Array = own.T @ shared.arm.joints.dynamic_friction
-    return found
+    return own.T @ shared.arm.joints.dynamic_friction
 
 
-def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None) -> _Estimate:
+def _estimate(regressor: Regressor, sought: Unknowns, start: Numbers | None = None) -> _Estimate:
     values, prior_sd, centre = sought.present, sought.prior_sd.copy(), sought.present.copy()
     if start is not None:
         values = start
@@ -200,14 +196,13 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None
     return _Estimate(equations, part, values, without, prior_sd, normal, _rms(left, equations.is_used), errors)
 
 
-def _parts(equations: Equations) -> NDArray[np.int64]:
+def _parts(equations: Equations) -> Rows:
     """Part of the motion that each sample belongs to, (k,), of equal numbers of samples."""
     k = len(equations.time)
-    found: NDArray[np.int64] = np.arange(k) * IDENTIFY.parts // k
-    return found
+    return np.arange(k) * IDENTIFY.parts // k
 
 
-def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _Normal:
+def _normal(equations: Equations, part: Rows, values: Numbers) -> _Normal:
     """Weighted normal equations; rows far from the present estimate count less (Huber)."""
     weight = _weights(equations, values)
     p = equations.columns.shape[2]
@@ -220,32 +215,28 @@ def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _No
     return _Normal(information, vector)
 
 
-def _weights(equations: Equations, values: Array) -> Array:
+def _weights(equations: Equations, values: Numbers) -> Numbers:
     """Weights of the rows, (k, n), 1/(N^2 m^2)."""
     left = equations.torque - equations.columns @ values
     scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
-    found: Array = (
-        np.minimum(1.0, IDENTIFY.huber * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
-    )
-    return found
+    return np.minimum(1.0, IDENTIFY.huber * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
 
 
-def _deviation(residuals: Array) -> float:
+def _deviation(residuals: Numbers) -> float:
     """Standard deviation of residuals by their median, N m."""
     return max(1.4826 * float(np.median(np.abs(residuals))), 1e-6) if len(residuals) else 1.0
 
 
-def _solve(information: Array, vector: Array, prior: Array, centre: Array) -> Array:
+def _solve(information: Numbers, vector: Numbers, prior: Numbers, centre: Numbers) -> Numbers:
     return np.asarray(np.linalg.solve(information + prior, vector + prior @ centre), np.float64)
 
 
-def _rms(left: Array, is_used: NDArray[np.bool_]) -> Array:
+def _rms(left: Numbers, is_used: Mask) -> Numbers:
     counts = np.maximum(is_used.sum(0), 1)
-    found: Array = np.sqrt((left**2 * is_used).sum(0) / counts)
-    return found
+    return np.sqrt((left**2 * is_used).sum(0) / counts)
 
 
-def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: Array) -> Uncertainty:
+def _uncertainty(sought: Unknowns, best: _Estimate, through: Numbers, asymmetric: Numbers) -> Uncertainty:
     equations, variance = best.equations, np.zeros(len(sought.names))
     for way in DIRECTIONS:
         coulomb, load = (sought.places(f"motors.{what}_{way}") for what in ("coulomb", "load"))
@@ -261,7 +252,7 @@ def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: 
     return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
 
 
-def _moved_by_averaging(best: _Estimate, prior: Array) -> Array:
+def _moved_by_averaging(best: _Estimate, prior: Numbers) -> Numbers:
     """By how much the estimate differs, (p,), where neighbouring equations are averaged, from that of the same ones.
 
     Of a right model it would not.  Torque ripple accelerates the rotors within a window, the cables give way to it and
@@ -278,7 +269,7 @@ def _moved_by_averaging(best: _Estimate, prior: Array) -> Array:
     follow = span < (IDENTIFY.averaged - 0.5) * np.median(np.diff(equations.time))
     whole = sliding_window_view(equations.is_used, IDENTIFY.averaged, 0).all(-1) & follow[:, None]
 
-    def solved(torque: Array, columns: Array) -> Array:
+    def solved(torque: Numbers, columns: Numbers) -> Numbers:
         weighted = columns * (weights[middle] * whole)[..., None]
         information = np.einsum("knp,knq->pq", weighted, columns, optimize=True)
         return _solve(information, np.einsum("knp,kn->p", weighted, torque), prior, best.values)
@@ -287,12 +278,11 @@ def _moved_by_averaging(best: _Estimate, prior: Array) -> Array:
         np.asarray(sliding_window_view(each, IDENTIFY.averaged, 0) @ (bell / bell.sum()), np.float64)
         for each in (equations.torque, equations.columns)
     ]
-    found: Array = solved(*averaged) - solved(equations.torque[middle], equations.columns[middle])
-    return found
+    return solved(*averaged) - solved(equations.torque[middle], equations.columns[middle])
 
 
 def _result(
-    sought: Unknowns, best: _Estimate, velocity: Array, uncertainty: Uncertainty, tracked: TrackedErrors
+    sought: Unknowns, best: _Estimate, velocity: Numbers, uncertainty: Uncertainty, tracked: TrackedErrors
 ) -> Identification:
     equations, information = best.equations, best.normal.information.sum(0)
     before = equations.torque - equations.columns @ sought.present

@@ -9,15 +9,13 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.held_messages import by_names
 from wam_analysis.thresholds import IDENTIFY, STREAM
+from wam_bag.arrays import Mask, Numbers
 from wam_bag.bag import BagError
 from wam_description.arm import Arm
 from wam_sim.recording import RecordedRun
-
-Array = NDArray[np.float64]
 
 LOADS = {
     "sim/disturbance": "the simulator pushed the arm",
@@ -36,10 +34,10 @@ class MotorRecord(NamedTuple):
     is_used : (k,), False where states are missing or the brakes hold.
     """
 
-    time: Array
-    theta: Array
-    torque: Array
-    is_used: NDArray[np.bool_]
+    time: Numbers
+    theta: Numbers
+    torque: Numbers
+    is_used: Mask
 
 
 class MotionSamples(NamedTuple):
@@ -55,14 +53,14 @@ class MotionSamples(NamedTuple):
     weights : (w,), of the states in the mean of a window.
     """
 
-    time: Array
-    theta: Array
-    thetad: Array
-    thetadd: Array
-    torque: Array
-    velocities: Array
-    torques: Array
-    weights: Array
+    time: Numbers
+    theta: Numbers
+    thetad: Numbers
+    thetadd: Numbers
+    torque: Numbers
+    velocities: Numbers
+    torques: Numbers
+    weights: Numbers
 
 
 def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
@@ -104,7 +102,7 @@ def loaded(run: RecordedRun) -> Iterator[str]:
             yield f"{what} in {100.0 * share:.2g} %"
 
 
-def evenly(stamps: Array, theta: Array, effort: Array) -> MotorRecord:
+def evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotorRecord:
     """States at a constant rate; where a few are missing, interpolated ones.
 
     Parameters
@@ -179,12 +177,12 @@ def motion(record: MotorRecord) -> MotionSamples:
     )
 
 
-def _cubic(half: int, period: float) -> Sequence[Array]:
+def _cubic(half: int, period: float) -> Sequence[Numbers]:
     """Weights, (2 half + 1,), of value, first and second derivative in the middle of a window."""
     at = np.arange(-half, half + 1) * period
     solved = np.linalg.pinv(np.vander(at / (half * period), 4, increasing=True))
     return [math.factorial(i) * solved[i] / (half * period) ** i for i in range(3)]
 
 
-def _smoothed(values: Array, weights: Array) -> Array:
+def _smoothed(values: Numbers, weights: Numbers) -> Numbers:
     return np.column_stack([np.convolve(column, weights[::-1], mode="same") for column in values.T])

@@ -6,16 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY, LAYOUT
+from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, SHARED, Configuration
 from wam_description.parameters import ParameterError
-
-Array = NDArray[np.float64]
 
 HEADING = "# The controllers' model as identified"  # of the file
 DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
@@ -32,10 +30,10 @@ class Identified(NamedTuple):
     """
 
     names: tuple[str, ...]
-    present: Array
-    values: Array
-    sd: Array
-    covariance: Array
+    present: Numbers
+    values: Numbers
+    sd: Numbers
+    covariance: Numbers
 
 
 def identified(found: Identification) -> Identified:
@@ -102,7 +100,7 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
     return ""
 
 
-def _by_group(result: Identified) -> dict[str, Array]:
+def _by_group(result: Identified) -> dict[str, Numbers]:
     """Values by group, as 'motors.viscous', in the order of motors, joints or links."""
     found: dict[str, list[float]] = {}
     for name, value in zip(result.names, result.values.tolist(), strict=True):
@@ -110,10 +108,10 @@ def _by_group(result: Identified) -> dict[str, Array]:
     return {group: np.array(values) for group, values in found.items()}
 
 
-def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Array]) -> dict[str, Any]:
+def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Numbers]) -> dict[str, Any]:
     """Friction of the joints: none at joints whose motor has it."""
     model = shared.model.joints
-    found: dict[str, Array] = {}
+    found: dict[str, Numbers] = {}
     for name in ("coulomb", "load", "viscous"):
         found[name] = np.zeros(len(model.coulomb))
         found[name][list(unknowns.joints)] = groups.get(f"joints.{name}", np.zeros(0))
@@ -122,7 +120,7 @@ def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Array
     return {f"model.joints.{name}": _numbers(each) for name, each in found.items()}
 
 
-def _link_values(groups: Mapping[str, Array]) -> dict[str, Any]:
+def _link_values(groups: Mapping[str, Numbers]) -> dict[str, Any]:
     mass = groups["links.mass"]
     centre = np.column_stack([groups[f"links.moment_{axis}"] / mass for axis in AXES])
     inertia = np.maximum(np.column_stack([groups[f"links.inertia_{axis}"] for axis in AXES]), IDENTIFY.least_inertia)
@@ -130,7 +128,7 @@ def _link_values(groups: Mapping[str, Array]) -> dict[str, Any]:
     return {f"model.links.{name}": _numbers(each, 9) for name, each in named.items()}
 
 
-def _numbers(values: Array, digits: int = LAYOUT.digits) -> list[float]:
+def _numbers(values: Numbers, digits: int = LAYOUT.digits) -> list[float]:
     return [float(f"{value:.{digits}g}") for value in values.tolist()]
 
 

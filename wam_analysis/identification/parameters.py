@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import IDENTIFY
+from wam_bag.arrays import Numbers
 from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = ("positive", "negative")
 AXES = ("x", "y", "z")
@@ -39,24 +37,23 @@ class Unknowns(NamedTuple):
     """
 
     names: tuple[str, ...]
-    present: Array
-    prior_sd: Array
+    present: Numbers
+    prior_sd: Numbers
     joints: tuple[int, ...]
     sharing: tuple[int, ...]
-    kept: Array
+    kept: Numbers
 
     @property
-    def prior(self) -> Array:
+    def prior(self) -> Numbers:
         """(p, p), information before the motion."""
-        found: Array = np.diag(self.prior_sd**-2) + self.kept
-        return found
+        return np.diag(self.prior_sd**-2) + self.kept
 
     def places(self, group: str) -> list[int]:
         """Where the parameters of a group are, as 'motors.viscous'."""
         return [i for i, name in enumerate(self.names) if name.rpartition(".")[0] == group]
 
 
-def shared_joints(matrix: Array) -> tuple[int, ...]:
+def shared_joints(matrix: Numbers) -> tuple[int, ...]:
     """Indices of the joints that several motors move together."""
     return tuple(int(j) for j in np.flatnonzero(np.count_nonzero(matrix, axis=1) > 1))
 
@@ -75,7 +72,7 @@ def unknowns(shared: Shared) -> Unknowns:
     present: list[float] = []
     sd: list[float] = []
 
-    def add(group: str, of: list[str], values: Array, sds: Array) -> None:
+    def add(group: str, of: list[str], values: Numbers, sds: Numbers) -> None:
         names.extend(f"{group}.{name}" for name in of)
         present.extend(values)
         sd.extend(np.maximum(sds, IDENTIFY.least_sd))

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
 from wam_analysis.thresholds import IDENTIFY
+from wam_bag.arrays import Mask, Numbers
 from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
-
-Array = NDArray[np.float64]
 
 DIAGONAL = (4, 6, 9)  # inertia xx, yy, zz among the ten parameters of a link
 PRODUCTS = ((5, 0, 1), (7, 0, 2), (8, 1, 2))  # inertia xy, xz, yz: place, axes
@@ -33,10 +31,10 @@ class Equations(NamedTuple):
     is_used : (k, n), whether the motor, and each joint that it moves, turns in one direction.
     """
 
-    time: Array
-    torque: Array
-    columns: Array
-    is_used: NDArray[np.bool_]
+    time: Numbers
+    torque: Numbers
+    columns: Numbers
+    is_used: Mask
 
 
 class Regressor:
@@ -50,7 +48,7 @@ class Regressor:
     stribeck_velocity : (n,), v_s of each motor, rad/s.
     """
 
-    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, stribeck_velocity: Array) -> None:
+    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, stribeck_velocity: Numbers) -> None:
         self._shared, self.unknowns, self._motion = shared, unknowns, motion
         self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
         self._stribeck = stribeck_velocity
@@ -62,7 +60,7 @@ class Regressor:
         self._carried = (qdd * shared.model.joints.armature) @ self._matrix
         self._is_used = self._steady()
 
-    def _steady(self) -> NDArray[np.bool_]:
+    def _steady(self) -> Mask:
         """(k, n), whether a motor and its joints turn in one direction during the window."""
         v, qd = self._motion.velocities, self._qd
         motor = np.abs(v).min(1) > IDENTIFY.slowest_motor
@@ -71,7 +69,7 @@ class Regressor:
         joint &= np.abs(np.sign(qd).sum(1)) == v.shape[1]
         return motor & ~(~joint @ (self._matrix != 0.0))
 
-    def equations(self, values: Array) -> Equations:
+    def equations(self, values: Numbers) -> Equations:
         """The equations about the values, (p,), of the parameters."""
         motion, unknowns = self._motion, self.unknowns
         n = motion.theta.shape[1]
@@ -91,7 +89,7 @@ class Regressor:
         torque = motion.torque - self._carried - self._links @ constant
         return Equations(motion.time, torque, columns, self._is_used)
 
-    def _friction(self, load: Array) -> dict[str, Array]:
+    def _friction(self, load: Numbers) -> dict[str, Numbers]:
         """Torque per parameter at each state, (k, w, n), by group."""
         v = self._motion.velocities
         slow = np.exp(-((v / self._stribeck) ** 2))
@@ -103,7 +101,7 @@ class Regressor:
             found[f"motors.load_{way}"] = moves * np.abs(load)
         return found
 
-    def load(self, values: Array) -> Array:
+    def load(self, values: Numbers) -> Numbers:
         """Torque that the cables transmit to each rotor at each state, (k, w, n), N m."""
         motion, unknowns = self._motion, self.unknowns
         rotor = values[unknowns.places("motors.inertia")] * motion.thetadd
@@ -111,28 +109,26 @@ class Regressor:
         friction = self._friction(load)
         return load - sum(each * values[unknowns.places(group)] for group, each in friction.items())
 
-    def inertial_torques(self, values: Array) -> Array:
+    def inertial_torques(self, values: Numbers) -> Numbers:
         """Torque of links, pulleys and rotors at each joint as torques of the motors, (k, n motors, n joints), N m."""
         motion, unknowns = self._motion, self.unknowns
         at, jacobian, constant = self._inertial(values)
         at_motors = self._carried + self._links @ (constant + jacobian @ values[at])
         at_motors += values[unknowns.places("motors.inertia")] * motion.thetadd
         at_joints = at_motors @ np.linalg.inv(self._matrix)
-        found: Array = at_joints[:, None, :] * self._matrix.T
-        return found
+        return at_joints[:, None, :] * self._matrix.T
 
-    def asymmetric_loads(self, values: Array) -> Array:
+    def asymmetric_loads(self, values: Numbers) -> Numbers:
         """Torques of the motors, (k, n, joints), by the part of joints' load friction that has one sign, per torque."""
         at_joints = np.einsum("w,kwn->kn", self._motion.weights, self._at_joints(self.load(values)))
         joints = list(self.unknowns.joints)
-        found: Array = at_joints[:, None, joints] * self._matrix[joints].T
-        return found
+        return at_joints[:, None, joints] * self._matrix[joints].T
 
-    def _at_joints(self, load: Array) -> Array:
+    def _at_joints(self, load: Numbers) -> Numbers:
         """Size of the torque that the cables transmit to each joint at each state, (k, w, n), N m."""
         return np.abs(load @ np.linalg.inv(self._matrix))  # tau = M^-T tau_motor
 
-    def _add_joints(self, columns: Array, load: Array) -> None:
+    def _add_joints(self, columns: Numbers, load: Numbers) -> None:
         weights, matrix, unknowns = self._motion.weights, self._matrix, self.unknowns
         at_joints, sign = self._at_joints(load), np.sign(self._qd)
         found = {"joints.coulomb": sign, "joints.load": sign * at_joints, "joints.viscous": self._qd}
@@ -141,7 +137,7 @@ class Regressor:
             for at, j in zip(unknowns.places(group), unknowns.joints, strict=True):
                 columns[:, :, at] = mean[:, j, None] * matrix[j]
 
-    def _inertial(self, values: Array) -> tuple[list[int], Array, Array]:
+    def _inertial(self, values: Numbers) -> tuple[list[int], Numbers, Numbers]:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
         unknowns, links = self.unknowns, self._shared.arm.links
         n = len(links.names)
@@ -156,7 +152,7 @@ class Regressor:
         return at.ravel().tolist(), jacobian, constant
 
 
-def about_origin(link: Array, product: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
+def about_origin(link: Numbers, product: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Numbers, Numbers]:
     """The ten parameters of a link about its frame's origin, (10,), and their slopes, (10, 7).
 
     Parameters

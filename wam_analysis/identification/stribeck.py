@@ -3,11 +3,9 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import IDENTIFY
-
-Array = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
 
@@ -15,11 +13,11 @@ VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
 class StribeckVelocities(NamedTuple):
     """v_s of each motor, (n,), rad/s; and as it is without each part of the motion, (parts, n)."""
 
-    velocity: Array
-    without: Array
+    velocity: Numbers
+    without: Numbers
 
 
-def stribeck_velocities(present: Array, present_errors: Array, errors: Array) -> StribeckVelocities:
+def stribeck_velocities(present: Numbers, present_errors: Numbers, errors: Numbers) -> StribeckVelocities:
     """Velocities by the squared errors of held-out motion.
 
     Parameters
@@ -35,7 +33,7 @@ def stribeck_velocities(present: Array, present_errors: Array, errors: Array) ->
     return StribeckVelocities(best, np.where(is_better, left_out, present))
 
 
-def slopes(values: Array, velocity: Array) -> Array:
+def slopes(values: Numbers, velocity: Numbers) -> Numbers:
     """Change of parameters per change of ln v_s about the v_s of each motor, (n, p).
 
     Parameters
@@ -44,11 +42,10 @@ def slopes(values: Array, velocity: Array) -> Array:
     velocity : (n,), rad/s.
     """
     upper = np.clip(np.searchsorted(VELOCITIES, velocity), 1, len(VELOCITIES) - 1)
-    found: Array = (values[upper] - values[upper - 1]) / np.log(VELOCITIES[upper] / VELOCITIES[upper - 1])[:, None]
-    return found
+    return (values[upper] - values[upper - 1]) / np.log(VELOCITIES[upper] / VELOCITIES[upper - 1])[:, None]
 
 
-def _minimum(total: Array) -> Array:
+def _minimum(total: Numbers) -> Numbers:
     """Where a parabola through the least of the errors, (c, n), and its neighbours is least, (n,), rad/s."""
     at = np.clip(total.argmin(0), 1, len(total) - 2)
     motor = np.arange(total.shape[1])
@@ -56,5 +53,4 @@ def _minimum(total: Array) -> Array:
     curvature = below - 2.0 * least + above
     shift = np.where(curvature > 0.0, 0.5 * (below - above) / np.where(curvature > 0.0, curvature, 1.0), 0.0)
     step = np.log(VELOCITIES[1] / VELOCITIES[0])
-    found: Array = VELOCITIES[at] * np.exp(step * np.clip(shift, -1.0, 1.0))
-    return found
+    return VELOCITIES[at] * np.exp(step * np.clip(shift, -1.0, 1.0))

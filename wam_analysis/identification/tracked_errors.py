@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.identification.uncertainty import Uncertainty
 from wam_analysis.thresholds import IDENTIFY
-
-Array = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 THEMSELVES = ("motors.coulomb_", "motors.load_", "joints.coulomb.", "joints.load.")  # identified and tracked
 CONSTANTS = "motors.torque_"  # the estimator has errors of the torque constants that are not identified
@@ -33,12 +31,12 @@ class TrackedErrors(NamedTuple):
     """
 
     names: tuple[str, ...]
-    covariance: Array
-    left: Array
+    covariance: Numbers
+    left: Numbers
 
 
 def tracked_errors(
-    regressor: Regressor, joints: Sequence[str], still: Sequence[int], values: Array, uncertainty: Uncertainty
+    regressor: Regressor, joints: Sequence[str], still: Sequence[int], values: Numbers, uncertainty: Uncertainty
 ) -> TrackedErrors:
     """Express the covariance of what was identified in tracked errors.
 

@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import IDENTIFY
-
-Array = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 
 class Uncertainty(NamedTuple):
@@ -23,22 +21,22 @@ class Uncertainty(NamedTuple):
     law : (p, p), covariance by what the model leaves out, which each part of the motion has alike.
     """
 
-    without: Array
-    white: Array
-    law: Array
+    without: Numbers
+    white: Numbers
+    law: Numbers
 
-    def variances(self, combinations: Array) -> Array:
+    def variances(self, combinations: Numbers) -> Numbers:
         """Those of linear combinations, (t, p), of the parameters, (t,)."""
         white, law = (((combinations @ each) * combinations).sum(1) for each in (self.white, self.law))
         return np.asarray(white * self._times(combinations, white) + law, np.float64)
 
-    def covariance(self, combinations: Array) -> Array:
+    def covariance(self, combinations: Numbers) -> Numbers:
         """That of linear combinations, (t, p), of the parameters, (t, t)."""
         white = combinations @ self.white @ combinations.T
         unit = np.sqrt(self._times(combinations, white.diagonal()))
         return np.asarray(white * np.outer(unit, unit) + combinations @ self.law @ combinations.T, np.float64)
 
-    def _times(self, combinations: Array, white: Array) -> Array:
+    def _times(self, combinations: Numbers, white: Numbers) -> Numbers:
         """How many times the white variances, (t,), those of the combinations are."""
         apart = (self.without - self.without.mean(0)) @ combinations.T
         parts = len(apart)

@@ -4,9 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Mask, Numbers
 
 
 class Efficiency(NamedTuple):
@@ -42,7 +41,7 @@ def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Eff
         dt = np.minimum(dt, np.median(dt[:-1]))
         dt[-1] = dt[-2]
 
-    def work(power: Numbers, rows: NDArray[np.bool_]) -> float:
+    def work(power: Numbers, rows: Mask) -> float:
         return float(np.sum(np.abs(power[rows]) * dt[rows]))
 
     onward = (motor_power > 0.0) & (joint_power > 0.0)

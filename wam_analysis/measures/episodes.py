@@ -4,13 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import LimitCycle, limit_cycle
 from wam_analysis.measures.runs import runs, smoothed
 from wam_analysis.thresholds import CYCLE
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Mask, Numbers
 
 
 class Episode(NamedTuple):
@@ -83,7 +81,7 @@ class _Transient(NamedTuple):
         return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < CYCLE.steady
 
 
-def _jumps(time: Numbers, value: Numbers, cycle: LimitCycle) -> NDArray[np.bool_]:
+def _jumps(time: Numbers, value: Numbers, cycle: LimitCycle) -> Mask:
     """Where the mean over a period is other than that over the period before by more than half of a cycle's size."""
     width = max(round(cycle.period / float(time[1] - time[0])), 1)
     total = np.concatenate([[0.0], np.cumsum(value)])
@@ -136,11 +134,10 @@ def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     away = np.arange(1, end + 1) / end
     before = slow[0] - away[::-1] * (slow[end] - slow[0])
     after = slow[-1] + away * (slow[-1] - slow[-1 - end])
-    flat: Numbers = value - np.concatenate([before, slow, after])
-    return flat
+    return value - np.concatenate([before, slow, after])
 
 
-def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: NDArray[np.bool_]) -> tuple[int, int]:
+def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: Mask) -> tuple[int, int]:
     """Rows between which the amplitude at a period, averaged over two, is above half of what it is where it cycles.
 
     Of several such stretches it is the one that holds most of the window, which may have quiet parts.

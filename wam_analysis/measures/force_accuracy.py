@@ -4,9 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 
 class ForceAccuracy(NamedTuple):

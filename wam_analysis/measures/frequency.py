@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Mask, Numbers
+
 Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 
 class FrequencyResponse(NamedTuple):
@@ -73,8 +73,7 @@ def frequency_response(
 
 
 def _level(values: Numbers) -> Numbers:
-    result: Numbers = values - np.mean(values)
-    return result
+    return values - np.mean(values)
 
 
 def bandwidth(found: FrequencyResponse, believed: Mask) -> float:

@@ -5,14 +5,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 from wam_analysis.thresholds import SHAFT
-
-Numbers = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from wam_bag.arrays import Index, Mask, Numbers, Rows
 
 
 class Friction(NamedTuple):
@@ -147,7 +144,7 @@ def _in_motion(
 
 
 def _robust(
-    columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: NDArray[np.int64]
+    columns: Numbers, wanted: Numbers, waves: Numbers, width: int, half: Rows
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
     """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
@@ -223,7 +220,7 @@ def _correlation_length(rest: Numbers) -> float:
     return 2.0 * float(np.sum(correlation[: ends[0] if len(ends) else n])) - 1.0
 
 
-def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:
+def _halves(rows: Index) -> Rows:
     """Number the halves of stretches without a gap, (k,): a motion gets faster in one, slower in the other."""
     begins = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) > 1)
     lengths = np.diff(begins, append=len(rows))
@@ -232,7 +229,7 @@ def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:
     return np.cumsum(result)
 
 
-def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) -> Numbers:
+def _disagreement(columns: Numbers, wanted: Numbers, half: Rows) -> Numbers:
     """Standard errors of the columns' factors from leaving out one half of a motion at a time, and all that repeat it.
 
     What the law leaves out returns where a motion is repeated: as separate halves, repetitions would agree on it and
@@ -266,8 +263,7 @@ def _spread(products: Numbers, targets: Numbers) -> Numbers | None:
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
     if len(found) < 2:
         return None
-    result: Numbers = _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
-    return result
+    return _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
 
 
 def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
@@ -282,8 +278,7 @@ def _repeated(halves: Sequence[tuple[Numbers, Numbers]]) -> list[int]:
         alike[0] = True  # also where a speed is not finite
         group[left[alike]] = number
         number += 1
-    found: list[int] = group.tolist()
-    return found
+    return group.tolist()
 
 
 def _mark(direction: float, speed: Numbers) -> tuple[float, ...]:
@@ -308,7 +303,7 @@ class _Breakaways(NamedTuple):
 
     torque: Numbers
     step: Numbers
-    row: NDArray[np.int64]
+    row: Rows
 
 
 def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) -> tuple[float, float, int]:

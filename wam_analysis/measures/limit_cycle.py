@@ -5,12 +5,10 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import after_gaps, noise
 from wam_analysis.thresholds import CYCLE
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Index, Numbers
 
 
 class LimitCycle(NamedTuple):
@@ -152,7 +150,7 @@ def last_cycle(time: Numbers, value: Numbers) -> CycleExtent:
     return CycleExtent(float(np.ptp(value[begin : end + 1])), float(time[end] - time[begin]))
 
 
-def _rises(value: Numbers, late: Numbers) -> NDArray[np.intp]:
+def _rises(value: Numbers, late: Numbers) -> Index:
     """Samples before each rising crossing of the middle between the extremes of the late part of a signal."""
     above = value > 0.5 * (late.max() + late.min())
     return np.flatnonzero(above[1:] & ~above[:-1])

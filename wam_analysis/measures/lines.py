@@ -4,11 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import CYCLE
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 
 class SpectralLine(NamedTuple):
@@ -70,8 +68,7 @@ def _windowed(value: Numbers) -> Numbers:
     n = len(value)
     steps = np.linspace(-1.0, 1.0, n)
     flat = value - np.polynomial.polynomial.polyval(steps, np.polynomial.polynomial.polyfit(steps, value, 1))
-    windowed: Numbers = flat * (0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n))
-    return windowed
+    return flat * (0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n))
 
 
 def _noise(power: Numbers, k: int) -> float:

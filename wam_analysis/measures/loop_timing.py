@@ -4,10 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Times = NDArray[np.int64]
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers, Times
 
 
 class StampTiming(NamedTuple):

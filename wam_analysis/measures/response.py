@@ -4,12 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import noise, smoothed
 from wam_analysis.thresholds import CYCLE
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers
 
 
 class StepResponse(NamedTuple):

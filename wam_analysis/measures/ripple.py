@@ -4,11 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import SHAFT
-
-Numbers = NDArray[np.float64]
+from wam_bag.arrays import Numbers, Rows
 
 
 class Ripple(NamedTuple):
@@ -21,7 +19,7 @@ class Ripple(NamedTuple):
     turns : range of the angle in turns; at least 1 is needed, in practice 1.2.
     """
 
-    order: NDArray[np.int64]
+    order: Rows
     amplitude: Numbers
     turns: float
 

@@ -3,13 +3,9 @@
 import heapq
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.thresholds import STREAM
-
-Numbers = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Rows = NDArray[np.int64]
+from wam_bag.arrays import Mask, Numbers, Rows
 
 
 def after_gaps(time: Numbers | Rows) -> Mask:
@@ -111,5 +107,4 @@ def smoothed(value: Numbers, width: int) -> Numbers:
     total = np.concatenate(([0.0], np.cumsum(value)))
     row = np.arange(len(value))
     reach = np.minimum(half, np.minimum(row, len(value) - 1 - row))
-    result: Numbers = (total[row + reach + 1] - total[row - reach]) / (2 * reach + 1)
-    return result
+    return (total[row + reach + 1] - total[row - reach]) / (2 * reach + 1)

@@ -4,13 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import require_usable
 from wam_analysis.thresholds import CYCLE
+from wam_bag.arrays import Numbers
 from wam_theory.verdicts import Verdict
-
-Numbers = NDArray[np.float64]
 
 
 class Stability(NamedTuple):

@@ -3,13 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import require_usable, runs, without_short
 from wam_analysis.thresholds import SHAFT
-
-Numbers = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from wam_bag.arrays import Numbers, Rows
 
 
 class Phases(NamedTuple):

@@ -4,14 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.stability import trend
 from wam_analysis.thresholds import CYCLE
+from wam_bag.arrays import Numbers, Rows
 from wam_theory.verdicts import Verdict
-
-Numbers = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 
 class Swings(NamedTuple):
