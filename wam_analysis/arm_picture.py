@@ -202,7 +202,8 @@ def draw(axes: Axes, shown: SideScene, view: View) -> None:
             edge = colour if face.shape == "cylinder" and len(corners) == 4 else "#8a6f3a"
             zorder = 2 if face.shape == "plane" else 3
             axes.add_patch(Polygon(corners, facecolor=colour, edgecolor=edge, linewidth=0.6, zorder=zorder))
-    _draw_pedestal(axes, view, shown.floor)
+    pillar = np.array([0.0, 0.0, shown.floor + LAYOUT.pedestal])
+    _draw_tube(axes, view, Tube(pillar, np.zeros(3), LAYOUT.pedestal, PEDESTAL_COLOUR), 4.0)
     order = sorted(shown.tubes, key=lambda tube: -float((tube.start + tube.end) @ forward))
     for depth, tube in enumerate(order):
         _draw_tube(axes, view, tube, 4.1 + 0.1 * depth)
@@ -216,33 +217,20 @@ def arrow(axes: Axes, tail: Numbers, tip: Numbers, colour: str, width: float) ->
     )
 
 
-def _draw_pedestal(axes: Axes, view: View, floor: float) -> None:
-    """A rounded pillar, cut off at the floor."""
-    pillar = Tube(np.array([0.0, 0.0, floor]), np.zeros(3), LAYOUT.pedestal, PEDESTAL_COLOUR)
-    angles = np.linspace(0.0, 2.0 * math.pi, 73)
-    ring = LAYOUT.pedestal * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(73)]) + pillar.start
-    foot = view.project(ring)
-    order = np.argsort(foot[:, 0])
-    front = foot[order][foot[order, 1] <= float(np.mean(foot[:, 1])) + 1e-9]
-    above = [[front[-1, 0], view.height], [front[0, 0], view.height]]
-    _draw_tube(axes, view, pillar, 4.0, Polygon([*front, *above], transform=axes.transData))
-    axes.plot(front[:, 0], front[:, 1], color=OUTLINE, lw=0.9, zorder=4.0)
-
-
-def _draw_tube(axes: Axes, view: View, tube: Tube, zorder: float, inside: Polygon | None = None) -> None:
+def _draw_tube(axes: Axes, view: View, tube: Tube, zorder: float) -> None:
     """A tube with the shading of a cylinder: nested stadiums, brighter towards the light."""
     ends = view.project(np.array([tube.start, tube.end]))
     light = view.axes[:2] @ LIGHT
     colour = np.array(to_rgb(tube.colour))
     rim = {"facecolor": colour * 0.82, "edgecolor": OUTLINE, "linewidth": 0.9}
-    _stadium(axes, ends, tube.radius, inside, zorder=zorder, **rim)
+    _stadium(axes, ends, tube.radius, zorder=zorder, **rim)
     for part in np.linspace(0.05, 0.9, 18):
         bright = colour * (0.82 + 0.18 * part) + (1.0 - colour) * 0.35 * part**2
         at = ends + 0.55 * part * tube.radius * light
-        _stadium(axes, at, tube.radius * (1.0 - part), inside, facecolor=bright, edgecolor="none", zorder=zorder)
+        _stadium(axes, at, tube.radius * (1.0 - part), facecolor=bright, edgecolor="none", zorder=zorder)
 
 
-def _stadium(axes: Axes, ends: Numbers, radius: float, inside: Polygon | None = None, **style: Any) -> None:
+def _stadium(axes: Axes, ends: Numbers, radius: float, **style: Any) -> None:
     begin, end = ends
     angle = math.atan2(end[1] - begin[1], end[0] - begin[0])
     half = np.linspace(-math.pi / 2.0, math.pi / 2.0, 25)
@@ -250,6 +238,4 @@ def _stadium(axes: Axes, ends: Numbers, radius: float, inside: Polygon | None = 
         point + radius * np.column_stack([np.cos(angle + half + turn), np.sin(angle + half + turn)])
         for point, turn in ((end, 0.0), (begin, math.pi))
     ]
-    patch = axes.add_patch(Polygon(np.vstack(caps), **style))
-    if inside is not None:
-        patch.set_clip_path(inside)
+    axes.add_patch(Polygon(np.vstack(caps), **style))

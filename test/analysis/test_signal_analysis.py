@@ -239,16 +239,16 @@ def test_planted_friction_is_recovered(offset):
     time, velocity, torque = shaft(static, dynamic, viscous, inertia)
     noisy = torque + offset + draws(7, len(time), 0.01)
     found = identify_friction(time, velocity + draws(8, len(time), 0.02), noisy, rest=0.1, window=0.02)
-    assert found.dynamic == near(dynamic)
-    assert found.viscous == near(viscous)
-    assert found.inertia == near(inertia)
-    assert found.static == near(static)
+    assert found.dynamic.value == near(dynamic)
+    assert found.viscous.value == near(viscous)
+    assert found.inertia.value == near(inertia)
+    assert found.static.value == near(static)
     assert found.offset == PRECISE(offset, abs=0.002)
     assert found.breakaways > 5
     for value, error, truth in (
-        (found.dynamic, found.dynamic_error, dynamic),
-        (found.viscous, found.viscous_error, viscous),
-        (found.inertia, found.inertia_error, inertia),
+        (found.dynamic.value, found.dynamic.error, dynamic),
+        (found.viscous.value, found.viscous.error, viscous),
+        (found.inertia.value, found.inertia.error, inertia),
     ):
         assert abs(value - truth) < 4.0 * error < truth / 2.0
 
@@ -259,8 +259,8 @@ def test_friction_of_a_recording_with_gaps_is_that_of_the_rest():
     kept = (time < 3.1) | ((time > 5.4) & (time < 9.3)) | (time > 11.9)
     noisy = torque + draws(7, len(time), 0.01)
     found = identify_friction(time[kept], velocity[kept], noisy[kept], rest=0.1, window=0.02)
-    assert found.inertia == PRECISE(0.004, rel=0.05)
-    assert found.dynamic == near(0.18)
+    assert found.inertia.value == PRECISE(0.004, rel=0.05)
+    assert found.dynamic.value == near(0.18)
 
 
 def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
@@ -272,8 +272,8 @@ def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
     torque = 0.18 * np.sign(velocity) + 0.012 * velocity
     torque += np.where(velocity != 0.0, np.sign(velocity) * 0.02 * np.exp(-since / 0.3), 0.0)
     found = identify_friction(time, velocity, torque, rest=0.05, window=0.02)
-    assert abs(found.viscous - 0.012) > 0.002
-    assert abs(found.viscous - 0.012) < 2.0 * found.viscous_error
+    assert abs(found.viscous.value - 0.012) > 0.002
+    assert abs(found.viscous.value - 0.012) < 2.0 * found.viscous.error
 
 
 def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike_for_long():
@@ -285,9 +285,9 @@ def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike
         wander = np.convolve(draws(100 + seed, len(time), 1.0), np.exp(-np.arange(1200) / 300.0), "same")
         found = identify_friction(time[kept], velocity[kept], (torque + 0.003 * wander)[kept], 0.1, 0.02)
         for value, error, truth in (
-            (found.dynamic, found.dynamic_error, 0.18),
-            (found.viscous, found.viscous_error, 0.012),
-            (found.inertia, found.inertia_error, 0.004),
+            (found.dynamic.value, found.dynamic.error, 0.18),
+            (found.viscous.value, found.viscous.error, 0.012),
+            (found.inertia.value, found.inertia.error, 0.004),
         ):
             off.append(abs(value - truth) / error)
     assert max(off) < 3.0, off
@@ -306,16 +306,16 @@ def test_three_stated_errors_hold_the_static_friction_of_a_shaft_that_creeps_bef
         velocity[start - 60 : start + 1] = np.sign(velocity[start + 1]) * 1e-4
     found = identify_friction(time, velocity, torque, rest=0.1, window=0.02)
     assert found.breakaways > 5
-    assert found.static < 0.93 * static
-    assert abs(found.static - static) < 3.0 * found.static_error < 0.5 * static
+    assert found.static.value < 0.93 * static
+    assert abs(found.static.value - static) < 3.0 * found.static.error < 0.5 * static
 
 
 def test_impacts_do_not_spoil_the_friction():
     time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
     torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0
     found = identify_friction(time, velocity, torque, rest=0.1, window=0.002)
-    assert found.dynamic == near(0.18)
-    assert found.viscous == near(0.012)
+    assert found.dynamic.value == near(0.18)
+    assert found.viscous.value == near(0.012)
 
 
 # frequency
@@ -521,9 +521,9 @@ def test_viscous_friction_of_few_speeds_has_the_error_of_an_uneven_dry_friction(
     velocity *= np.sign(np.sin(0.4 * time))
     uneven = 0.5 * (1.0 + 0.003 * (np.abs(velocity) - 0.2) / 0.01)
     found = identify_friction(time, velocity, uneven * np.sign(velocity) + 0.05 * velocity, rest=0.02, window=0.02)
-    assert found.viscous > 0.15
-    assert abs(found.viscous - 0.05) < 3.0 * found.viscous_error
-    assert found.dynamic_error < 0.05
+    assert found.viscous.value > 0.15
+    assert abs(found.viscous.value - 0.05) < 3.0 * found.viscous.error
+    assert found.dynamic.error < 0.05
 
 
 def stops(dynamic: float, breakaway: float, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -541,8 +541,8 @@ def test_a_shaft_that_creeps_before_every_motion_has_no_static_friction() -> Non
     time, velocity, torque = stops(0.18, 0.1805, 0.4)
     found = identify_friction(time, velocity, torque + draws(4, len(time), 5e-4), rest=0.05, window=0.03)
     assert found.breakaways >= 3
-    assert found.dynamic == PRECISE(0.18, rel=0.01)
-    assert math.isinf(found.static_error)
+    assert found.dynamic.value == PRECISE(0.18, rel=0.01)
+    assert math.isinf(found.static.error)
 
 
 @pytest.mark.parametrize("end", [1_700, 2_600])
@@ -550,7 +550,7 @@ def test_one_or_two_breakaways_have_an_error_too(end: int) -> None:
     time, velocity, torque = (values[900:end] for values in stops(0.18, 0.25, 0.3))
     found = identify_friction(time, velocity, torque, rest=0.05, window=0.03)
     assert found.breakaways == (1 if end < 2_000 else 2)
-    assert abs(found.static - 0.25) < 3.0 * found.static_error < 0.5 * found.static
+    assert abs(found.static.value - 0.25) < 3.0 * found.static.error < 0.5 * found.static.value
 
 
 def test_a_shaft_whose_encoder_counts_in_a_rest_is_not_at_rest() -> None:

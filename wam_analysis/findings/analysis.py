@@ -7,22 +7,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_analysis.findings.contact import contact_section
+from wam_analysis.findings.effort import effort_section
 from wam_analysis.findings.finding import Section, counted, shown, stated
 from wam_analysis.findings.force import cycle_section, force_section
+from wam_analysis.findings.force_steps import step_section
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.motion import friction_section, ripple_section
 from wam_analysis.findings.power import power_section
+from wam_analysis.findings.repetition import repetition_section, spectrum_section
 from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
+from wam_analysis.findings.topics import topics_section
 from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
-from wam_analysis.foreign.sections import (
-    effort_section,
-    repetition_section,
-    spectrum_section,
-    step_section,
-    topics_section,
-)
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
@@ -182,7 +179,7 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
     lines = (_line("Wrong", wrong, "nothing was found."), _line("Shows", shows, "nothing that can be evaluated."))
-    return Section("verdict", "Verdict", (what, *lines), ())
+    return Section("verdict", "Verdict", (what, *lines))
 
 
 def _line(title: str, sentences: list[str], silent: str) -> str:
@@ -215,7 +212,7 @@ def happened_section(recording: AnalysedRecording) -> Section:
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     lacking = run.lacking("joint_states", "force_command", "contact/wrench", "status")
-    return Section("happened", "What happened", tuple(sentences), (), lacking, (), tuple(wrong))
+    return Section("happened", "What happened", sentences, (), lacking, (), wrong)
 
 
 def _own_line(recording: AnalysedRecording) -> str:
@@ -248,13 +245,13 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
 def _of_the_start(make: Maker, recording: AnalysedRecording) -> Section | None:
     """A section whose predictions are for the parameters at the start, marked where these were changed."""
     section = make(recording)
-    changed = tuple(_changed(recording.run, recording.traces.zero)) if section is not None else ()
+    changed = [*_changed(recording.run, recording.traces.zero)]
     if section is None or not changed:
         return section
-    findings = tuple(
+    findings = [
         one._replace(note="; ".join(filter(None, (one.note, OF_THE_START)))) if math.isfinite(one.predicted) else one
         for one in section.findings
-    )
+    ]
     return section._replace(sentences=(*changed, *section.sentences), findings=findings)
 
 

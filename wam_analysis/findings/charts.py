@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.drawing import COLOURS, COMMANDED, ESTIMATED, LIKELY, SHAFTS
+from wam_analysis.drawing import COLOURS, COMMANDED, LIKELY, SHAFTS
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.foreign.cycles import held as held_command
+from wam_analysis.findings.repetition import held as held_command
 from wam_analysis.foreign.sources import Source, longest, pieces
 from wam_analysis.measures.lines import amplitudes
 from wam_analysis.recording import AnalysedRecording
@@ -62,7 +62,6 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     yield from map(_thinned, _positions(analysis))
     for one in _shown(analysis.recording):
         yield from _of_motion(one)
-    yield from _friction(analysis)
     ripples = {name: found for name, found in analysis.recording.motion.ripple.items() if len(found.order)}
     for i, (name, found) in enumerate(ripples.items()):
         line = ChartLine(name, SHAFTS[i % len(SHAFTS)], 1e3 * found.amplitude)
@@ -143,29 +142,6 @@ def _of_motion(one: Source) -> Iterator[Chart]:
     line = ChartLine(one.label, SHAFTS[0], piece.values["velocity"][rows], dots=True)
     title = f"Velocity over position of {one.label}; a cycle is a closed curve."
     yield Chart("stick_slip", title, f"position [{unit}]", f"velocity [{unit}/s]", value[rows], (line,))
-
-
-def _friction(analysis: Analysis) -> Iterator[Chart]:
-    signals, arm = analysis.recording.motion.signals, analysis.recording.parameters.arm
-    if signals is None or arm is None or not analysis.recording.motion.friction:
-        return
-    some = np.flatnonzero(signals.use)
-    some = some[:: max(1, len(some) // LAYOUT.dots)]
-    for i, name in enumerate(arm.motors.names):
-        rows = some[np.argsort(signals.velocity[some, i], kind="stable")]
-        speed, torque = signals.velocity[rows, i], 1e3 * (signals.torque - signals.load)[rows, i]
-        found, motors = analysis.recording.motion.friction[name], arm.motors
-        of_config = (motors.dynamic_friction[i], motors.viscous_friction[i])
-        lines = [ChartLine("torque less load", LAYOUT.grey, torque, dots=True)]
-        for label, colour, (dry, viscous) in (
-            ("identified", ESTIMATED, (found.dynamic, np.nan_to_num(found.viscous))),
-            ("configured", COMMANDED, of_config),
-        ):
-            lines.append(
-                ChartLine(label, colour, 1e3 * (dry * np.sign(speed) + viscous * speed), label == "configured")
-            )
-        title = f"Friction torque of {name} over its velocity."
-        yield Chart("friction", title, "velocity [rad/s]", "torque [mN m]", speed, tuple(lines))
 
 
 def _thinned(chart: Chart) -> Chart:

@@ -67,7 +67,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
     findings += _tracked_friction(recording)
-    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(shows), tuple(wrong))
+    return Section("contact", "Contact", sentences, findings, lacking, shows, wrong)
 
 
 def contact_numbers(recording: AnalysedRecording) -> Iterator[Finding]:

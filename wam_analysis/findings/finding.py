@@ -1,6 +1,7 @@
 """Results of an analysis: numbers with their predictions, and sentences."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_analysis.thresholds import SHAFT
@@ -65,14 +66,14 @@ class Section(NamedTuple):
 
     key: str
     title: str
-    sentences: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    lacking: tuple[str, ...] = ()
-    shows: tuple[str, ...] = ()
-    wrong: tuple[str, ...] = ()
+    sentences: Sequence[str]
+    findings: Sequence[Finding] = ()
+    lacking: Sequence[str] = ()
+    shows: Sequence[str] = ()
+    wrong: Sequence[str] = ()
 
 
-def deviations(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+def deviations(findings: Sequence[Finding]) -> tuple[str, ...]:
     """A sentence on the numbers that differ from their predictions by more than three standard errors, or none."""
     found = [one for one in findings if one.deviates]
     if not found:

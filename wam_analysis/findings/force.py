@@ -41,9 +41,9 @@ def force_section(recording: AnalysedRecording) -> Section:
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
-    wrong = tuple(_reaction_verdict(reactions, zero))
-    every = (*findings, *_dynamic_range(recording))
-    return Section("force", "Force", tuple(sentences), every, lacking, _forces_verdict(held), wrong)
+    findings += _dynamic_range(recording)
+    wrong = _reaction_verdict(reactions, zero)
+    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong)
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -201,7 +201,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     margin = f", guard margin {shown(min(margins))}" if margins else ""
     if settled and not verdict:
         verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings), (), tuple(verdict))
+    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict)
 
 
 def _fate(one: HeldForce) -> tuple[str, str]:

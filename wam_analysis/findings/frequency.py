@@ -55,7 +55,7 @@ def frequency_section(recording: AnalysedRecording) -> Section | None:
             f"The velocity commands are too short for a frequency response, which takes {least:g} s without a gap."
         )
     title = "Frequency response of the velocity loops"
-    return Section("frequency", title, tuple(sentences), tuple(findings), lacking, tuple(shows))
+    return Section("frequency", title, sentences, findings, lacking, shows)
 
 
 def _bandwidth_sentence(name: str, width: float, top: float) -> str:

@@ -184,7 +184,7 @@ def _before(traces: Traces, hold: Hold, measured: Numbers) -> float:
 def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
     """What repeats in a force, apart from the dither of a period, s, which a mean over it takes out; 0 for none."""
     good = np.isfinite(value)
-    if int(np.sum(good)) < SHAFT.fewest_samples or np.mean(good) <= 0.95:
+    if np.count_nonzero(good) < SHAFT.fewest_samples or np.mean(good) <= 0.95:
         return None
     time, value = time[good], value[good]
     if dither and (width := round(dither / float(np.median(np.diff(time))))) > 1:

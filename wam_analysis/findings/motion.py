@@ -8,12 +8,13 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.transmission import turning
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals
-from wam_analysis.measures.friction import Friction
+from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
+UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
 ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
 
@@ -26,9 +27,9 @@ def friction_section(recording: AnalysedRecording) -> Section:
     arm, signals, joints, friction, _, drowned = recording.motion
     if arm is None or signals is None:
         why = "no parameters of the arm" if arm is None else "no motor_states with a load"
-        sentences = [f"Friction, ripple and power cannot be evaluated: {why} in this bag."]
+        sentence = f"Friction, ripple and power cannot be evaluated: {why} in this bag."
         missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
-        return Section("friction", "Friction", tuple(sentences), (), missing)
+        return Section("friction", "Friction", (sentence,), (), missing)
     alone = signals.load_from == CABLE
     note = (
         f"load from the {signals.load_from}"
@@ -42,13 +43,13 @@ def friction_section(recording: AnalysedRecording) -> Section:
         bearing = arm.joints
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
         findings += _friction_findings(name, found, configured, "cable torque less strain")
-    seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic)]
     sentences = []
+    seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic.value)]
     unsure = [
         _named(name, kind)
         for name, found in {**friction, **joints}.items()
-        for kind, _, value, error in _numbers(found)
-        if not _is_identified(value, error)
+        for kind in UNITS
+        if getattr(found, kind).is_vague
     ]
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
@@ -56,18 +57,15 @@ def friction_section(recording: AnalysedRecording) -> Section:
     if still:
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
-    flagged = deviations(tuple(findings))
+    flagged = deviations(findings)
     every = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
-    return Section("friction", "Friction", every, tuple(findings), lacking, (), flagged)
+    return Section("friction", "Friction", every, findings, lacking, (), flagged)
 
 
-def identified(found: Friction) -> dict[str, float]:
-    """Friction of a shaft by kind, NaN where it is not identifiable."""
-    return {k: value if _is_identified(value, error) else math.nan for k, _, value, error in _numbers(found)}
-
-
-def _is_identified(value: float, error: float) -> bool:
-    return not error > SHAFT.unsure * abs(value)
+def identified(found: Friction, kind: str) -> float:
+    """Friction of a shaft, NaN where it is not identifiable."""
+    known: FrictionNumber = getattr(found, kind)
+    return math.nan if known.is_vague else known.value
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
@@ -84,15 +82,6 @@ def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
     return own[0], own[1], own[2]
 
 
-def _numbers(found: Friction) -> tuple[tuple[str, str, float, float], ...]:
-    """Kind, unit, value and standard error of each friction of a shaft."""
-    return (
-        ("static", "N m", found.static, found.static_error),
-        ("dynamic", "N m", found.dynamic, found.dynamic_error),
-        ("viscous", "N m s/rad", found.viscous, found.viscous_error),
-    )
-
-
 def _named(shaft: str, kind: str) -> str:
     return f"{shaft}: {kind} friction"
 
@@ -100,16 +89,17 @@ def _named(shaft: str, kind: str) -> str:
 def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
     """Of one shaft."""
     about = {"static": f"{found.breakaways} breakaways"}
-    if math.isnan(found.offset) and math.isfinite(found.dynamic):
+    if math.isnan(found.offset) and math.isfinite(found.dynamic.value):
         about["dynamic"] = ONE_WAY
     findings = []
-    for (kind, unit, value, error), predicted in zip(_numbers(found), configured, strict=True):
-        doubt, stated = "", (value, error)
-        if not _is_identified(value, error):
-            doubt = f"not identifiable: {shown(value)} +-{shown(error)}" if math.isfinite(error) else "not identifiable"
-            stated = (math.nan, math.nan)
+    for (kind, unit), predicted in zip(UNITS.items(), configured, strict=True):
+        doubt, known = "", getattr(found, kind)
+        if known.is_vague:
+            value, error = map(shown, known)
+            doubt = f"not identifiable: {value} +-{error}" if math.isfinite(known.error) else "not identifiable"
+            known = UNKNOWN
         text = "; ".join(filter(None, (about.get(kind), doubt, note)))
-        findings.append(Finding(_named(name, kind), unit, stated[0], predicted, text, stated[1]))
+        findings.append(Finding(_named(name, kind), unit, known.value, predicted, text, known.error))
     return findings
 
 
@@ -142,7 +132,7 @@ def ripple_section(recording: AnalysedRecording) -> Section | None:
         )
         clear = (
             amplitude > SHAFT.faint_ripple * float(np.median(found.amplitude))
-            and amplitude > SHAFT.slight_ripple * friction[name].dynamic
+            and amplitude > SHAFT.slight_ripple * friction[name].dynamic.value
         )
         sentences.append(
             f"{name}: {shown(amplitude, 'N m')} at {order} cycles per turn."
@@ -153,7 +143,7 @@ def ripple_section(recording: AnalysedRecording) -> Section | None:
         sentences.append("Ripple was not measured: of the motors' load only that of gravity is known in this bag.")
     elif not ripple:
         sentences.append("No motor turned enough to identify its ripple.")
-    return Section("ripple", "Torque ripple by pulley angle", tuple(sentences), tuple(findings))
+    return Section("ripple", "Torque ripple by pulley angle", sentences, findings)
 
 
 def _configured_ripple(parameters: PredictionParameters, signals: TransmissionSignals, shaft: str, order: int) -> float:

@@ -51,8 +51,8 @@ def power_section(recording: AnalysedRecording) -> Section | None:
     findings += _backdrive(arm, friction, joints)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")
-    verdict = tuple(stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%")
-    return Section("power", "Efficiency and backdrivability", tuple(sentences), tuple(findings), (), verdict)
+    shows = [stated(f"{one.name}: {shown(one.measured, '%')}") for one in findings if one.unit == "%"]
+    return Section("power", "Efficiency and backdrivability", sentences, findings, (), shows)
 
 
 def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
@@ -69,9 +69,9 @@ def _backdrive(arm: Arm, friction: Mapping[str, Friction], joints: Mapping[str, 
     """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
     matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
     motor_per_joint = np.abs(np.linalg.inv(matrix))
-    measured = np.array([friction[name].dynamic for name in arm.motors.names])
+    measured = np.array([friction[name].dynamic.value for name in arm.motors.names])
     configured = np.array(arm.motors.dynamic_friction)
-    own = np.array([joints[name].dynamic if name in joints else math.nan for name in arm.joints.names])
+    own = np.array([joints[name].dynamic.value if name in joints else math.nan for name in arm.joints.names])
     found = []
     for i, name in enumerate(arm.joints.names):
         turns = motor_per_joint[:, i]

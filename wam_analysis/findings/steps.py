@@ -52,8 +52,8 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     outcomes, (brief, why) = _outcomes(recording), recording.unassessed
     wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
-    answers = tuple(f"{answer}." for answer in verdict(recording))
-    return Section("steps", "Result of the steps, worst case in brackets", answers, (), (), (), tuple(wrong))
+    answers = [f"{answer}." for answer in verdict(recording)]
+    return Section("steps", "Result of the steps, worst case in brackets", answers, wrong=wrong)
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
@@ -142,10 +142,10 @@ def _compared(recording: AnalysedRecording) -> list[ListedContact]:
 def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     """Whether a contact was estimated where none is; none where that is not known."""
     traces = recording.traces
-    free = int(np.sum(traces.is_compared & ~traces.true.acts))
+    free = np.count_nonzero(traces.is_compared & ~traces.true.acts)
     if not free:
         return []
-    false = int(np.sum(traces.is_false))
+    false = np.count_nonzero(traces.is_false)
     question = f"false detections within {TOUCH.false_tolerance:g} % of the time without contact"
     part, seconds = 100.0 * false / free, false * traces.period
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:

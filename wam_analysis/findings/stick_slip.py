@@ -1,9 +1,16 @@
 """Section about stick and slip."""
 
+import math
+from typing import NamedTuple
+
+import numpy as np
+
 from wam_analysis.findings.finding import Finding, Section, rest_words, shown
-from wam_analysis.foreign.mechanics import hidden_motion, sticking
+from wam_analysis.foreign.sources import Piece, Source, pieces, resolution
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
+from wam_bag.arrays import Mask, Numbers, Rows
 
 
 def stick_section(recording: AnalysedRecording) -> Section:
@@ -31,5 +38,88 @@ def stick_section(recording: AnalysedRecording) -> Section:
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
-    stated = tuple(sentences) or ("No velocity was recorded.",)
-    return Section("stick_slip", "Stick and slip", stated, tuple(findings), lacking, tuple(verdict))
+    stated = sentences or ["No velocity was recorded."]
+    return Section("stick_slip", "Stick and slip", stated, findings, lacking, verdict)
+
+
+class Sticking(NamedTuple):
+    """How a joint moved.
+
+    Attributes
+    ----------
+    stuck : fraction of the time at rest.
+    slips : motions between; a motion back and forth is one.
+    commanded : fraction of the rest in which it was commanded to move; NaN without a command.
+    """
+
+    stuck: float
+    slips: int
+    commanded: float
+
+
+def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
+    """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
+    if rests(source):
+        return Sticking(1.0, 0, math.nan)
+    still = slips = total = disobeyed = 0
+    moved = next((q for q in ("velocity", "position") if q in source.values), "")
+    for piece in pieces(source, moved) if moved else ():
+        rest = rest_speed(piece, least)
+        period = float(piece.time[1] - piece.time[0])
+        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
+        total += len(piece.time)
+        if _only_turns(phases, piece.values["velocity"]):
+            slips += 1
+            lengths = np.diff(phases.sticks, axis=1)
+            still += int(np.sum(lengths[lengths > SHAFT.brief * np.median(np.diff(phases.slips, axis=1))]))
+            continue
+        phases = without_turns(phases, piece.values["velocity"], rest)
+        still += round(phases.stuck * len(piece.time))
+        slips += len(phases.slips)
+        if command is not None:
+            moves = np.abs(_commanded_speed(command, piece.time)) > rest
+            disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
+    if not total:
+        return None
+    return Sticking(still / total, slips, disobeyed / still if command is not None and still else math.nan)
+
+
+def rests(source: Source) -> bool:
+    """Whether a joint never moved, by its position: an encoder may flicker between counts."""
+    position = source.only("position").values.get("position", np.zeros(0))
+    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
+
+
+def hidden_motion(source: Source) -> float:
+    """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
+    position = source.only("position").values.get("position", np.zeros(1))
+    distance = float(np.ptp(position))
+    return distance if distance > SHAFT.far * max(resolution(position), SHAFT.joint_rest) else 0.0
+
+
+def _only_turns(phases: Phases, velocity: Numbers) -> bool:
+    """Whether it is one motion back and forth, which is slow for a moment where it turns."""
+    between = phases.sticks[1:-1]
+    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < SHAFT.turns:
+        return False
+    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
+    return rest < SHAFT.brief * motion
+
+
+def _turns(sticks: Rows, velocity: Numbers) -> Mask:
+    """Whether the motion after each rest goes against the one before it; not all turns of a motion are rests."""
+    return velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
+
+
+def rest_speed(piece: Piece, least: float) -> float:
+    """The speed up to which a joint is at rest, above the noise of its velocity."""
+    return max(least, SHAFT.noisy * piece.noise["velocity"])
+
+
+def _commanded_speed(command: Source, time: Numbers) -> Numbers:
+    speed, position = command.only("velocity"), command.only("position")
+    if np.any(speed.values.get("velocity", 0.0)):
+        return np.interp(time, speed.time, speed.values["velocity"])
+    if len(position.time) < SHAFT.fewest_samples:
+        return np.zeros(len(time))
+    return np.interp(time, position.time, np.gradient(position.values["position"], position.time))

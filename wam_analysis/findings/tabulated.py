@@ -1,5 +1,6 @@
 """The numbers of a section as tables: subjects by quantities, and a list of the rest."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ class Tabulated(NamedTuple):
     rows: tuple[tuple[str, ...], ...]
 
 
-def tabulated(findings: tuple[Finding, ...]) -> tuple[Tabulated, ...]:
+def tabulated(findings: Sequence[Finding]) -> tuple[Tabulated, ...]:
     """Tables of some numbers: one of those whose subjects share quantities, and one of those without a subject.
 
     What was neither measured nor predicted for any subject is left out; a column of predictions is there only if there
@@ -58,23 +59,16 @@ def _table(findings: list[Finding]) -> Tabulated:
     cells = {(one.subject, (one.quantity, one.unit)): one for one in findings}
     downwards = len(subjects) <= len(quantities)
     titles = [_titled(*quantity) for quantity in quantities]
-    names, heads = (titles, subjects) if downwards else (subjects, titles)
-    heads = [head or "measured" for head in heads]
-    columns, predicted = ["quantity" if downwards else ""], [False]
-    rows: list[list[str]] = [[name] for name in names]
     grid = [[cells.get((subject, quantity)) for quantity in quantities] for subject in subjects]
-    columned = grid if downwards else [list(column) for column in zip(*grid, strict=True)]
-    for head, found in zip(heads, columned, strict=True):
-        columns.append(head)
-        predicted.append(False)
-        for row, one in zip(rows, found, strict=True):
-            row.append("" if one is None else _measured(one))
-        if any(one is not None and not np.isnan(one.predicted) for one in found):
-            columns.append("predicted")
-            predicted.append(True)
-            for row, one in zip(rows, found, strict=True):
-                row.append("" if one is None or np.isnan(one.predicted) else shown(one.predicted))
-    return Tabulated(tuple(columns), tuple(predicted), tuple(tuple(row) for row in rows))
+    columned = grid if downwards else zip(*grid, strict=True)
+    columns = [("quantity" if downwards else "", False, titles if downwards else subjects)]
+    for head, found in zip(subjects if downwards else titles, columned, strict=True):
+        columns.append((head or "measured", False, ["" if one is None else _measured(one) for one in found]))
+        expected = ["" if one is None or np.isnan(one.predicted) else shown(one.predicted) for one in found]
+        if any(expected):
+            columns.append(("predicted", True, expected))
+    heads, predicted, rows = zip(*columns, strict=True)
+    return Tabulated(heads, predicted, tuple(zip(*rows, strict=True)))
 
 
 def _measured(one: Finding) -> str:

@@ -4,6 +4,8 @@ import json
 import math
 import shutil
 import textwrap
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
@@ -43,7 +45,7 @@ def _wrapped(line: str, wide: int) -> list[str]:
     return textwrap.wrap(line, wide, initial_indent="  ", subsequent_indent="    ")
 
 
-def table_lines(findings: tuple[Finding, ...], wide: int) -> list[str]:
+def table_lines(findings: Sequence[Finding], wide: int) -> list[str]:
     """Lines of the tables of some numbers, of so many columns; none without numbers."""
     lines: list[str] = []
     for table in tabulated(findings):
@@ -63,15 +65,18 @@ def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
     column = max(LAYOUT.column, *(len(text) for row in (words, *(row[1:] for row in table.rows)) for text in row))
     column = min(column, wide - 4 - names)
     fits = max(1, (wide - 2 - names) // (column + 2))
-    groups: list[list[int]] = []
-    for j in range(1, len(table.columns)):
-        with_last = table.predicted[j] or (groups and j + 1 < len(table.columns) and not table.predicted[j + 1])
-        room = bool(groups) and len(groups[-1]) + 1 + (j + 1 < len(table.columns) and table.predicted[j + 1]) <= fits
-        if groups and (room or (table.predicted[j] and with_last)):
-            groups[-1].append(j)
-        else:
-            groups.append([j])
-    return [_block(table, names, column, group) for group in groups]
+    blocks: list[list[int]] = [[]]
+    for column_with_prediction in _with_predictions(table):
+        if blocks[-1] and len(blocks[-1]) + len(column_with_prediction) > fits:
+            blocks.append([])
+        blocks[-1] += column_with_prediction
+    return [_block(table, names, column, block) for block in blocks]
+
+
+def _with_predictions(table: Tabulated) -> list[list[int]]:
+    """Each measured column, with that of its predictions if there is one."""
+    starts = [j for j, is_predicted in enumerate(table.predicted) if j and not is_predicted]
+    return [list(range(*pair)) for pair in pairwise([*starts, len(table.columns)])]
 
 
 def _block(table: Tabulated, names: int, column: int, columns: list[int]) -> list[str]:

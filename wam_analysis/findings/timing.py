@@ -59,7 +59,7 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
 
 def timing_section(recording: AnalysedRecording) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
-    sentences, findings, verdict = [], [], []
+    findings, wrong = [], []
     streams = _foreign_streams(recording) if recording.is_foreign else _own_streams(recording)
     for name, stamp, received, expected in streams:
         found = stamp_timing(stamp, received)
@@ -77,11 +77,10 @@ def timing_section(recording: AnalysedRecording) -> Section:
             ]
         if found.missed:
             gap = shown(found.longest_gap, "s")
-            sentences.append(f"{name}: {found.missed} periods without a message, the longest gap {gap}.")
-            verdict.append(sentences[-1])
+            wrong.append(f"{name}: {found.missed} periods without a message, the longest gap {gap}.")
     if recording.is_foreign:
         stated = "Every period has its message." if findings else "No stamped topic was recorded."
-        return Section("timing", "Timing", tuple(sentences) or (stated,), tuple(findings), (), (), tuple(verdict))
+        return Section("timing", "Timing", wrong or [stated], findings, wrong=wrong)
     if timed := [facts for facts in recording.loop if RATE in facts]:
         last = timed[-1]
         findings.append(Finding("driver: rate", "Hz", float(last[RATE])))
@@ -90,6 +89,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
             findings.append(Finding(f"driver: latency {p}", "us", median(values)))
         note = f"of {last.get('periods', '-')}"
         findings.append(Finding("driver: missed periods", "", float(last.get("missed periods", math.nan)), note=note))
+    sentences = [*wrong]
     if recording.mode == "lockstep":
         sentences.append(
             "Recorded in lockstep: the driver waited for every command, so reception times have no meaning."
@@ -97,7 +97,7 @@ def timing_section(recording: AnalysedRecording) -> Section:
     if not findings:
         sentences.append("No stamped topic of the loop was recorded.")
     lacking = recording.run.lacking(*TIMED[:2])
-    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), lacking, (), tuple(verdict))
+    return Section("timing", "Timing of the loop", sentences, findings, lacking, (), wrong)
 
 
 def provenance(recording: AnalysedRecording) -> dict[str, str]:

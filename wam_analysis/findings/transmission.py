@@ -10,7 +10,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
-from wam_analysis.measures.friction import Friction, identify_friction
+from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
@@ -139,11 +139,9 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
 
 def _possible(found: Friction) -> Friction:
     """The friction, without its numbers where one is surely below zero: then the torque holds more than friction."""
-    known = ((found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error))
-    if not any(value < -SHAFT.below_zero * error for value, error in known):
+    if not (found.dynamic.is_negative or found.viscous.is_negative):
         return found
-    nan = math.nan
-    return found._replace(static=nan, dynamic=nan, viscous=nan, inertia=nan)
+    return found._replace(static=UNKNOWN, dynamic=UNKNOWN, viscous=UNKNOWN, inertia=UNKNOWN)
 
 
 def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Friction]) -> dict[str, Ripple]:
@@ -158,10 +156,10 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
         known = friction[name]
         velocity = signals.velocity[:, i]
         rows = turning(signals, i)
-        if not math.isfinite(known.dynamic) or not np.any(rows):
+        if not math.isfinite(known.dynamic.value) or not np.any(rows):
             continue
-        rest = signals.torque[:, i] - signals.load[:, i] - known.dynamic * np.sign(velocity)
-        rest = rest - np.nan_to_num(known.viscous) * velocity
+        rest = signals.torque[:, i] - signals.load[:, i] - known.dynamic.value * np.sign(velocity)
+        rest = rest - np.nan_to_num(known.viscous.value) * velocity
         rest = rest - arm.motors.inertia[i] * np.gradient(velocity, signals.time)
         rows &= np.abs(rest) < 10.0 * float(np.median(np.abs(rest[rows]))) + 1e-12
         found[name] = ripple_spectrum(signals.angle[rows, i], rest[rows], SHAFT.orders)

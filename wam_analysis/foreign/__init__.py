@@ -1,10 +1,6 @@
-"""Recordings of other robots: JointState, WrenchStamped and mapped topics, by joint and wrench axis.
+"""Recordings of other robots read: JointState, WrenchStamped and mapped topics, by joint and wrench axis.
 
 topic_map   which topics, joints and fields hold which quantity, in which unit
 reading     bags by `wam_bag`, and those of other formats by rosbags, as columns of joints and wrenches
 sources     one joint or one wrench of one sender: gaps, doubled stamps and lacking velocities handled
-cycles      limit cycles in windows, and whether they were commanded; spectrum
-mechanics   stick-slip, friction and inertia
-forces      response of a force to the steps of its command
-sections    all of it as sections of an analysis
 """

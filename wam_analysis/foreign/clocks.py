@@ -73,7 +73,7 @@ def rising(stamps: Times, received: Times) -> Times:
     that are years away from their reception, such as 0, are replaced by it.
     """
     away = np.abs(stamps - received) > STREAM.away
-    if 2 * int(np.sum(away)) < len(stamps):
+    if 2 * np.count_nonzero(away) < len(stamps):
         stamps = np.where(away, received, stamps)
     steps = np.diff(stamps)
     arrivals = np.diff(received)

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.findings.analysis import Analysis, analyse
+from wam_analysis.findings.effort import friction
 from wam_analysis.findings.finding import shown
 from wam_analysis.findings.guarded import sentence
 from wam_analysis.findings.held_force import Theory, theory_of
 from wam_analysis.findings.motion import identified
-from wam_analysis.foreign.mechanics import friction, is_sure
 from wam_analysis.foreign.sources import Source
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recording import AnalysedRecording
@@ -65,11 +65,11 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
     fit = found_friction.friction
     values = {"rate": _rate(joint)}
     for name, kind in (("friction", "dynamic"), ("damping", "viscous"), ("inertia", "inertia")):
-        value, error = getattr(fit, kind), getattr(fit, f"{kind}_error")
-        if is_sure(value, error):
-            values[name] = _identified(label, value, error)
+        known = getattr(fit, kind)
+        if known.is_sure:
+            values[name] = _identified(label, *known)
     if "friction" in values and fit.breakaways > 2:
-        values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
+        values["stiction"] = _identified(label, max(fit.static.value, fit.dynamic.value), fit.static.error)
     return RecordedLoop(values, "")
 
 
@@ -127,7 +127,7 @@ def _with_identified(arm: Arm, recording: AnalysedRecording) -> tuple[Arm, list[
     """The arm with the friction of its joints that the recording shows, and their names."""
     joints, names = arm.joints, []
     for kind in ("static", "dynamic", "viscous"):
-        found = {name: identified(one)[kind] for name, one in recording.motion.joints.items()}
+        found = {name: identified(one, kind) for name, one in recording.motion.joints.items()}
         names += [name for name, value in found.items() if math.isfinite(value)]
         old = zip(joints.names, getattr(joints, f"{kind}_friction"), strict=True)
         values = [value if math.isnan(found.get(name, math.nan)) else found[name] for name, value in old]

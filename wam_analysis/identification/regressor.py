@@ -16,8 +16,7 @@ from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
-DIAGONAL = (4, 6, 9)  # inertia xx, yy, zz among the ten parameters of a link
-PRODUCTS = ((5, 0, 1), (7, 0, 2), (8, 1, 2))  # inertia xy, xz, yz: place, axes
+INERTIA = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # axes xx, xy, yy, xz, yz, zz of the last six parameters of a link
 
 
 class Equations(NamedTuple):
@@ -160,19 +159,15 @@ def about_origin(link: Numbers, product: Sequence[float] = (0.0, 0.0, 0.0)) -> t
     link : (7,), mass, kg; mass times centre, kg m; moments of inertia about the centre, kg m^2.
     product : elements xy, xz, yz of that inertia, kg m^2, which are not estimated.
     """
-    mass, moment, inertia = float(link[0]), link[1:4], link[4:]
+    mass, moment = float(link[0]), link[1:4]
+    square = moment @ moment * np.eye(3) - np.outer(moment, moment)
+    centre = np.diag(link[4:])
+    for (a, b), own in zip(((0, 1), (0, 2), (1, 2)), product, strict=True):
+        centre[a, b] = own
     ten, slope = np.zeros(10), np.zeros((10, 7))
-    ten[0], slope[0, 0] = mass, 1.0
-    ten[1:4], slope[1:4, 1:4] = moment, np.eye(3)
-    for i, place in enumerate(DIAGONAL):
-        others = [axis for axis in range(3) if axis != i]
-        square = float(moment[others] @ moment[others])
-        ten[place] = inertia[i] + square / mass
-        slope[place, 0], slope[place, 4 + i] = -square / mass**2, 1.0
-        for axis in others:
-            slope[place, 1 + axis] = 2.0 * moment[axis] / mass
-    for (place, a, b), own in zip(PRODUCTS, product, strict=True):
-        ten[place] = own - moment[a] * moment[b] / mass
-        slope[place, 0] = moment[a] * moment[b] / mass**2
-        slope[place, 1 + a], slope[place, 1 + b] = -moment[b] / mass, -moment[a] / mass
+    ten[:4], slope[:4, :4] = link[:4], np.eye(4)
+    ten[4:], slope[4:, 0] = (centre + square / mass)[INERTIA], -square[INERTIA] / mass**2
+    for i, axis in enumerate(np.eye(3)):
+        turned = 2.0 * moment[i] * np.eye(3) - np.outer(axis, moment) - np.outer(moment, axis)
+        slope[4:, 1 + i], slope[4:, 4 + i] = turned[INERTIA] / mass, np.diag(axis)[INERTIA]
     return ten, slope

@@ -12,39 +12,58 @@ from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Index, Mask, Numbers, Rows
 
 
+class FrictionNumber(NamedTuple):
+    """A number and its standard error; NaN if it is not identifiable."""
+
+    value: float = math.nan
+    error: float = math.nan
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether a number that has to be above zero is identified."""
+        return self.value > 0.0 and self.error < SHAFT.unsure * self.value
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether the error is too large to state the number."""
+        return self.error > SHAFT.unsure * abs(self.value)
+
+    @property
+    def is_negative(self) -> bool:
+        """Whether it is surely below zero: then the torque holds more than friction."""
+        return self.value < -SHAFT.below_zero * self.error
+
+
+UNKNOWN = FrictionNumber()
+
+
 class Friction(NamedTuple):
-    """Friction of a shaft, N m (or N), with standard errors; NaN if it is not identifiable.
+    """Friction of a shaft, N m (or N).
 
     Attributes
     ----------
-    static : torque at which the shaft breaks away, median over the breakaways.  Those nearer to dynamic
-        friction than to the third highest are left out: what moves off at less was not quite at rest.
+    static : torque at which the shaft breaks away, median over the breakaways.  Those nearer to dynamic friction than
+        to the third highest are left out: what moves off at less was not quite at rest.  Its error is at least half of
+        its rise above `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often
+        as you like; and at least what the torque changes by in a period before a breakaway: it may be as much again
+        until the shaft slips.  Infinite where the torque rises by no more than it scatters in motion.
     dynamic : torque of dry friction in motion.
     viscous : torque per velocity.
-    inertia : torque per acceleration.
+    inertia : torque per acceleration.  Three errors of these hold the truth also where there are few motions.
     offset : torque that does not change its sign.
-    static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four; three of them hold
-        the truth also where there are few breakaways or motions.  That of `static` is at least half of its rise above
-        `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often as you like;
-        and at least what the torque changes by in a period before a breakaway: it may be as much again until the shaft
-        slips.  Infinite where the torque rises by no more than it scatters in motion.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
     unexplained : the same as a share of the rms of that torque about its mean.
     """
 
-    static: float
-    dynamic: float
-    viscous: float
-    inertia: float
-    offset: float
-    static_error: float
-    dynamic_error: float
-    viscous_error: float
-    inertia_error: float
-    breakaways: int
-    residual: float
-    unexplained: float
+    static: FrictionNumber = UNKNOWN
+    dynamic: FrictionNumber = UNKNOWN
+    viscous: FrictionNumber = UNKNOWN
+    inertia: FrictionNumber = UNKNOWN
+    offset: float = math.nan
+    breakaways: int = 0
+    residual: float = math.nan
+    unexplained: float = math.nan
 
 
 def identify_friction(
@@ -84,8 +103,8 @@ def identify_friction(
     n = len(time)
     allowed = np.ones(n, dtype=np.bool_) if use is None else use.copy()
     allowed &= np.isfinite(velocity) & np.isfinite(torque)
-    if n < SHAFT.fewest_samples or int(np.sum(allowed)) < SHAFT.fewest_samples:
-        return _UNSEEN
+    if n < SHAFT.fewest_samples or np.count_nonzero(allowed) < SHAFT.fewest_samples:
+        return Friction()
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
     period = float(np.median(np.diff(time)))
     gaps = np.flatnonzero(after_gaps(time))
@@ -95,16 +114,11 @@ def identify_friction(
         np.empty((n, 0)) if each is None else np.where(allowed[:, np.newaxis], each, 0.0) for each in (load, waves)
     )
     solution, errors, left = _in_motion(velocity, torque, acting, unknown, rest, half, period, allowed)
-    dynamic, viscous, inertia, offset = solution[:4]
-    free = torque - acting @ np.nan_to_num(np.array(solution[4:])) - (0.0 if math.isnan(offset) else offset)
-    static, error, count = _static(
-        _breakaways(velocity, free, rest, 2 * half, allowed), dynamic, math.hypot(errors[0], left[0]), unknown
-    )
-    return Friction(static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], count, *left)
-
-
-_NAN = math.nan
-_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0, _NAN, _NAN)
+    dynamic, viscous, inertia, offset = map(FrictionNumber, solution[:4], errors[:4])
+    steady = acting @ np.nan_to_num(np.array(solution[4:])) + np.nan_to_num(offset.value)
+    breakaways = _breakaways(velocity, torque - steady, rest, 2 * half, allowed)
+    static, count = _static(breakaways, dynamic.value, math.hypot(dynamic.error, left[0]), unknown)
+    return Friction(static, dynamic, viscous, inertia, offset.value, count, *left)
 
 
 def _in_motion(
@@ -160,7 +174,7 @@ def _robust(
     used = _distinct(columns)
     solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
-        if int(np.sum(keep)) < SHAFT.fewest_samples:
+        if np.count_nonzero(keep) < SHAFT.fewest_samples:
             break
         used, solution, rest = _fit(columns, wanted, scale, keep)
         middle = float(np.median(rest[keep]))
@@ -306,25 +320,26 @@ class _Breakaways(NamedTuple):
     row: Rows
 
 
-def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) -> tuple[float, float, int]:
-    """Static friction, its standard error and the number of breakaways that count.
+def _static(found: _Breakaways, dynamic: float, noise: float, waves: Numbers) -> tuple[FrictionNumber, int]:
+    """Static friction and the number of breakaways that count.
 
     A shaft that creeps carries dynamic friction, about which the torque scatters by `noise`: breakaways that rise by no
     more may all be of a shaft that never stuck, and the error is infinite.  The part of `waves` in it is in the error.
     """
     near = found.torque >= dynamic  # what moved at less was creeping; where it never slid, it was no breakaway
     if not np.any(near):
-        return math.nan, math.nan, 0
+        return UNKNOWN, 0
     count = found.torque >= (dynamic + float(np.min(np.sort(found.torque[near])[-SHAFT.agreeing :]))) / 2.0
     torque = found.torque[count]
     static = float(np.median(torque))
     wave = float(np.sqrt(np.mean(np.sum(waves[found.row[count]] ** 2, axis=1))))
     if not static - dynamic > SHAFT.sigmas * math.sqrt(max(noise**2 - wave**2, 0.0)):
-        return static, math.inf, len(torque)
+        return FrictionNumber(static, math.inf), len(torque)
     scatter = 1.4826 * float(np.median(np.abs(torque - static)))
     alike = _few(len(torque) - 1.0) * scatter / math.sqrt(len(torque))
     step = float(np.median(found.step[count]))
-    return static, math.hypot(alike, SHAFT.creep * (static - dynamic), step, wave), len(torque)
+    error = math.hypot(alike, SHAFT.creep * (static - dynamic), step, wave)
+    return FrictionNumber(static, error), len(torque)
 
 
 def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> _Breakaways:

@@ -221,5 +221,5 @@ def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
 
 def _luck(below: Numbers, scatter: float) -> float:
     """Part of the highest of the phases on a plateau that is due to noise: the expected largest of so many draws."""
-    rivals = int(np.sum(below <= 4.0 * scatter))
+    rivals = np.count_nonzero(below <= 4.0 * scatter)
     return scatter * NormalDist().inv_cdf((rivals - 0.375) / (rivals + 0.25)) if rivals > 1 else 0.0

@@ -1,16 +1,18 @@
 """Limit cycles of joints and wrench axes in windows of a recording, or cycles that were commanded; their spectrum."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.foreign.sources import Piece, Source, longest, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.episodes import Episode, episodes, without_drift
 from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
-from wam_analysis.measures.lines import SpectralLine, spectral_lines
+from wam_analysis.measures.lines import spectral_lines
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, SHAFT, STREAM
 from wam_bag.arrays import Numbers
 
@@ -21,82 +23,118 @@ HARMONIC = "near a multiple of the commanded frequency"
 
 
 class FoundCycle(NamedTuple):
-    """A cycle of a joint or wrench axis.
+    """A cycle: from where it comes, and the standard error of its size where what was commanded was taken off."""
 
-    Attributes
-    ----------
-    label, unit : of what.
-    begin, end : s.
-    frequency : Hz.
-    peak_to_peak, error : size, with its standard error where what was commanded had to be taken off, else NaN.
-    growth : size of the second half over that of the first.
-    confidence : 0 to 1.
-    origin : `COMMANDED_CYCLE`, `LIMIT_CYCLE`, `HARMONIC` or `UNKNOWN`.
-    """
-
-    label: str
-    unit: str
-    begin: float
-    end: float
-    frequency: float
-    peak_to_peak: float
-    error: float
-    growth: float
-    confidence: float
+    episode: Episode
     origin: str
+    error: float = math.nan
 
 
-def traced(source: Source) -> list[str]:
-    """The quantities in which cycles are looked for: the first of position, velocity and effort, or each axis.
-
-    One that is in less than half of the messages comes last.
-    """
-    if not source.is_joint:
-        return list(source.values)
-    known = {q: 2 * int(np.sum(np.isfinite(v))) < len(v) for q, v in source.values.items()}
-    return [min((q for q in ("position", "velocity", "effort") if q in known), key=known.__getitem__)]
-
-
-def cycles(source: Source, command: Source | None) -> list[FoundCycle]:
-    """The cycles of a joint or wrench.
-
-    Parameters
-    ----------
-    source : what was measured.
-    command : of the same joint or wrench; None if there is none.
-    """
-    found = []
-    for quantity in traced(source):
-        label = source.label if source.is_joint else f"{source.label} {quantity}"
-        unit = source.units[quantity]
+def repetition_section(recording: AnalysedRecording) -> Section:
+    """What repeats, and whether it was commanded."""
+    sentences, findings, verdict = [], [], []
+    taken: set[str] = set()
+    for one, quantity, label in traced(recording.states):
+        unit, command = one.units[quantity], recording.command_of(one)
         own = None if command is None else command.only(quantity)
-        for piece in pieces(source, quantity):
+        for piece in pieces(one, quantity):
             least = max(CYCLE.loud * piece.noise[quantity], LEAST.get(unit, 0.0))
-            for one, origin, error in _of_piece(piece, quantity, own, least):
-                cycle = one.cycle
-                size = (cycle.peak_to_peak, error, cycle.growth, cycle.confidence)
-                found.append(FoundCycle(label, unit, one.begin, one.end, 1.0 / cycle.period, *size, origin))
-    return found
+            for found in _of_piece(piece, quantity, own, least):
+                begin, end, cycle = found.episode
+                name = label if label not in taken else f"{label} from {begin:.1f} s"
+                taken.add(name)
+                sentences.append(_sentence(label, unit, found))
+                frequency = 1.0 / cycle.period
+                if found.origin not in (COMMANDED_CYCLE, HARMONIC):
+                    size = f"{shown(frequency, 'Hz')}, {shown(cycle.peak_to_peak, unit)} peak to peak"
+                    verdict.append(f"{label}: {size}{', not commanded' * (found.origin == LIMIT_CYCLE)}.")
+                findings += [
+                    Finding(
+                        f"{name}: cycle, peak to peak", unit, cycle.peak_to_peak, note=found.origin, error=found.error
+                    ),
+                    Finding(f"{name}: frequency", "Hz", frequency, note=found.origin),
+                    Finding(f"{name}: begin", "s", begin),
+                    Finding(f"{name}: end", "s", end),
+                    Finding(f"{name}: confidence", "", cycle.confidence),
+                ]
+    stated = sentences or ["Nothing in this recording repeats five times."]
+    return Section("stability", "Cycles", stated, findings, (), verdict)
 
 
-def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float) -> list[tuple[Episode, str, float]]:
-    """Episodes, where each comes from, and the error of its size where a response to a command was taken off."""
-    result: list[tuple[Episode, str, float]] = []
+def _sentence(label: str, unit: str, found: FoundCycle) -> str:
+    begin, end, cycle = found.episode
+    size = f"{shown(cycle.peak_to_peak, unit)} peak to peak"
+    if not CYCLE.changing < cycle.growth < 1.0 / CYCLE.changing:
+        change = f"{'growing' if cycle.growth > 1.0 else 'shrinking'} by {100.0 * abs(cycle.growth - 1.0):.0f} %"
+        size += f", {change} from half to half,"
+    where = f"from {begin:.1f} to {end:.1f} s (confidence {cycle.confidence:.2f})"
+    frequency = shown(1.0 / cycle.period, "Hz")
+    if found.origin == LIMIT_CYCLE:
+        return f"{label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
+    ends = {
+        COMMANDED_CYCLE: ", as it was commanded",
+        HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion that is not "
+        "followed linearly",
+        UNKNOWN: "; no command of it is known, --command names one",
+    }
+    return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
+
+
+def spectrum_section(recording: AnalysedRecording) -> Section:
+    """The strongest lines of each joint and wrench axis, in its longest stretch without a gap."""
+    findings, begins = [], []
+    for one, quantity, label in traced(recording.states):
+        if (piece := longest(pieces(one, quantity))) is None:
+            continue
+        begins.append(CYCLE.first_line / float(np.ptp(piece.time)))
+        unit = one.units[quantity]
+        for line in spectral_lines(piece.time, piece.values[quantity], CYCLE.lines):
+            if 2.0 * line.amplitude > LEAST.get(unit, 0.0):
+                name = f"{label}, {shown(line.frequency, 'Hz')}"
+                findings.append(Finding(f"{name}: amplitude", unit, line.amplitude))
+                findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
+    if not begins:
+        return Section("frequency", "Spectrum", ("No stretch is long enough.",))
+    span = f"from {shown(min(begins), 'Hz')} on, five cycles of the longest stretch"
+    if findings:
+        return Section("frequency", "Spectrum", (f"Looked for {span}.",), findings)
+    silent = (f"No frequency is above the noise {span}; slower ones were not looked for.",)
+    return Section("frequency", "Spectrum", silent, wrong=(), shows=silent)
+
+
+def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:
+    """Sources with each quantity that is looked at, and a label of both.
+
+    Of a joint it is the first of position, velocity and effort, of a wrench each axis.  One that is in less than half
+    of the messages comes last.
+    """
+    for one in sources:
+        if one.is_joint:
+            seldom = {q: 2 * np.count_nonzero(np.isfinite(v)) < len(v) for q, v in one.values.items()}
+            quantities = (q for q in ("position", "velocity", "effort") if q in seldom)
+            yield one, min(quantities, key=seldom.__getitem__), one.label
+        else:
+            yield from ((one, axis, f"{one.label} {axis}") for axis in one.values)
+
+
+def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float) -> list[FoundCycle]:
+    """The cycles of a stretch."""
+    result: list[FoundCycle] = []
     rest = None if command is None else _without_response(piece, quantity, command)
     for one in _found(piece, quantity, piece.values[quantity], least):
         frequency = _commanded_frequency(one, quantity, command)
         if frequency is None:
-            result.append((one, UNKNOWN, math.nan))
+            result.append(FoundCycle(one, UNKNOWN))
         elif abs(frequency * one.cycle.period - 1.0) > CYCLE.same_frequency:
             if rest is None:
-                result.append((one, LIMIT_CYCLE, math.nan))
+                result.append(FoundCycle(one, LIMIT_CYCLE))
         else:
-            result.append((one, COMMANDED_CYCLE, math.nan))
+            result.append(FoundCycle(one, COMMANDED_CYCLE))
             if rest is None:
                 inner = (piece.time >= one.begin) & (piece.time <= one.end)
                 left = _without(piece.time[inner], piece.values[quantity][inner], frequency)
                 others = episodes(piece.time[inner], left, least)
-                result += [(other, LIMIT_CYCLE, math.nan) for other in others if not _is_harmonic(other, frequency)]
+                result += [FoundCycle(other, LIMIT_CYCLE) for other in others if not _is_harmonic(other, frequency)]
     if rest is None:
         return result
     for one in _found(piece, quantity, rest, least):
@@ -106,7 +144,7 @@ def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float)
         inner = (piece.time >= one.begin) & (piece.time <= one.end)
         error = error_of_size(piece.time[inner], rest[inner], one.cycle.period)
         error = math.hypot(error, (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak)
-        result.append((one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
+        result.append(FoundCycle(one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
     return result
 
 
@@ -205,21 +243,3 @@ def _without(time: Numbers, value: Numbers, frequency: float) -> Numbers:
     angles = 2.0 * np.pi * frequency * np.outer(time - time[0], np.arange(1, most + 1))
     columns = np.column_stack([np.ones(len(time)), time - time[0], np.cos(angles), np.sin(angles)])
     return value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
-
-
-def lines(source: Source) -> list[tuple[str, str, SpectralLine]]:
-    """Label, unit and line: the strongest lines in the spectrum of the longest stretch without a gap."""
-    found = []
-    for quantity in traced(source):
-        if (piece := longest(pieces(source, quantity))) is not None:
-            label = source.label if source.is_joint else f"{source.label} {quantity}"
-            every = spectral_lines(piece.time, piece.values[quantity], CYCLE.lines)
-            least = LEAST.get(source.units[quantity], 0.0)
-            found += [(label, source.units[quantity], line) for line in every if 2.0 * line.amplitude > least]
-    return found
-
-
-def slowest(source: Source) -> float:
-    """The frequency, Hz, from which on lines are looked for; NaN where no stretch is long enough."""
-    piece = longest([one for quantity in traced(source) for one in pieces(source, quantity)])
-    return CYCLE.first_line / float(np.ptp(piece.time)) if piece is not None else math.nan

@@ -1,12 +1,15 @@
-"""Response of a measured force to the steps of its command."""
+"""Section about the steps of a commanded force, and the response of the measured one."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.findings.finding import Finding, Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, pieces
 from wam_analysis.held_messages import row_at
 from wam_analysis.measures.response import StepResponse, step_response
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import HOLD
 
 FORCE = ("force.x", "force.y", "force.z")
@@ -62,7 +65,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
             value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
             before = (piece.time < begin) & (piece.time >= begin - HOLD.before)
             after = (piece.time >= begin) & (piece.time < end)
-            if not np.any(before) or int(np.sum(after)) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
+            if not np.any(before) or np.count_nonzero(after) < 8 or float(piece.time[after][-1]) < end - HOLD.before:
                 continue
             try:
                 response = step_response(
@@ -78,3 +81,54 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
                 ForceStep(measured.label, begin, float(desired[last] @ way), float(desired[row] @ way), response)
             )
     return found
+
+
+def step_section(recording: AnalysedRecording) -> Section:
+    """Steps of a commanded force, and how the measured one followed."""
+    states, commands = recording.states, recording.commands
+    steps: list[ForceStep] = []
+    sentences, findings, doubts, followed = [], [], [], set()
+    for one in (one for one in states if not one.is_joint):
+        if (command := recording.command_of(one)) is not None:
+            steps += force_steps(one, command)
+            followed.add(command.topic)
+            continue
+        doubts += [
+            f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
+            f"{other.frame}."
+            for other in commands
+            if not other.is_joint and not one.shares_frame(other)
+        ]
+    doubts += [text for one in commands if one.topic in followed and (text := _arrival(one))]
+    for step in steps:
+        name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
+        response = step.response
+        over = 100.0 * response.overshoot
+        settled = "" if math.isfinite(response.settling) else ", which did not settle to 5 %"
+        sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
+        findings += [
+            Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),
+            Finding(f"{name}: rise time 10-90 %", "s", response.rise),
+            Finding(f"{name}: settling time to 5 %", "s", response.settling),
+            Finding(f"{name}: overshoot", "%", over),
+            Finding(f"{name}: ripple", "N", response.ripple),
+        ]
+    if steps:
+        worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
+        error = shown(abs(worst.response.final - worst.commanded), "N")
+        number, size = counted(len(steps), "force step"), shown(worst.commanded, "N")
+        verdict = f"{number}; the largest steady error is {error} of {size}."
+        return Section("force", "Force", (*sentences, *doubts), findings, (), (verdict,), doubts)
+    return Section("force", "Force", doubts or ["No step of a commanded force was recorded."], wrong=doubts)
+
+
+def _arrival(command: Source) -> str:
+    """That a command goes over to its frame from another one, '' if it does not."""
+    at = command.time[command.arrives & np.any(np.column_stack([*command.values.values()]), axis=1)]
+    if not len(at):
+        return ""
+    when = f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
+    return (
+        f"{command.topic} goes over to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
+        "a step, because what was commanded before is in another frame."
+    )

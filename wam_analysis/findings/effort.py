@@ -1,100 +1,81 @@
-"""Stick-slip, friction and inertia of the joints of another robot."""
+"""Section about friction and inertia of the joints of another robot, from their effort."""
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, resolution
-from wam_analysis.measures.friction import Friction, identify_friction
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.stick_slip import rest_speed, rests
+from wam_analysis.foreign.sources import Source, differentiated, pieces
+from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
+from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
-from wam_bag.arrays import Mask, Numbers, Rows
+from wam_bag.arrays import Mask, Numbers
 
 WEIGHT, DRAG, FILTER = "weight", "drag", "filter"
+ALSO = {
+    WEIGHT: "with its weight",
+    DRAG: "with a drag by the square of the velocity",
+    FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
+}
 
 
-class Sticking(NamedTuple):
-    """How a joint moved.
-
-    Attributes
-    ----------
-    stuck : fraction of the time at rest.
-    slips : motions between; a motion back and forth is one.
-    commanded : fraction of the rest in which it was commanded to move; NaN without a command.
-    """
-
-    stuck: float
-    slips: int
-    commanded: float
-
-
-def sticking(source: Source, command: Source | None, least: float) -> Sticking | None:
-    """Rest and motion of a joint, which is at rest below a least speed; None without a velocity."""
-    if rests(source):
-        return Sticking(1.0, 0, math.nan)
-    still = slips = total = disobeyed = 0
-    moved = next((q for q in ("velocity", "position") if q in source.values), "")
-    for piece in pieces(source, moved) if moved else ():
-        rest = _rest(piece, least)
-        period = float(piece.time[1] - piece.time[0])
-        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(SHAFT.shortest_phase / period)))
-        total += len(piece.time)
-        if _only_turns(phases, piece.values["velocity"]):
-            slips += 1
-            lengths = np.diff(phases.sticks, axis=1)
-            still += int(np.sum(lengths[lengths > SHAFT.brief * np.median(np.diff(phases.slips, axis=1))]))
+def effort_section(recording: AnalysedRecording) -> Section:
+    """Friction and inertia of the joints of another robot."""
+    states = recording.states
+    sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
+    for one in states:
+        factor = velocity_factor(one)
+        if math.isfinite(factor):
+            wrong.append(
+                f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
+                f"of another unit or sign, so that neither friction nor inertia is given."
+            )
+        whole = friction(one) if one.is_joint else None
+        if whole is None:
+            if not math.isfinite(factor) and {"effort"} < one.values.keys() and not rests(one):
+                doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
             continue
-        phases = without_turns(phases, piece.values["velocity"], rest)
-        still += round(phases.stuck * len(piece.time))
-        slips += len(phases.slips)
-        if command is not None:
-            moves = np.abs(_commanded_speed(command, piece.time)) > rest
-            disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
-    if not total:
-        return None
-    return Sticking(still / total, slips, disobeyed / still if command is not None and still else math.nan)
-
-
-def rests(source: Source) -> bool:
-    """Whether a joint never moved, by its position: an encoder may flicker between counts."""
-    position = source.only("position").values.get("position", np.zeros(0))
-    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
-
-
-def hidden_motion(source: Source) -> float:
-    """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
-    position = source.only("position").values.get("position", np.zeros(1))
-    distance = float(np.ptp(position))
-    return distance if distance > SHAFT.far * max(resolution(position), SHAFT.joint_rest) else 0.0
-
-
-def _only_turns(phases: Phases, velocity: Numbers) -> bool:
-    """Whether it is one motion back and forth, which is slow for a moment where it turns."""
-    between = phases.sticks[1:-1]
-    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < SHAFT.turns:
-        return False
-    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
-    return rest < SHAFT.brief * motion
-
-
-def _turns(sticks: Rows, velocity: Numbers) -> Mask:
-    """Whether the motion after each rest goes against the one before it; not all turns of a motion are rests."""
-    return velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
-
-
-def _rest(piece: Piece, least: float) -> float:
-    return max(least, SHAFT.noisy * piece.noise["velocity"])
-
-
-def _commanded_speed(command: Source, time: Numbers) -> Numbers:
-    speed, position = command.only("velocity"), command.only("position")
-    if np.any(speed.values.get("velocity", 0.0)):
-        return np.interp(time, speed.time, speed.values["velocity"])
-    if len(position.time) < SHAFT.fewest_samples:
-        return np.zeros(len(time))
-    return np.interp(time, position.time, np.gradient(position.values["position"], position.time))
+        found = whole.friction
+        effort, speed = one.units["effort"], one.units.get("velocity", "rad/s").partition("/")[0]
+        every = (
+            ("dry friction", effort, found.dynamic),
+            ("viscous friction", f"{effort} s/{speed}", found.viscous),
+            ("inertia", "kg m2" if effort == "N m" else f"{effort} s2/{speed}", found.inertia),
+        )
+        numbers = [number for number in every if number[2].is_sure]
+        findings += [
+            Finding(f"{one.label}: {what}", unit, known.value, error=known.error) for what, unit, known in numbers
+        ]
+        brief.append(
+            f"{one.label}: {', '.join(f'{what} {shown(known.value, unit)}' for what, unit, known in numbers)}."
+        )
+        missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
+        remarks = [f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"]
+        if math.isnan(found.inertia.value):
+            late = shown(1e-3 * abs(whole.per_lag))
+            remarks.append(f"one frequency, 1 ms of delay changes the viscous friction by {late}")
+            alone.append(one.label)
+        remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
+        remarks += [ALSO[name] for name in whole.also]
+        way = "behind" if whole.lag > 0.0 else "before"
+        remarks += [f"the effort is {shown(abs(whole.lag), 's')} {way} the motion"] * bool(whole.lag)
+        sentences.append(f"{one.label}: {'; '.join(remarks)}.")
+    if not sentences:
+        why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
+        return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
+    assumed = (
+        "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
+        "that it may also hold are taken off where they are found, and otherwise count in the errors:"
+    )
+    if alone:
+        doubts.append(
+            f"{', '.join(alone)} moved at one frequency: inertia cannot be separated from weight, nor viscous "
+            "friction from a delay of the effort."
+        )
+    return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
 
 
 def velocity_factor(source: Source) -> float:
@@ -168,7 +149,7 @@ def friction(source: Source) -> FoundFriction | None:
     columns = {DRAG: (velocity * np.abs(velocity))[:, np.newaxis]}
     if "position" in joined and source.units["position"] == "rad":
         columns[WEIGHT] = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
-    rest = max(_rest(piece, SHAFT.joint_rest) for piece in some)
+    rest = max(rest_speed(piece, SHAFT.joint_rest) for piece in some)
     trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
     width, per_lag = round(window / period), math.nan
     acceleration = _Acceleration.of(velocity, sd, rest, width, period)
@@ -179,14 +160,12 @@ def friction(source: Source) -> FoundFriction | None:
         rate = np.concatenate(rates)
         other = trial._replace(velocity=rate, columns=columns | {DRAG: (rate * np.abs(rate))[:, np.newaxis]})
         found, also, shift = min((found, also, shift), _best(other, True), key=lambda one: one[0].residual)
-    by_noise = acceleration.share_of_noise() * found.inertia
-    found = found._replace(inertia_error=math.hypot(found.inertia_error, by_noise))
+    inertia = _less_certain(found.inertia, [acceleration.share_of_noise() * found.inertia.value])
     if one_frequency:
-        per_lag = (found.viscous - trial.fit(also, 1).viscous) / period
-        found = found._replace(inertia=math.nan, inertia_error=math.nan)
-    dry, viscous = (found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error)
-    numbers = (dry, viscous, (found.inertia, found.inertia_error))
-    if not (is_sure(*dry) or is_sure(*viscous)) or any(v < -SHAFT.below_zero * e for v, e in numbers):
+        per_lag, inertia = (found.viscous.value - trial.fit(also, 1).viscous.value) / period, UNKNOWN
+    found = found._replace(inertia=inertia)
+    is_known = found.dynamic.is_sure or found.viscous.is_sure
+    if not is_known or any(one.is_negative for one in (found.dynamic, found.viscous, inertia)):
         return None
     return FoundFriction(found, also, shift * period, per_lag)
 
@@ -245,15 +224,16 @@ def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
             break
         i = min(gains)[1]
         (also, shift), found = others[i], fits[i]
-    more = {
-        name: [getattr(fit, name) - getattr(found, name) for fit in fits] for name in ("dynamic", "viscous", "inertia")
+    doubted: dict[str, Any] = {
+        name: _less_certain(own := getattr(found, name), [getattr(fit, name).value - own.value for fit in fits])
+        for name in ("dynamic", "viscous", "inertia")
     }
-    found = found._replace(
-        dynamic_error=math.hypot(found.dynamic_error, *more["dynamic"]),
-        viscous_error=math.hypot(found.viscous_error, *more["viscous"]),
-        inertia_error=math.hypot(found.inertia_error, *more["inertia"]),
-    )
-    return found, also, shift
+    return found._replace(**doubted), also, shift
+
+
+def _less_certain(known: FrictionNumber, more: Sequence[float]) -> FrictionNumber:
+    """A number with further errors."""
+    return known._replace(error=math.hypot(known.error, *more))
 
 
 class _Acceleration(NamedTuple):
@@ -279,14 +259,9 @@ class _Acceleration(NamedTuple):
         """Share, rms, that is not alike the columns of a weight, without the noise of the velocity."""
         rows = self.rows & np.all(np.isfinite(weight), axis=1)
         rows[:width] = rows[-width:] = False  # the mean is incomplete
-        if int(np.sum(rows)) < SHAFT.fewest_samples:
+        if np.count_nonzero(rows) < SHAFT.fewest_samples:
             return 0.0
-        columns, wanted = np.column_stack([np.ones(int(np.sum(rows))), weight[rows]]), self.value[rows]
+        columns, wanted = np.column_stack([np.ones(np.count_nonzero(rows)), weight[rows]]), self.value[rows]
         rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
         own, whole = float(np.mean(rest**2)) - self.noise, float(np.var(wanted)) - self.noise
         return math.sqrt(own / whole) if 0.0 < own < whole else 0.0
-
-
-def is_sure(value: float, error: float) -> bool:
-    """Whether a number that has to be above zero is identified."""
-    return value > 0.0 and error < SHAFT.unsure * value

@@ -1,0 +1,131 @@
+"""Section about the topics of another robot's recording, and what was done to their raw values."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from wam_analysis.findings.finding import Finding, Section, counted, shown, times
+from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of
+from wam_analysis.recording import AnalysedRecording
+from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
+from wam_bag.limits import READING_LIMITS
+
+TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
+
+
+def topics_section(recording: AnalysedRecording) -> Section:
+    """What is in another robot's recording, and what was done to its raw values."""
+    bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
+    what = (
+        "Analysed as that of another robot, as the options request."
+        if given.is_given
+        else "This is not a recording of this stack."
+    )
+    sentences = [what, *(line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns))]
+    clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
+    wrong = [*_treated(found), *clocks]
+    wrong += [
+        f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
+        f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
+        for topic in dict.fromkeys(one.topic for one in mixed)
+    ]
+    for name, columns in bag.topics.items():
+        if isinstance(columns, JointColumns):
+            wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
+            largest = float(np.nanmax(np.abs(columns.position), initial=0.0))
+            if largest > TURNS and not given.units.get("position"):
+                far = f"positions up to {shown(largest, 'rad')}, taken as radians"
+                wrong.append(f"{name}: {far}; if they are degrees, give --unit position=deg.")
+    if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
+        sentences.append(f"Taken as commands: {topics}.")
+    sentences += [*wrong, *_alike(found), *_unread(bag)]
+    if not found:
+        wrong += _unread(bag) or ["nothing in it can be analysed."]
+    return Section("happened", "What happened", sentences, _treated_findings(found), wrong=wrong)
+
+
+def _topic(name: str, columns: Columns) -> Iterator[str]:
+    """What a topic holds."""
+    if isinstance(columns, JointColumns) and len(columns.stamp_ns):
+        yield f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}."
+        numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
+        if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
+            yield f"{name}: {', '.join(none)} without a value that is a number."
+    elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
+        sizes = np.sqrt((columns.force**2).sum(axis=1))
+        sizes = sizes[np.isfinite(sizes)]
+        what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
+        yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
+
+
+DONE_TO = {
+    Treatment.COARSE: "{number} of {of} stamps repeat the one before; times of reception are used",
+    Treatment.ROUNDED: "the stamps are rounded to {size}; times of reception are used",
+    Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
+    Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
+    Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
+    Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}, which is taken off",
+    Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
+}
+
+
+def _treated(found: Sequence[Source]) -> list[str]:
+    """What was done to raw values, a sentence for all joints of a topic and quantities to which the same was done."""
+    alike: dict[tuple[str, Treated], tuple[list[Source], list[str]]] = {}
+    for one in found:
+        for treated in one.treated:
+            those, quantities = alike.setdefault((one.topic, treated._replace(quantity="")), ([], []))
+            those += [one] * (one not in those)
+            quantities += [treated.quantity] * (treated.quantity not in quantities)
+    sentences = []
+    for (topic, treated), (those, quantities) in alike.items():
+        is_whole = not quantities[0] or 1 < len(those) == sum(one.topic == topic for one in found)
+        subject = topic if is_whole else ", ".join(one.label for one in those)
+        words = DONE_TO[treated.what].format(
+            quantity=" and ".join(quantities),
+            number=treated.number,
+            of=treated.of,
+            size=shown(abs(treated.size), those[0].units.get(quantities[0], "s")),
+            times=times(treated.number),
+            share=100.0 * (1.0 - treated.number / treated.of),
+        )
+        sentences.append(f"{subject}: {words}.")
+    return sentences
+
+
+def _treated_findings(found: Sequence[Source]) -> list[Finding]:
+    return [
+        Finding(f"{one.label}: {' '.join(filter(None, (treated.what, treated.quantity)))}", "", float(treated.number))
+        for one in found
+        for treated in one.treated
+    ]
+
+
+def _alike(found: Sequence[Source]) -> list[str]:
+    """How to name the command among several topics with the same joints: their values do not show it."""
+    topics: dict[str, list[str]] = {}
+    for one in found:
+        if one.is_joint and not one.is_command:
+            topics.setdefault(one.name, []).append(one.topic)
+    shared = {tuple(dict.fromkeys(some)): joint for joint, some in topics.items() if len({*some}) > 1}
+    if any(one.is_command for one in found):
+        return []
+    return [
+        f"{joint} is in {' and '.join(some)}; if one of them is what was commanded, give --command {some[-1]}."
+        for some, joint in shared.items()
+    ]
+
+
+def _unread(bag: Bag) -> list[str]:
+    """Topics that were not read, and how to."""
+    others = {
+        name: n for name, n in bag.counts.items() if n and not any(one.split(" ")[0] == name for one in bag.topics)
+    }
+    if not others:
+        return []
+    most = sorted(others, key=lambda name: -others[name])[: READING_LIMITS.named]
+    listed = ", ".join(f"{name} ({bag.types.get(name, '')})" for name in most) + ", ..." * (len(others) > len(most))
+    number = f"{sum(others.values())} messages of other topics"
+    return [f"{number} were not analysed: {listed}; --topic {most[0]} --map QUANTITY=FIELD names what they hold."]
