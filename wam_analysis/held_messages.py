@@ -47,10 +47,10 @@ def at_stamps(columns: JointColumns, stamps: Times) -> tuple[Mask, Index]:
     return columns.stamp_ns[row] == stamps, row
 
 
-def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> Numbers | None:
-    """Columns of a field in the order of some names, (k, n); None if a name is missing."""
-    values: Numbers = getattr(columns, field)
-    if not values.shape[1] or any(name not in columns.names for name in names):
+def by_names(columns: JointColumns | None, field: str, names: tuple[str, ...]) -> Numbers | None:
+    """Columns of a field in the order of some names, (k, n); None without columns, or if a name is missing."""
+    values: Numbers = getattr(columns, field, np.empty((0, 0)))
+    if columns is None or not values.shape[1] or any(name not in columns.names for name in names):
         return None
     order = [columns.names.index(name) for name in names]
     return values if order == list(range(values.shape[1])) else values[:, order]
@@ -61,7 +61,7 @@ def joint_angles(run: RecordedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     for topic in ("sim/joint_states", "joint_sensors", "joint_states", "motor_states"):
         columns, is_motors = run.joints(topic), topic == "motor_states"
         names = arm.motors.names if is_motors else arm.joints.names
-        angles = None if columns is None else by_names(columns, "position", names)
+        angles = by_names(columns, "position", names)
         if columns is not None and angles is not None and np.any(good := np.isfinite(angles).all(axis=1)):
             found = angles[good]
             return columns.stamp_ns[good], found @ TransmissionMap.of(arm).joint_from_motor.T if is_motors else found

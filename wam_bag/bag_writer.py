@@ -24,7 +24,7 @@ from wam_bag.errors import RecordingError, command
 from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata
 
-__all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "exact_cdr", "policies", "release"]
+__all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "policies", "release"]
 
 CHUNK_SIZE: Final = 1024 * 1024  # bytes; the arm fills half of it in half a second, and it compresses to a tenth
 FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
@@ -66,17 +66,6 @@ def policies(qos: Any) -> Policies:
         "liveliness_lease_duration": duration(qos.liveliness_lease_duration),
         "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
     }
-
-
-def exact_cdr(name: str, data: bytes) -> bytes:
-    """A serialized message without the extra bytes that its publisher left at its end.
-
-    Parameters
-    ----------
-    name : type, ``package/msg/Type``.
-    data : CDR with encapsulation header; returned unchanged if it does not fit the type.
-    """
-    return data[: ExactLength(name)(data)]
 
 
 class Split(NamedTuple):

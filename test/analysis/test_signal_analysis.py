@@ -15,9 +15,8 @@ from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import without_short
-from wam_analysis.measures.stability import stability
+from wam_analysis.measures.stability import stability, swings
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
-from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 from wam_theory.verdicts import Verdict
 

@@ -28,7 +28,7 @@ from sample_messages import QOS, STORE, joint_state, point, status, wrench
 
 import wam_bag
 from wam_bag.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
-from wam_bag.bag_writer import BagWriter, RecordingError, exact_cdr
+from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.cdr import ExactLength, stamp_reader
 from wam_bag.definitions import DefinitionError, definition, schema, type_hash
 from wam_bag.mcap_writer import McapWriter
@@ -142,8 +142,8 @@ def test_bytes_left_behind_a_message_are_cut_and_nothing_else() -> None:
         data = joint_state(1_500_000_000, name, position, velocity, effort)
         for tail in range(17):
             assert length(data + bytes(range(1, 1 + tail))) == len(data)
-        assert exact_cdr("sensor_msgs/msg/JointState", data + b"\7" * 9) == data
-    assert exact_cdr("std_msgs/msg/Bool", b"\0\1\0\0\1\7\7\7") == b"\0\1\0\0\1"
+        assert ExactLength("sensor_msgs/msg/JointState")(data + b"\7" * 9) == len(data)
+    assert ExactLength("std_msgs/msg/Bool")(b"\0\1\0\0\1\7\7\7") == 5
 
 
 def test_stamps_are_read_from_either_byte_order() -> None:

@@ -15,8 +15,7 @@ from std_msgs.msg import Header
 
 from wam_bag import definitions
 from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
-from wam_bag.bag_writer import exact_cdr
-from wam_bag.cdr import encoded
+from wam_bag.cdr import ExactLength, encoded
 from wam_bag.contents import contents
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_control.task.scenario_settings import Setting
@@ -161,7 +160,7 @@ def test_messages_are_serialized_as_ros_does() -> None:
         kind = f"{package}/msg/{type(message).__name__}"
         data = encoded(kind, fields)
         assert deserialize_message(data, type(message)) == message
-        assert len(data) == len(exact_cdr(kind, bytes(serialize_message(message))))  # its padding is not defined
+        assert len(data) == ExactLength(kind)(bytes(serialize_message(message)))  # its padding is not defined
 
 
 @pytest.mark.slow

@@ -16,21 +16,18 @@ FORCE = ("force.x", "force.y", "force.z")
 
 
 class ForceStep(NamedTuple):
-    """A step of a command and its response, N along the change of the command.
-
-    Attributes
-    ----------
-    label : of the measured wrench.
-    begin : s.
-    before, commanded : forces before and from the step on.
-    response : of the measured force.
-    """
+    """A step of a command at a time, s, and its response, N along the change of the command."""
 
     label: str
     begin: float
     before: float
     commanded: float
     response: StepResponse
+
+    @property
+    def error(self) -> float:
+        """Of the steady force, N."""
+        return abs(self.response.final - self.commanded)
 
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
@@ -103,21 +100,19 @@ def step_section(recording: AnalysedRecording) -> Section:
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
-        over = 100.0 * response.overshoot
         settled = "" if math.isfinite(response.settling) else ", which did not settle to 5 %"
         sentences.append(f"{name}: a step from {shown(step.before, 'N')}{settled}.")
         findings += [
             Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),
             Finding(f"{name}: rise time 10-90 %", "s", response.rise),
             Finding(f"{name}: settling time to 5 %", "s", response.settling),
-            Finding(f"{name}: overshoot", "%", over),
+            Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
             Finding(f"{name}: ripple", "N", response.ripple),
         ]
     if steps:
-        worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
-        error = shown(abs(worst.response.final - worst.commanded), "N")
-        number, size = counted(len(steps), "force step"), shown(worst.commanded, "N")
-        verdict = f"{number}; the largest steady error is {error} of {size}."
+        worst = max(steps, key=lambda step: step.error)
+        error, size = shown(worst.error, "N"), shown(worst.commanded, "N")
+        verdict = f"{counted(len(steps), 'force step')}; the largest steady error is {error} of {size}."
         return Section("force", "Force", (*sentences, *doubts), findings, (), (verdict,), doubts)
     return Section("force", "Force", doubts or ["No step of a commanded force was recorded."], wrong=doubts)
 

@@ -21,8 +21,7 @@ def frequency_section(recording: AnalysedRecording) -> Section | None:
     shows: list[str] = []
     commands, states = recording.run.joints("motor_velocity_command"), recording.run.joints("motor_states")
     lacking = recording.run.lacking("motor_velocity_command")
-    commanded = None if commands is None else by_names(commands, "velocity", arm.motors.names)
-    got = None if states is None else by_names(states, "velocity", arm.motors.names)
+    commanded, got = (by_names(one, "velocity", arm.motors.names) for one in (commands, states))
     if commands is not None and states is not None and commanded is not None and got is not None:
         there, row = at_stamps(states, commands.stamp_ns)
         rate = 1e9 / max(float(np.median(np.diff(commands.stamp_ns))), 1.0) if len(commands.stamp_ns) > 1 else 0.0

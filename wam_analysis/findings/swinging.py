@@ -8,7 +8,7 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.measures.stability import Swings, swings
 from wam_analysis.thresholds import CYCLE, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns

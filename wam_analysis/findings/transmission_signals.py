@@ -53,13 +53,9 @@ class TransmissionSignals(NamedTuple):
 
 def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | None:
     """The signals of a recording; None if it has no motor states or no load."""
-    motors = run.joints("motor_states")
-    if motors is None:
-        return None
-    names, joints = arm.motors.names, arm.joints.names
-    fields = [by_names(motors, field, names) for field in ("position", "velocity", "effort")]
-    angle, velocity, torque = fields
-    if angle is None or velocity is None or torque is None:
+    motors, joints = run.joints("motor_states"), arm.joints.names
+    angle, velocity, torque = (by_names(motors, q, arm.motors.names) for q in ("position", "velocity", "effort"))
+    if motors is None or angle is None or velocity is None or torque is None:
         return None
     stamps = motors.stamp_ns
     cable = _of(run, "sim/joint_states", "effort", joints, stamps)
@@ -159,7 +155,7 @@ def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps
     """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages and in their gaps."""
     result = np.full((len(stamps), len(names)), np.nan)
     columns = run.joints(topic)
-    values = None if columns is None else by_names(columns, field, names)
+    values = by_names(columns, field, names)
     if columns is not None and values is not None and len(columns.stamp_ns) > 1:
         inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])
         row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)

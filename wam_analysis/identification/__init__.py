@@ -4,8 +4,7 @@ motion      recorded motor states, checked, filtered and thinned
 parameters  what is estimated: names, present values, prior standard deviations
 regressor   motor torques per parameter
 fit         estimate, covariance by jackknife, cross-validation
-uncertainty standard errors and covariance, of parameters and of their combinations
-tracked_errors  the covariance in the errors of the model that the contact estimator tracks
+tracked_errors  covariance of parameters, and in the errors of the model that the contact estimator tracks
 stribeck    the Stribeck velocity of each motor
 contradictions  mistakes of a recording that would give a wrong model
 recorded_loop  friction node and force loop of chapter 5, as far as a recording of any arm shows them

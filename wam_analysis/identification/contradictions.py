@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import DIRECTIONS
+from wam_analysis.identification.parameters import DIRECTIONS, Unknowns
 from wam_analysis.identification.regressor import Regressor
 from wam_analysis.thresholds import IDENTIFY
 from wam_bag.arrays import Mask, Numbers
@@ -82,46 +82,38 @@ def _symptoms(shared: Shared, motion: MotionSamples, found: Identification) -> I
 
 def _cause(shared: Shared, motion: MotionSamples, found: Identification) -> Contradiction | None:
     """The one mistake that explains the recorded torques much better than none; None where none does."""
-    motors = shared.arm.motors.names
-    fit = _Fit(shared, found)
-    model, torque, used = fit.torques(motion)
-    as_recorded = fit.misfit(model, torque, used)
+    motors, unknowns = shared.arm.motors.names, found.unknowns
+    model, torque, used = _torques(shared, unknowns, motion)
+    as_recorded = _misfit(model, torque, used)
     tried: list[tuple[float, Contradiction]] = []
     scale = _ratio(model, torque, used)
-    tried.append((fit.misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale)))
+    tried.append((_misfit(model, torque / scale, used), Contradiction(Mistake.SCALED, (), scale)))
     for i, name in enumerate(motors):
         one = np.ones(len(motors))
         one[i] = _ratio(model[:, [i]], torque[:, [i]], used[:, [i]])
         mistake = Contradiction(Mistake.SCALED_MOTOR, (name,), float(one[i]))
-        tried.append((fit.misfit(model, torque / one, used), mistake))
+        tried.append((_misfit(model, torque / one, used), mistake))
     for pair in combinations(range(len(motors)), 2):
         mistake = Contradiction(Mistake.SWAPPED, tuple(motors[i] for i in pair), 1.0)
-        tried.append((fit.misfit(*fit.torques(_swapped(motion, *pair))), mistake))
+        tried.append((_misfit(*_torques(shared, unknowns, _swapped(motion, *pair))), mistake))
     least, cause = min((one for one in tried if _is_mistake(one[1])), key=lambda one: one[0])
     is_clear = as_recorded > IDENTIFY.misfit and least < IDENTIFY.better * as_recorded
     return cause if is_clear else None
 
 
-class _Fit:
-    """Torques of the configured arm for a motion, and how far recorded ones are from them."""
+def _torques(shared: Shared, unknowns: Unknowns, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
+    """Torques of the configured arm and the recorded ones, N m, and where they count, (k, n) each."""
+    stribeck = np.array(shared.model.motors.stribeck_velocity)
+    equations = Regressor(shared, unknowns, motion, stribeck).equations(unknowns.present)
+    return equations.columns @ unknowns.present + motion.torque - equations.torque, motion.torque, equations.is_used
 
-    def __init__(self, shared: Shared, found: Identification) -> None:
-        self._shared, self._unknowns = shared, found.unknowns
-        self._stribeck = np.array(shared.model.motors.stribeck_velocity)
 
-    def torques(self, motion: MotionSamples) -> tuple[Numbers, Numbers, Mask]:
-        """Of the configured arm and as recorded, N m, and where they count, (k, n) each."""
-        equations = Regressor(self._shared, self._unknowns, motion, self._stribeck).equations(self._unknowns.present)
-        model = equations.columns @ self._unknowns.present + motion.torque - equations.torque
-        return model, motion.torque, equations.is_used
-
-    @staticmethod
-    def misfit(model: Numbers, torque: Numbers, used: Mask) -> float:
-        """Rms difference per rms torque of the model, the mean over motors."""
-        counts = np.maximum(used.sum(0), 1)
-        left, size = (np.sqrt((each**2 * used).sum(0) / counts) for each in (torque - model, model))
-        moved = used.any(0)
-        return float(np.mean(left[moved] / np.maximum(size[moved], IDENTIFY.least_friction))) if moved.any() else 0.0
+def _misfit(model: Numbers, torque: Numbers, used: Mask) -> float:
+    """Rms difference per rms torque of the model, the mean over motors."""
+    counts = np.maximum(used.sum(0), 1)
+    left, size = (np.sqrt((each**2 * used).sum(0) / counts) for each in (torque - model, model))
+    moved = used.any(0)
+    return float(np.mean(left[moved] / np.maximum(size[moved], IDENTIFY.least_friction))) if moved.any() else 0.0
 
 
 def _ratio(model: Numbers, torque: Numbers, used: Mask) -> float:
