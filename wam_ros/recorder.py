@@ -1,13 +1,14 @@
 """The recorder without ROS: which messages are written with which time, and which were lost on the way."""
 
-import struct
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
-from wam_bag.cdr import stamp_reader
+from wam_bag.cdr import Reading, stamp_reader
+from wam_bag.errors import Damage
 from wam_bag.losses import LOST_AT_END, UNFINISHED
 from wam_bag.printable import printable
 from wam_description.status import diagnosed_name
@@ -15,8 +16,7 @@ from wam_description.topics import EVERY_NODE, Topic
 from wam_ros.limits import RECORDER_LIMITS
 
 _LATEST: Final = 2**63 - 1  # ns; log times of a bag
-_NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
-_NODE_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 
 class Count(NamedTuple):
@@ -107,7 +107,7 @@ class _Channel:
         self.name = name
         self.publisher_of = _publisher_reader(topic, writers, arm)
         self._writers = writers
-        self._arm = arm if topic.type == _NODE_DIAGNOSTICS else ""
+        self._arm = arm if topic.type == _DIAGNOSTICS else ""
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
         self.totals: dict[str, int] = {}  # published by each node that has announced it
@@ -116,7 +116,7 @@ class _Channel:
 
     def is_foreign(self, data: bytes) -> bool:
         """Whether a message is that of another arm or program on a topic that all share, with stamps of its own."""
-        return bool(self._arm) and not _first_status_text(data).startswith(self._arm)
+        return bool(self._arm) and not _status_name(self.topic.type, data).startswith(self._arm)
 
     def announce(self, node: str, total: int) -> None:
         """A node has published so many messages on this topic."""
@@ -245,14 +245,9 @@ class Recorder:
                 if len(self._stamps) > RECORDER_LIMITS.publishers * len(self._channels):
                     del self._stamps[next(iter(self._stamps))]
             received = sent = max(stamp, self._begin) if is_free else stamp
-        if not (0 <= received <= _LATEST and 0 <= sent <= _LATEST):  # anybody can send such a stamp
-            received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
-        if self.failure:
-            return
-        try:
-            self._bag.write(channel.name, data, received, sent, number)
-        except RecordingError as error:
-            self._fail(error)
+        # anybody can send another stamp
+        received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
+        self._try(lambda: self._bag.write(channel.name, data, received, sent, number))
 
     def flush(self) -> None:
         """Write received messages to disk and see that they are there; call it every few tenths of a second."""
@@ -274,7 +269,7 @@ class Recorder:
 
     def dropped(self) -> int:
         """Messages lost on the way to the recorder."""
-        return sum(found.dropped for channel in self._channels.values() for found in channel.publishers.values())
+        return sum(count.dropped for count in self.counts())
 
     def lost_at_end(self) -> int:
         """Messages that their nodes announced and that have not come, so far."""
@@ -294,9 +289,7 @@ class Recorder:
             values[UNFINISHED] = ", ".join(unfinished)
         for count in self.counts():
             key = f"{count.topic} {count.publisher}"
-            values[f"{key} received"] = str(count.received)
-            values[f"{key} dropped"] = str(count.dropped)
-            values[f"{key} missed"] = str(count.missed)
+            values |= {f"{key} {name}": str(getattr(count, name)) for name in ("received", "dropped", "missed")}
             if count.lost_at_end:
                 values[f"{key} {LOST_AT_END}"] = str(count.lost_at_end)
         self._try(lambda: self._bag.metadata("recording", values))
@@ -307,11 +300,8 @@ class Recorder:
             try:
                 write()
             except RecordingError as error:
-                self._fail(error)
+                self.failure = f"recording into {self._bag.path} has stopped: {error}; then start a new recording"
         return not self.failure
-
-    def _fail(self, error: RecordingError) -> None:
-        self.failure = f"recording into {self._bag.path} has stopped: {error}; then start a new recording"
 
 
 def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:
@@ -345,10 +335,8 @@ def _publisher_reader(topic: Topic, writers: Callable[[], Mapping[str, str]], ar
     arm : what the names of this arm's nodes begin with in /diagnostics.
     writers : finds the publishers of any other topic, once a message has come; of several the name is ''.
     """
-    if topic.type == _NODE_STATUS:
-        return lambda data: _node_of(_text(data, 5))
-    if topic.type == _NODE_DIAGNOSTICS:
-        return lambda data: _node_of(_first_status_text(data).removeprefix(arm))
+    if topic.name in EVERY_NODE:
+        return lambda data: re.split("[:/]", _status_name(topic.type, data).removeprefix(arm))[0].strip() or "?"
 
     @cache
     def only_node() -> str:
@@ -358,30 +346,16 @@ def _publisher_reader(topic: Topic, writers: Callable[[], Mapping[str, str]], ar
     return lambda data: only_node()
 
 
-def _first_status_text(data: bytes) -> str:
-    """Name of the first status of a message of /diagnostics, '' where it has none."""
+def _status_name(kind: str, data: bytes) -> str:
+    """Name in a status, or in the first of a message of /diagnostics; '' where there is none."""
     try:
-        (frame,) = struct.unpack_from("<I", data, 12)
-        position = _aligned(16 + frame)
-        (count,) = struct.unpack_from("<I", data, position)
-    except struct.error:
+        reading = Reading(data)
+        if kind == _DIAGNOSTICS:
+            reading.skip(8)  # stamp
+            reading.text()  # frame
+            if not reading.count():
+                return ""
+        reading.skip(1)  # level
+        return printable(reading.text()[: RECORDER_LIMITS.name_length].strip("/"))
+    except Damage:
         return ""
-    return _text(data, position + 5) if count else ""
-
-
-def _text(data: bytes, position: int) -> str:
-    try:
-        position = _aligned(position)
-        (length,) = struct.unpack_from("<I", data, position)
-    except struct.error:
-        return ""
-    end = position + 3 + min(length, RECORDER_LIMITS.name_length)
-    return printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
-
-
-def _node_of(name: str) -> str:
-    return name.split(":")[0].split("/")[0].strip() or "?"
-
-
-def _aligned(position: int) -> int:
-    return position + -position % 4

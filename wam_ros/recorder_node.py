@@ -8,7 +8,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.serialization import deserialize_message
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.event import Level
@@ -20,14 +19,15 @@ from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.yaml_text import parameter_text
 from wam_ros.health import ENDED, NODE, PUBLISHED, READY
 from wam_ros.limits import RECORDER_LIMITS
-from wam_ros.messages import diagnostic_status, message_type, read_status
+from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
 from wam_ros.recorded_stack import RecordedStack
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.tolerance import TolerantNode
-from wam_ros.topics import DEPTH, DIAGNOSTICS, qos, topic_name
+from wam_ros.topics import DEPTH, DIAGNOSTICS, listening, qos, topic_name
+from wam_ros.wire import deserialized
 
 
 class RecorderNode(TolerantNode):
@@ -52,7 +52,6 @@ class RecorderNode(TolerantNode):
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._writers, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
-        self._status_name = self.resolve_topic_name(STATUS)
         self._own_topics = frozenset(self.resolve_topic_name(name) for name in EVERY_NODE)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
         # those without a stamp are drained first: what a node sent before them is there by then and gives the time
@@ -64,9 +63,9 @@ class RecorderNode(TolerantNode):
         self._unfinished = set(self._nodes) if self._ends_last else set()  # nodes without a final count
         self._expected = {name: len([one for one in found if one != own_name]) for name, found in publishers.items()}
         self.stack = RecordedStack(self, shared, self._nodes, str(self.bag.path))
-        self._status = self.create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
-        diagnostics = BY_NAME["/diagnostics"]
-        self._diagnostics = self.create_publisher(DiagnosticArray, diagnostics.name, qos(diagnostics))
+        self._status, self._diagnostics = (
+            self.create_publisher(message_type(row), row.name, qos(row)) for row in map(BY_NAME.__getitem__, EVERY_NODE)
+        )
         self.ready = False
         self._attached = ""
         self._dropped = 0
@@ -106,17 +105,17 @@ class RecorderNode(TolerantNode):
         self._status.publish(self._state(reason or self.recorder.failure or "recording", reason))
 
     def _listen(self, name: str, topic: Topic) -> Any:
-        profile = qos(topic)
-        profile.depth = DEPTH
-        subscription = self.create_subscription(message_type(topic), name, lambda data: None, profile, raw=True)
+        subscription = self.create_subscription(
+            message_type(topic), name, lambda data: None, listening(topic), raw=True
+        )
         self.leave_unserved(subscription)  # `_drain` fetches its messages
         return subscription
 
     def _take_totals(self, data: bytes) -> None:
         """Take what the nodes report about the messages that they have published."""
         try:
-            message = deserialize_message(data, DiagnosticArray)
-        except Exception:  # rclpy raises its own kinds for bytes that are no such message
+            message = deserialized(data, DiagnosticArray, DIAGNOSTICS)
+        except Refused:
             return
         for facts in (read_status(status).facts for status in message.status[: RECORDER_LIMITS.statuses]):
             namespace, _, node = facts.get(NODE, "").rpartition("/")
@@ -131,13 +130,6 @@ class RecorderNode(TolerantNode):
             elif self._ends_last:
                 self._unfinished.add(node)
 
-    def _take_status(self, data: bytes) -> None:
-        try:
-            status = read_status(deserialize_message(data, DiagnosticStatus))
-        except Exception:  # rclpy raises its own kinds for bytes that are no such message
-            return
-        self.stack.hear(status)
-
     def _writers(self, name: str) -> dict[str, str]:
         """The present publishers of a topic: the node of each, with its namespace if it has another, by identity."""
         own = self.get_namespace().rstrip("/") + "/"
@@ -150,20 +142,16 @@ class RecorderNode(TolerantNode):
         """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""
         self.recorder.flush()
         self._warn()
-        self.stack.attend(self._writers(self._status_name))
-        if self.ready or self.stack.parameters.missing or self._unmatched():
+        self.stack.attend(self._writers(STATUS))
+        if self.ready or self.stack.parameters.missing or self._is_unmatched():
             return
         self._attach_parameters()  # now, so that a killed recorder leaves them
         if not self.recorder.failure:  # a scenario starts when all are ready
             self.ready = True
             self._status.publish(diagnostic_status(READY._replace(node=self.get_name()), self._arm))
 
-    def _unmatched(self) -> list[str]:
-        return [
-            name
-            for name, subscription in self._inlets.items()
-            if subscription.get_publisher_count() < self._expected[name]
-        ]
+    def _is_unmatched(self) -> bool:
+        return any(one.get_publisher_count() < self._expected[name] for name, one in self._inlets.items())
 
     def _warn(self) -> None:
         if self.recorder.failure and not self._failed:
@@ -218,8 +206,6 @@ class RecorderNode(TolerantNode):
             self.recorder.receive(name, data, received, sent, number)
             if name == self._diagnostics_name:
                 self._take_totals(data)
-            elif name == self._status_name:
-                self._take_status(data)
 
     def _attach_parameters(self) -> None:
         """Attach the known parameters, if these are more than were attached before."""
