@@ -1,7 +1,6 @@
 """A node in the place of the velocity loop that answers a driver under test, and looks at its currents and mode."""
 
 import math
-import statistics
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,26 +8,26 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from rclpy.serialization import deserialize_message
 
 from wam_description.agreement import DIGESTS
 from wam_description.arm import Shared
-from wam_description.driver_contract import REPLY, SERVICES, DriverContract
+from wam_description.driver_contract import REPLY, SENT, SERVICES, TAKEN, DriverContract
 from wam_description.event import Level
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NodeStatus, State
+from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Call
 from wam_ros.client import StackClient
 from wam_ros.health import READY
 from wam_ros.limits import CONFORMANCE_LIMITS
-from wam_ros.messages import diagnostic_status, joint_state
-from wam_ros.topics import NAMESPACE, qos, stamp_of, topic_name
+from wam_ros.messages import diagnostic_status, joint_state, message_type
+from wam_ros.topics import DIAGNOSTICS, NAMESPACE, qos, topic_name
+from wam_ros.wire import stamp_of
 
-KEPT = {"motor_states": JointState, "motor_currents": JointState, "/clock": Clock, "robot_description": String}
+KEPT = ("motor_states", "motor_currents", "/clock")
 COMMAND = "motor_current_command"
 Restart = Callable[[], None]
 
@@ -92,25 +91,19 @@ class DriverBench(StackClient):
         self.wanted: Callable[[int, list[float]], Any] | None = None
         self._session = -1
         self._command = self.publisher(COMMAND)
-        for topic, kind in KEPT.items():
+        for topic in KEPT:
             row = BY_NAME[topic]
-            self.node.create_subscription(kind, topic_name(self.node, row), self._keeping(topic), qos(row))
-        row = BY_NAME["/diagnostics"]
-        self.node.create_subscription(DiagnosticArray, row.name, self._take_report, qos(row))
+            keep = self._keeping(topic, message_type(row))
+            self.node.create_subscription(message_type(row), topic_name(self.node, row), keep, qos(row), raw=True)
+        self.node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._take_report, qos(BY_NAME[DIAGNOSTICS]))
         self.follow_statuses()
-        self._services = {name: self.service(_call(name))[0] for name in SERVICES}
+        self.lacking()  # of a service is there once there is a client
         self.report()
 
-    def _keeping(self, topic: str) -> Callable[[Any], None]:
-        kept = self.arrived[topic]
-
-        def keep(message: Any) -> None:
-            stamp = 0
-            if topic == "/clock":
-                stamp = message.clock.sec * 1_000_000_000 + message.clock.nanosec
-            elif topic != "robot_description":
-                stamp = stamp_of(message)
-            kept.append(Arrived(time.monotonic(), stamp, message))
+    def _keeping(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        def keep(data: bytes) -> None:
+            stamp, message = stamp_of(data), deserialize_message(data, kind)
+            self.arrived[topic].append(Arrived(time.monotonic(), stamp, message))
             if topic == "motor_states":
                 self._answer(stamp, message)
 
@@ -194,18 +187,19 @@ class DriverBench(StackClient):
         answer = self.answer(client, message, limit, limit) if self.wait(client.service_is_ready, limit) else None
         return (bool(answer.success), str(answer.message)) if answer else (False, "")
 
-    def lacking(self, sent: tuple[str, ...], taken: tuple[str, ...]) -> list[str]:
+    def lacking(self) -> list[str]:
         """What the driver does not connect to, of the topics that it sends and takes and of its services."""
-        names = {topic: topic_name(self.node, BY_NAME[topic]) for topic in sent}
-        lacking = [topic for topic in sent if not self.node.count_publishers(names[topic])]
-        lacking += [topic for topic in taken if not self._command.get_subscription_count()]
-        lacking += [f"driver/{name}" for name, client in self._services.items() if not client.service_is_ready()]
-        return lacking + ([] if self.reported else [STATUS])
+        node, name = self.node, diagnosed_name(self.node.get_namespace(), "driver")
+        lacking = [topic for topic in SENT if not node.count_publishers(topic_name(node, BY_NAME[topic]))]
+        lacking += [topic for topic in TAKEN if not self.publisher(topic).get_subscription_count()]
+        lacking += [f"driver/{name}" for name in SERVICES if not self.service(_call(name))[0].service_is_ready()]
+        lacking += [STATUS] * (not self.reported)
+        return lacking + [f"/diagnostics of '{name}'"] * (name not in self.diagnostics)
 
     def second_publisher(self) -> Any:
         """Another publisher of the command, of a node of its own, and what ends it."""
         other = Node("second_velocity_loop", namespace=self.node.get_namespace(), context=self.node.context)
-        other.create_publisher(JointState, COMMAND, qos(BY_NAME[COMMAND]))
+        other.create_publisher(message_type(BY_NAME[COMMAND]), COMMAND, qos(BY_NAME[COMMAND]))
         return other
 
     # the driver in a state, and its currents
@@ -244,8 +238,8 @@ class DriverBench(StackClient):
 
     def is_zero(self, state: Arrived) -> bool:
         """Whether no current flows, by the effort of a state."""
-        flow = self.flow(state)
-        return all(abs(i) <= self.tolerance(0.0, peak) for i, peak in zip(flow, self.contract.peak, strict=False))
+        pairs = zip(self.flow(state), self.contract.peak, strict=False)
+        return all(abs(flow) <= self.tolerance(0.0, peak) for flow, peak in pairs)
 
     @staticmethod
     def tolerance(current: float, peak: float) -> float:
@@ -272,31 +266,29 @@ class DriverBench(StackClient):
 
     def compare(self) -> str:
         """What is wrong with the currents that flow, against those commanded."""
-        contract = self.contract
+        contract, looks = self.contract, 20
         self.enable()
-        differences: list[list[float]] = [[] for _ in contract.motors]
-        for _ in range(20):
+        wrong = [0] * len(contract.motors)  # looks at each motor
+        for _ in range(looks):
             self.watch(0.01)
             if not (self.arrived["motor_states"] and self.arrived["motor_currents"]):
-                continue
+                return "no currents come"
             flow = self.flow(self.arrived["motor_states"][-1])
             sent = list(self.arrived["motor_currents"][-1].message.effort)
-            if len(flow) != len(contract.motors) or len(sent) != len(contract.motors):
+            if not len(flow) == len(sent) == len(wrong):
                 return "an effort is missing"
-            for i, (by_effort, current) in enumerate(zip(flow, sent, strict=True)):
-                wanted = self.commanded[i]
-                limit = self.tolerance(wanted, contract.peak[i])
-                worst = max(abs(by_effort - wanted), abs(current - wanted))
-                differences[i].append(worst if worst > limit else 0.0)
+            for i, wanted in enumerate(self.commanded):
+                worst = max(abs(flow[i] - wanted), abs(sent[i] - wanted))
+                wrong[i] += worst > self.tolerance(wanted, contract.peak[i])
         if self.status.mode != "enabled":
             return f"it does not stay enabled: {self.status.message}"
-        for i, found in enumerate(differences):
-            if statistics.median(found or [math.inf]):
-                return (
-                    f"{contract.motors[i]}: commanded {self.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
-                    f"effort of motor_states is {flow[i] * contract.torque_constant[i]:.3g} N m"
-                )
-        return ""
+        if 2 * max(wrong) < looks:
+            return ""
+        i = wrong.index(max(wrong))
+        return (
+            f"{contract.motors[i]}: commanded {self.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
+            f"effort of motor_states is {flow[i] * contract.torque_constant[i]:.3g} N m"
+        )
 
     def bad(self) -> list[float]:
         """Currents that may not flow, A: of the other sign than those that hold the arm up, so that the two differ."""

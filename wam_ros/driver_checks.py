@@ -1,6 +1,6 @@
 """Checks of the rows of a driver's contract: what it sends, which commands it takes, and what stops it.
 
-Each returns what is wrong, '' where nothing is.
+Each is named as its row, and returns what is wrong, '' where nothing is.
 """
 
 import math
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Final
 
-from wam_description.driver_contract import REPLY, SENT, STATUS_AGE, STOP, TAKEN
+from wam_description.driver_contract import REPLY, REQUIREMENTS, STATUS_AGE, STOP
 from wam_description.event import Level
 from wam_description.signals import State
 from wam_ros.driver_bench import DriverBench, Untested
@@ -21,14 +21,8 @@ Check = Callable[[DriverBench], str]
 
 
 def _interface(bench: DriverBench) -> str:
-
-    def lacking() -> list[str]:
-        found = bench.lacking(SENT, TAKEN)
-        name = f"{bench.node.get_namespace().strip('/')}: driver"
-        return found if name in bench.diagnostics else [*found, f"/diagnostics of '{name}'"]
-
-    bench.wait(lambda: not lacking(), CONFORMANCE_LIMITS.start)
-    return f"{', '.join(found)} not found" if (found := lacking()) else ""
+    bench.wait(lambda: not bench.lacking(), CONFORMANCE_LIMITS.start)
+    return f"{', '.join(found)} not found" if (found := bench.lacking()) else ""
 
 
 def _rate(bench: DriverBench) -> str:
@@ -155,31 +149,29 @@ def _names(bench: DriverBench) -> str:
 
 
 def _refusals(bench: DriverBench) -> str:
-    names = list(bench.contract.motors)
-    bad = bench.bad()
-
-    def made(names: list[str], values: list[float]) -> Callable[[int], object]:
-        return lambda stamp: joint_state(stamp, names, State([], [], values))
-
+    names, bad = list(bench.contract.motors), bench.bad()
+    wrong = {
+        "NaN": (names, [math.nan, *bad[1:]]),
+        "infinite": (names, [math.inf, *bad[1:]]),
+        "short": (names, bad[:-1]),
+        "empty": (names, []),
+        "unknown name": (["nobody", *names[1:]], bad),
+        "doubled name": ([names[-1], *names[1:]], bad),
+    }
     return bench.bears(
         {
-            "NaN": made(names, [math.nan, *bad[1:]]),
-            "infinite": made(names, [math.inf, *bad[1:]]),
-            "short": made(names, bad[:-1]),
-            "empty": made(names, []),
-            "unknown name": made(["nobody", *names[1:]], bad),
-            "doubled name": made([names[-1], *names[1:]], bad),
+            what: lambda stamp, names=names, values=values: joint_state(stamp, names, State([], [], values))
+            for what, (names, values) in wrong.items()
         }
     )
 
 
 def _answers(bench: DriverBench) -> str:
-    names = list(bench.contract.motors)
-    bad = State([], [], bench.bad())
+    bad, ahead = bench.bad(), 10 * bench.contract.outer_period
     return bench.bears(
         {
-            "no stamp": lambda _: joint_state(0, names, bad),
-            "stamp of the future": lambda stamp: joint_state(stamp + 10 * bench.contract.outer_period, names, bad),
+            "no stamp": lambda _: bench.command(0, bad),
+            "stamp of the future": lambda stamp: bench.command(stamp + ahead, bad),
         }
     )
 
@@ -315,29 +307,4 @@ def _session(bench: DriverBench) -> str:
     return bench.in_mode("braked")
 
 
-CHECKS: Final[dict[str, Check]] = {
-    "interface": _interface,
-    "rate": _rate,
-    "stamps": _stamps,
-    "outer": _outer,
-    "arrays": _arrays,
-    "velocity": _velocity,
-    "braked": _braked,
-    "status": _status,
-    "silence": _silence,
-    "current": _current,
-    "names": _names,
-    "refusals": _refusals,
-    "answers": _answers,
-    "watchdog": _watchdog,
-    "repetition": _repetition,
-    "fault": _fault,
-    "disable": _disable,
-    "estop": _estop,
-    "discard": _discard,
-    "peers": _peers,
-    "claims": _claims,
-    "agreement": _agreement,
-    "end": _end,
-    "session": _session,
-}
+CHECKS: Final[dict[str, Check]] = {key: globals()[f"_{key}"] for key in REQUIREMENTS}

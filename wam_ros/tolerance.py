@@ -82,7 +82,7 @@ class TolerantNode(LeavingNode):
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
         """As that of rclpy."""
         if srv_type in (SetParameters, SetParametersAtomically):
-            callback = _refusing_unknown_types(self._refusing_unknown_names(callback))
+            callback = _refusing_unknown_types(callback)
         return super().create_service(
             srv_type, srv_name, self._serving(callback, f"a request to {srv_name}"), **options
         )
@@ -103,33 +103,24 @@ class TolerantNode(LeavingNode):
         return bear
 
     def _serving(self, callback: Callable[[Any, Any], Any], what: str) -> Callable[[Any, Any], Any]:
+        bearing = self.bearing(callback, what)
+
         @functools.wraps(callback)
         def serve(request: Any, response: Any) -> Any:
-            try:
-                return callback(request, response)
-            except Exception as error:
-                self._take_exception(what, error)
-                if hasattr(response, "message"):
-                    response.success, response.message = False, self._exception_fault
-                return response
+            if (answer := bearing(request, response)) is not None:
+                return answer
+            if hasattr(response, "message"):
+                response.success, response.message = False, self._exception_fault
+            return response
 
         return serve
 
-    def _refusing_unknown_names(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        """The reason that rclpy gives for a name that no parameter has lists nothing."""
-
-        def answer(request: Any, response: Any) -> Any:
-            response = callback(request, response)
-            unknown = [found.name for found in request.parameters if not self.has_parameter(found.name)]
-            if hasattr(response, "results"):
-                for found, result in zip(request.parameters, response.results, strict=True):
-                    if found.name in unknown and not result.successful:
-                        result.reason = self._unknown(found.name)
-            elif unknown and not response.result.successful:
-                response.result.reason = self._unknown(unknown[0])
-            return response
-
-        return answer
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """As that of rclpy, whose reason for a name that no parameter has lists nothing."""
+        for found in parameter_list:
+            if not self.has_parameter(found.name):
+                return SetParametersResult(successful=False, reason=self._unknown(found.name))
+        return super().set_parameters_atomically(parameter_list)
 
     def _unknown(self, name: str) -> str:
         names = sorted(self.list_parameters([], 0).names)
@@ -187,8 +178,6 @@ def _wrong(parameters: Sequence[Any]) -> str:
     if len(parameters) > NODE_LIMITS.requested_parameters:
         return f"{len(parameters)} parameters in one request; send at most {NODE_LIMITS.requested_parameters}"
     for found in parameters:
-        if not found.name:
-            return "a parameter without a name; name it"
         if found.value.type not in _READABLE:
             name = printable(found.name, 100)
             return f"parameter '{name}' has the type {found.value.type}; allowed: {min(_READABLE)} to {max(_READABLE)}"

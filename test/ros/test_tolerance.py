@@ -67,7 +67,7 @@ def test_a_parameter_of_an_unknown_type_is_refused_and_the_node_goes_on(ros: Any
     answer = request(ros, SetParametersAtomically, "gravity/set_parameters_atomically", parameters=[unknown]).result
     assert not answer.successful
     assert request(ros, GetParameters, "gravity/get_parameters", names=["arm.name"]).values[0].string_value == "wam"
-    for wrong, text in ([Parameter()], "a parameter without a name"), ([Parameter(name="a")] * 501, "at most 500"):
+    for wrong, text in ([Parameter()], "unknown parameter ''"), ([Parameter(name="a")] * 501, "at most 500"):
         answer = request(ros, SetParametersAtomically, "gravity/set_parameters_atomically", parameters=wrong).result
         assert not answer.successful
         assert text in answer.reason
