@@ -39,7 +39,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state
-from wam_ros.run import Connection, spin
+from wam_ros.run import Connection
 from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import stamp_of as stamp_in
 from wam_sim.simulation import Simulation
@@ -248,7 +248,7 @@ def relay_alone() -> None:
     connection.add(Relay(connection.context))
     reader = threading.Thread(target=sys.stdin.buffer.read)
     reader.start()
-    spin(connection.executor, lambda: not reader.is_alive())
+    connection.spin(lambda: not reader.is_alive())
     connection.close()
 
 
@@ -269,7 +269,7 @@ def measure_relay(way: str, length: float) -> tuple[float, float]:
         connection.add(sender)
         need = 0.5 * length / PERIOD
         end = time.perf_counter() + SETTLE + length
-        spin(connection.executor, lambda: time.perf_counter() > end and len(sender.latencies) > need)
+        connection.spin(lambda: time.perf_counter() > end and len(sender.latencies) > need)
         latencies = sorted(sender.latencies)
     return latencies[len(latencies) // 2], latencies[int(0.99 * len(latencies))]
 
@@ -294,20 +294,14 @@ def measure_stack(way: str, length: float) -> tuple[float, float]:
 
     with ExitStack() as stack:
         if way == "one process":
-            composition = stack.enter_context(Composition(configuration))
-            context, executor = composition.context, composition.executor
+            connection: Connection = stack.enter_context(Composition(configuration))
         else:
             stack.enter_context(Processes(configuration))
             keep_apart(children())
-            connection = Connection()
-            stack.callback(connection.close)
-            context, executor = connection.context, connection.executor
-        listener = Node("listener", context=context)
-        stack.callback(listener.destroy_node)
-        stack.callback(executor.remove_node, listener)
+            connection = stack.enter_context(Connection())
+        listener = connection.add(Node("listener", context=connection.context))
         listener.create_subscription(DiagnosticArray, "/diagnostics", take, qos(BY_NAME["/diagnostics"]))
-        executor.add_node(listener)
-        spin(executor, lambda: len(reports) >= max(1, round(length)))
+        connection.spin(lambda: len(reports) >= max(1, round(length)))
     return tuple(1e-6 * quartiles([report[i] for report in reports]).median for i in (0, 1))
 
 

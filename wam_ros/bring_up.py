@@ -24,7 +24,7 @@ from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
-from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, prepare_logging_directory, spin
+from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, prepare_logging_directory
 from wam_ros.topics import NAMESPACE
 
 LOGGER: Final = get_logger("wam")
@@ -108,17 +108,13 @@ class Processes(Closing):
         processes: str = EACH,
     ) -> None:
         names = node_names(configuration)
-        prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()
-        parameters = self._stack.enter_context(parameter_file(configuration))
-        own = ["--params-file", str(parameters), "--log-level", log_level]
-        namespaced = f"__ns:=/{namespace.strip('/')}"
+        arguments = self._stack.enter_context(_arguments(configuration, namespace, log_level))
         self._processes = {
-            " or ".join(names[entry] for entry in group): _start(group, [*own, "-r", namespaced], place)
+            " or ".join(names[entry] for entry in group): _start(group, arguments, place)
             for group, place in placed_groups(configuration.shared, processes)
         }
-        self._first = next((name for name in self._processes if FIRST in name.split()), FIRST)
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
@@ -143,39 +139,27 @@ class Processes(Closing):
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
         was_first = self.ended().get(LAST) == 0
-        others = [name for name in self._processes if name not in (self._first, LAST)]
+        first = [name for name in self._processes if FIRST in name.split()]
+        others = [name for name in self._processes if name not in (*first, LAST)]
         if any(code < 0 for code in self.ended().values()):
             for process in self._processes.values():
                 process.send_signal(LISTENER_GONE)
-        for names in ([self._first], others):
+        for names in (first, others):
             for name in names:
-                self._terminate(name)
+                self._processes[name].terminate()
             for name in names:
-                self._wait_until(name, deadline)
-        self._terminate(LAST)
-        self._wait_for_recorder()
+                if not _has_ended(self._processes[name], deadline):
+                    self._kill(name, "did not end")
+        if recorder := self._processes.get(LAST):
+            recorder.terminate()
+            self._wait_for_recorder(recorder)
         if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
             self.bag_failure = f"the recorder ended with code {code}; what it wrote may lack messages"
         elif was_first and others:
             self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
         self._stack.close()
 
-    def _terminate(self, name: str) -> None:
-        process = self._processes.get(name)
-        if process is not None and process.poll() is None:
-            process.terminate()
-
-    def _wait_until(self, name: str, deadline: float) -> None:
-        if process := self._processes.get(name):
-            try:
-                process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                self._kill(name, "did not end")
-
-    def _wait_for_recorder(self) -> None:
-        process = self._processes.get(LAST)
-        if process is None:
-            return
+    def _wait_for_recorder(self, process: subprocess.Popen[bytes]) -> None:
         begin = now = moved = time.monotonic()
         state, printed = _work_of(process.pid), begin
         while process.poll() is None:
@@ -192,11 +176,9 @@ class Processes(Closing):
                 LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
-        process = self._processes[name]
         LOGGER.error(f"node {name} is killed: it {reason}")
         self.killed.append(name)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        _kill(self._processes[name])
 
 
 class NodeProcess:
@@ -212,10 +194,8 @@ class NodeProcess:
 
     def __init__(self, configuration: Configuration, entry: str, namespace: str, log_level: str = "error") -> None:
         self._stack = ExitStack()
-        prepare_logging_directory()
-        file = self._stack.enter_context(parameter_file(configuration))
-        place = f"__ns:=/{namespace.strip('/')}"
-        self._entry, self._arguments = entry, ["--params-file", str(file), "-r", place, "--log-level", log_level]
+        self._arguments = self._stack.enter_context(_arguments(configuration, namespace, log_level))
+        self._entry = entry
         self.start()
 
     def start(self) -> None:
@@ -234,16 +214,21 @@ class NodeProcess:
     def stop(self) -> None:
         """End the node, the hard way where it does not end by itself."""
         self._process.terminate()
-        try:
-            self._process.wait(PROCESS_LIMITS.end)
-        except subprocess.TimeoutExpired:
-            os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
+        if not _has_ended(self._process, time.monotonic() + PROCESS_LIMITS.end):
+            _kill(self._process)
 
     def close(self) -> None:
         """End the node for good."""
         self.stop()
         self._stack.close()
+
+
+@contextmanager
+def _arguments(configuration: Configuration, namespace: str, log_level: str) -> Iterator[list[str]]:
+    """Arguments of ROS for the processes of a configuration."""
+    prepare_logging_directory()
+    with parameter_file(configuration) as file:
+        yield ["--params-file", str(file), "-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
 
 
 def _start(
@@ -255,6 +240,20 @@ def _start(
         start_new_session=True,
         env={**os.environ, PARENT: str(os.getpid()), **place},
     )
+
+
+def _has_ended(process: subprocess.Popen[bytes], deadline: float) -> bool:
+    """Whether a process ends before a time of the monotonic clock."""
+    try:
+        process.wait(max(0.0, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def _ending(code: int) -> str:
@@ -271,12 +270,11 @@ def _work_of(pid: int) -> tuple[str, ...]:
     """What changes while a process works: its time of computing, what it has written, whether it waits for a disk."""
     folder = Path("/proc", str(pid))
     try:
-        fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        state, *fields = (folder / "stat").read_text().rpartition(")")[2].split()
         written = (folder / "io").read_text()
     except OSError:
         return ()
-    waits_for_disk = str(time.monotonic()) if fields[0] == "D" else ""
-    return fields[11], fields[12], written, waits_for_disk
+    return (*fields[10:12], written, str(time.monotonic()) * (state == "D"))
 
 
 class PlayedScenario(NamedTuple):
@@ -362,10 +360,6 @@ class Composition(Connection):
         """Spin until the exit codes seen so far satisfy a condition; returns them."""
         self.spin(lambda: until(self.ended()))
         return self.ended()
-
-    def spin(self, until: Callable[[], bool]) -> None:
-        """Spin until a condition holds."""
-        spin(self.executor, until)
 
     def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> PlayedScenario:
         """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it."""

@@ -66,8 +66,6 @@ class StackClient(Closing):
     statuses : newest of each node by its name, after `follow_statuses` and while anything is awaited.
     """
 
-    clock: Callable[[], float] = staticmethod(time.monotonic)
-
     def __init__(
         self, namespace: str = NAMESPACE, name: str = "wam_call", connection: Any = None, shared: Shared | None = None
     ) -> None:
@@ -93,9 +91,9 @@ class StackClient(Closing):
         self.connection.executor.spin_once(timeout_sec=seconds)
 
     def wait(self, until: Callable[[], Any], seconds: float = CALL_LIMITS.answer) -> bool:
-        """Spin until something is true; False where it is not within this time of `clock`."""
-        end = self.clock() + seconds
-        while not (found := until()) and self.clock() < end:
+        """Spin until something is true; False where it is not within this time."""
+        end = time.monotonic() + seconds
+        while not (found := until()) and time.monotonic() < end:
             self.spin_once()
         return bool(found)
 

@@ -68,24 +68,6 @@ def end_of_delivery(context: Context) -> float:
     return _ENDS.get(context, time.monotonic() + PROCESS_LIMITS.delivery)
 
 
-def spin(executor: Any, until: Callable[[], bool], end: Callable[[], object] = lambda: None) -> None:
-    """Spin until `until` is true, which is evaluated after each callback; then `end` and handle what has arrived.
-
-    The events executor's own spin() hangs in the wheels built against old C libraries, and its
-    spin_until_future_complete() sees its time-out only when no message waits: that is what the end
-    wants, and what never comes in a lockstep that goes on, hence the limit.
-    """
-    while not until():
-        executor.spin_once(timeout_sec=0.1)
-    end()
-    future: rclpy.Future[None] = rclpy.Future()
-    limit = threading.Timer(PROCESS_LIMITS.arrived, executor.create_task, [future.set_result, None])
-    limit.start()
-    executor.spin_until_future_complete(future, timeout_sec=0.1)
-    limit.cancel()
-    limit.join()
-
-
 def prepare_logging_directory() -> None:
     """Let rclpy log somewhere even where HOME is missing or cannot be written."""
     if "ROS_LOG_DIR" in os.environ or "ROS_HOME" in os.environ:
@@ -152,6 +134,24 @@ class Connection(Closing):
         self.executor.remove_node(node)
         node.destroy_node()
 
+    def spin(self, until: Callable[[], bool], end: Callable[[], object] = lambda: None) -> None:
+        """Spin until `until` is true, which is evaluated after each callback; then `end` and handle what has arrived.
+
+        The events executor's own spin() hangs in the wheels built against old C libraries, and its
+        spin_until_future_complete() sees its time-out only when no message waits: that is what the end
+        wants, and what never comes in a lockstep that goes on, hence the limit.
+        """
+        executor = self.executor
+        while not until():
+            executor.spin_once(timeout_sec=0.1)
+        end()
+        future: rclpy.Future[None] = rclpy.Future()
+        limit = threading.Timer(PROCESS_LIMITS.arrived, executor.create_task, [future.set_result, None])
+        limit.start()
+        executor.spin_until_future_complete(future, timeout_sec=0.1)
+        limit.cancel()
+        limit.join()
+
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
         _ENDS[self.context] = time.monotonic() + (
@@ -207,7 +207,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
         for node in nodes.values():
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
-        spin(connection.executor, is_over, end)
+        connection.spin(is_over, end)
         bound_leaving(connection.context, lambda: _failure(nodes.values()))
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None

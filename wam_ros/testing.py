@@ -3,14 +3,12 @@
 `wam_ros.pytest_plugin` has its fixtures; docs/own-node.md shows it.
 """
 
-import fcntl
 import itertools
 import math
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +20,7 @@ from wam_bag.bag import Bag, read
 from wam_bag.columns import Columns, columns_of
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import Interface, declared
+from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, NodeStatus, Point, State, Table, Wrench
 from wam_description.topics import JOINT_STATE, POINT, TABLE, WRENCH
 from wam_description.wiring import Call
@@ -30,7 +29,7 @@ from wam_ros.client import StackClient
 from wam_ros.limits import TEST_LIMITS
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
-from wam_ros.network import is_inhabited
+from wam_ros.network import Place, is_inhabited
 from wam_ros.run import Connection
 from wam_ros.topics import NAMESPACE, SECOND, listening, topic_name
 from wam_ros.wire import decoder, stamp_of
@@ -61,22 +60,18 @@ def locked_domain() -> Iterator[int]:
     end = time.monotonic() + 10.0 * TEST_LIMITS.patience
     for attempt in itertools.count(os.getpid() + next(_COUNTER)):
         number = domains[attempt % len(domains)]
-        path = Path(tempfile.gettempdir()) / f"wam_stack_test_domain_{number}"
-        lock = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with suppress(ParameterError):  # another test has it
+            place = Place(number, "", "test")
             if not is_inhabited(number):
                 break
-        except OSError:
-            pass  # another test has it
-        os.close(lock)
+            place.close()
         if time.monotonic() > end:
             raise TimeoutError(f"ROS domains {domains[0]} to {domains[-1]} are all in use; end what is there")
         time.sleep(TEST_LIMITS.domain_retry)
     try:
         yield number
     finally:
-        os.close(lock)
+        place.close()
 
 
 class Network(Connection):
@@ -171,10 +166,9 @@ class RunningArm:
         self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
         self.interface = Interface(self.configuration.shared)
         self._composition = Composition(self.configuration, domain_id=self._domain_id)
-        self.nodes, self.executor = self._composition.nodes, self._composition.executor
-        self.context = self._composition.context
-        driver: Any = self.nodes.get("driver")
-        self._driver: Any = driver.driver if driver else None
+        self.nodes: dict[str, Any] = self._composition.nodes
+        self.context, self.executor = self._composition.context, self._composition.executor
+        self._driver: Any = self.nodes["driver"].driver if "driver" in self.nodes else None
         self._client = StackClient(NAMESPACE, "test", self._composition, self.configuration.shared)
         self._client.follow_statuses()
         self.node = self._client.node
@@ -188,20 +182,21 @@ class RunningArm:
         self._recorded = Recorded({topic: row.type for topic, row in rows.items()})
         bus = BUSES[self.context] if self.configuration.shared.timing.mode == "lockstep" else None
         for topic, row in rows.items():
-            take = self._taking(topic, self._recorded.data[topic].append)
+            take = self._taking(topic)
             if bus is not None and row.is_numbers and bus.carries(self.interface.publishers(topic)):
                 bus.subscribe(self.node.resolve_topic_name(topic), take)
             else:
                 name = topic_name(self.node, row)
                 self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
 
-    def _taking(self, topic: str, keep: Callable[[bytes], None]) -> Callable[[bytes], None]:
-        def take(data: bytes) -> None:
-            keep(data)
-            if topic == "joint_states":
-                self._stream(stamp_of(data))
+    def _taking(self, topic: str) -> Callable[[bytes], None]:
+        kept = self._recorded.data[topic]
 
-        return take
+        def take(data: bytes) -> None:
+            kept.append(data)
+            self._stream(stamp_of(data))
+
+        return take if topic == "joint_states" else kept.append
 
     # what the arm does
 
@@ -280,17 +275,15 @@ class RunningArm:
 
     def run_until_fault(self, seconds: float = TEST_LIMITS.arm_time) -> str:
         """Spin until the driver has a fault, which the test expects; returns it."""
-
-        def is_faulty() -> bool:
-            self.fault = str(self._driver.safety.fault)
-            return bool(self.fault)
-
-        self._spin(is_faulty, seconds, lambda: None)
+        self._spin(self._present_fault, seconds, lambda: None)
+        self.fault = self._present_fault()
         return self.fault
 
+    def _present_fault(self) -> str:
+        return str(self._driver.safety.fault) if self._driver else ""
+
     def _require_no_fault(self) -> None:
-        fault = str(self._driver.safety.fault) if self._driver else ""
-        if fault and fault != self.fault:
+        if (fault := self._present_fault()) not in ("", self.fault):
             raise ArmFault(fault)
 
     def call(self, service: str, switch: bool | None = None) -> Any:
@@ -311,14 +304,10 @@ class RunningArm:
         ArmFault
             where the driver refuses it.
         """
-        self.run_until(lambda: self.stamp > 0 and not self._driver_is_awaiting())
+        self.run_until(lambda: self.stamp > 0 and not self.nodes["driver"].awaited)
         answer = self.call("driver/enable", True)
         if not answer.success:
             raise ArmFault(answer.message)
-
-    def _driver_is_awaiting(self) -> bool:
-        driver: Any = self.nodes["driver"]
-        return bool(driver.awaited)
 
     def send(self, topic: str, value: Any = None, seconds: float = 0.0, **fields: Any) -> None:
         """Publish on a topic with the stamp of the newest state.
