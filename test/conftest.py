@@ -1,14 +1,20 @@
-"""What all tests share; the fixtures of those that touch ROS are those of the test kit."""
+"""What all tests share; the fixture `arm` is that of the test kit."""
 
 import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from wam_ros.network import SWITCH, limit_to_this_machine
+from wam_ros.pytest_plugin import isolate
+
+if TYPE_CHECKING:
+    from ros_network import Network
 
 pytest_plugins = ["wam_ros.pytest_plugin"]
 
@@ -33,6 +39,26 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker("ros")
         if item.get_closest_marker("ros") and config.pluginmanager.hasplugin("xdist"):
             item.add_marker(pytest.mark.xdist_group("ros"))
+
+
+@pytest.fixture(scope="module")
+def domain_of_module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """As `domain_id`, for fixtures of a module."""
+    from wam_ros.testing import locked_domain
+
+    with pytest.MonkeyPatch.context() as patch, locked_domain() as number:
+        isolate(patch, number, tmp_path_factory.mktemp("ros"))
+        yield number
+
+
+@pytest.fixture
+def ros(domain_id: int) -> Iterator["Network"]:
+    """A ROS domain with an executor, for tests that make their nodes themselves."""
+    from ros_network import Network
+
+    network = Network(domain_id)
+    yield network
+    network.close()
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from wam_ros.health import Diagnostics, Health, problem_of
 from wam_ros.inlets import Inlets
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import message_type, read_status
-from wam_ros.network import take_place
+from wam_ros.network import Place, require_name
 from wam_ros.outlets import Outlets
 from wam_ros.parameters import declare
 from wam_ros.priority import PRIORITY, set_priority
@@ -88,7 +88,8 @@ class StackNode(TolerantNode):
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration.name, **ros)
-        self._place = take_place(self, declaration.name)
+        require_name(self, declaration.name)
+        self._place = Place(self.context.get_domain_id(), self.get_namespace(), declaration.name)
         owned: str | None = getattr(declaration.node, "owns", None)
         self.shared, self.own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
         self.interface = Interface(self.shared, started_by_hand=declaration)

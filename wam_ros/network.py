@@ -84,18 +84,6 @@ class Place:
         self._socket.close()
 
 
-def take_place(node: Any, name: str) -> Place:
-    """The place of a ROS node, which must have its declared name.
-
-    Raises
-    ------
-    ParameterError
-        where the node was renamed, or another process has the place.
-    """
-    require_name(node, name)
-    return Place(node.context.get_domain_id(), node.get_namespace(), name)
-
-
 def require_name(node: Any, name: str) -> None:
     """Refuse a node that was renamed: the others find it, and it finds its parameters, by its name.
 
@@ -148,15 +136,10 @@ def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
     return int(text) if text.isascii() and text.isdigit() else 0
 
 
-def is_inhabited(domain: int) -> bool:
+def is_inhabited(domain: int, sockets: Path = Path("/proc/net/udp")) -> bool:
     """Whether a program of this machine takes part in a ROS domain: it has bound UDP ports of the domain."""
-    return has_ports(Path("/proc/net/udp").read_text(encoding="utf-8"), domain)
-
-
-def has_ports(sockets: str, domain: int) -> bool:
-    """Whether a table of sockets, as /proc/net/udp, has a port of a ROS domain."""
     first = FIRST_PORT + PORTS * domain
-    lines = sockets.splitlines()[1:]
+    lines = sockets.read_text(encoding="utf-8").splitlines()[1:]
     return any(first <= int(line.split()[1].rpartition(":")[2], 16) < first + PORTS for line in lines)
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from wam_ros.testing import Network, RunningArm
+    from wam_ros.testing import RunningArm
 
 
-def _isolate(monkeypatch: pytest.MonkeyPatch, number: int, folder: Path) -> None:
+def isolate(monkeypatch: pytest.MonkeyPatch, number: int, folder: Path) -> None:
     """Give this process and its children a ROS domain of their own."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     monkeypatch.setenv("ROS_LOG_DIR", str(folder / "ros_log"))
@@ -23,28 +23,8 @@ def domain_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     from wam_ros.testing import locked_domain
 
     with locked_domain() as number:
-        _isolate(monkeypatch, number, tmp_path)
+        isolate(monkeypatch, number, tmp_path)
         yield number
-
-
-@pytest.fixture(scope="module")
-def domain_of_module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
-    """The same, for fixtures of a module."""
-    from wam_ros.testing import locked_domain
-
-    with pytest.MonkeyPatch.context() as patch, locked_domain() as number:
-        _isolate(patch, number, tmp_path_factory.mktemp("ros"))
-        yield number
-
-
-@pytest.fixture
-def ros(domain_id: int) -> Iterator["Network"]:
-    """A ROS domain with an executor, for tests that make their nodes themselves."""
-    from wam_ros.testing import Network
-
-    network = Network(domain_id)
-    yield network
-    network.close()
 
 
 @pytest.fixture

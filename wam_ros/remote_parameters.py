@@ -33,11 +33,6 @@ class RemoteParameters:
         self._requested = dict.fromkeys(self._clients, -CALL_LIMITS.parameters)
 
     @property
-    def names(self) -> frozenset[str]:
-        """The nodes."""
-        return frozenset(self._clients)
-
-    @property
     def missing(self) -> list[str]:
         """Nodes that have not answered yet."""
         return [name for name in self._clients if name not in self.found]

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import yaml
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from wam_bag.bag import Bag, read
@@ -30,7 +29,6 @@ from wam_ros.limits import TEST_LIMITS
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import message_type
 from wam_ros.network import Place, is_inhabited
-from wam_ros.run import Connection
 from wam_ros.topics import NAMESPACE, SECOND, listening, topic_name
 from wam_ros.wire import decoder, stamp_of
 
@@ -72,35 +70,6 @@ def locked_domain() -> Iterator[int]:
         yield number
     finally:
         place.close()
-
-
-class Network(Connection):
-    """A ROS domain for one test, with an executor for nodes that the test makes itself.
-
-    Parameters
-    ----------
-    domain_id : ROS domain.
-
-    Attributes
-    ----------
-    environment : for child processes that shall be in the same domain.
-    """
-
-    def __init__(self, domain_id: int) -> None:
-        super().__init__(domain_id=domain_id)
-        self.domain_id = domain_id
-        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
-
-    def node(self, name: str, namespace: str = f"/{NAMESPACE}") -> Any:
-        """A plain node, spun and destroyed with the test."""
-        return self.add(Node(name, namespace=namespace, context=self.context))
-
-    def wait(self, until: Callable[[], Any], timeout: float = TEST_LIMITS.patience, what: str = "") -> None:
-        """Spin until something is true; the test fails if that takes longer than `timeout`, s."""
-        end = time.monotonic() + timeout
-        while not until():
-            assert time.monotonic() < end, f"not within {timeout} s: {what or until}"
-            self.executor.spin_once(timeout_sec=0.01)
 
 
 class Recorded(Mapping[str, Any]):

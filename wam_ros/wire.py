@@ -29,7 +29,7 @@ _STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
 MARKERS = "visualization_msgs/msg/MarkerArray"
 Decode = Callable[[bytes], Any]
-Numbers = list[tuple[float, ...]]
+Numbers = list[Any]  # groups of them
 
 
 def stamp_of(data: bytes) -> int:
@@ -125,34 +125,30 @@ def _finder(topic: Topic, arm: Arm) -> Decode:
         known = [(wrenches(frame).numbers, partial(_as_wrench, frame)) for frame in frames(arm)]
     else:
         known = [(points(frame).numbers, partial(_as_point, frame)) for frame in frames(arm)]
-    newest = known[0]
 
     def find(data: bytes) -> Any:
-        nonlocal newest
-        numbers_of, value_of = newest
-        if (numbers := numbers_of(data)) is not None:
-            return value_of(numbers)
-        for newest in known:
-            if (numbers := newest[0](data)) is not None:
-                return newest[1](numbers)
+        for layout in known:
+            numbers_of, value_of = layout
+            if (numbers := numbers_of(data)) is not None:
+                if layout is not known[0]:
+                    known.remove(layout)
+                    known.insert(0, layout)
+                return value_of(numbers)
         return None
 
     return find
 
 
 def _as_state(numbers: Numbers) -> State:
-    position, velocity, effort = numbers
-    return State(list(position), list(velocity), list(effort))
+    return State(*map(list, numbers))
 
 
 def _as_wrench(frame: str, numbers: Numbers) -> Wrench:
-    fx, fy, fz, tx, ty, tz = numbers[0]
-    return Wrench(frame, (fx, fy, fz), (tx, ty, tz))
+    return Wrench(frame, numbers[0][:3], numbers[0][3:])
 
 
 def _as_point(frame: str, numbers: Numbers) -> Point:
-    x, y, z = numbers[0]
-    return Point(frame, (x, y, z))
+    return Point(frame, numbers[0])
 
 
 def _find_table(columns: tuple[str, ...], frames: tuple[str, ...], most: int, data: bytes) -> Table | None:

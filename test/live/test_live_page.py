@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from bag_comparison import compare
 from conftest import LONG
+from ros_network import Network
 
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
@@ -47,7 +48,7 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 from wam_live.page import free_port as next_free_port
 from wam_live.thresholds import LIVE
-from wam_ros.testing import Network, RunningArm
+from wam_ros.testing import RunningArm
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402

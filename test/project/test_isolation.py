@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT
 
 from wam_ros.limits import TEST_LIMITS
-from wam_ros.network import PORTS, has_ports, is_inhabited
+from wam_ros.network import PORTS, is_inhabited
 from wam_ros.testing import locked_domain
 
 LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/ip_local_port_range
@@ -42,10 +42,11 @@ def test_a_domain_with_a_participant_is_seen() -> None:
         assert is_inhabited(number)
 
 
-def test_every_port_of_a_domain_is_looked_at_and_no_other() -> None:
+def test_every_port_of_a_domain_is_looked_at_and_no_other(tmp_path: Path) -> None:
+    table = tmp_path / "sockets"
     for port, inhabited in ((61149, False), (61150, True), (61399, True), (61400, False)):
-        table = f"  sl  local_address rem_address\n 1: 0100007F:{port:04X} 00000000:0000 07"
-        assert has_ports(table, 215) == inhabited
+        table.write_text(f"  sl  local_address rem_address\n 1: 0100007F:{port:04X} 00000000:0000 07")
+        assert is_inhabited(215, table) == inhabited
 
 
 def test_two_tests_never_share_a_domain() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
+from ros_network import Network
 from test_loss import Stack
 from test_nodes import SIX, WAM, changed, make
 
@@ -16,7 +17,6 @@ from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status
-from wam_ros.testing import Network
 from wam_ros.topics import qos
 
 OWN = digests(WAM.shared)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from conftest import LONG
+from ros_network import Network
 from sensor_msgs.msg import JointState
 
 from wam_cli.commands.conform import driver_alone, on_bus
@@ -23,7 +24,6 @@ from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_bench import DriverBench
 from wam_ros.limits import CONFORMANCE_LIMITS
 from wam_ros.node import make_node
-from wam_ros.testing import Network
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

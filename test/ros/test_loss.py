@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import pytest
 from conftest import LONG
+from ros_network import Network
 from test_nodes import ARM, MS, SIX, changed, make
 
 from wam_description.arm import Shared
@@ -19,7 +20,6 @@ from wam_description.wiring import Input, Outputs, reaction
 from wam_driver.safety import Mode
 from wam_ros.long_steps import LongStep
 from wam_ros.messages import diagnostic_status, joint_state, message_type
-from wam_ros.testing import Network
 from wam_ros.topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
 

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from ros_network import Network
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
@@ -27,7 +28,7 @@ from wam_ros.health import READY
 from wam_ros.messages import diagnostic_status, joint_state, message_type, read_status
 from wam_ros.node import make_node
 from wam_ros.outlets import COPIED, copy_name
-from wam_ros.testing import Network, RunningArm, playing
+from wam_ros.testing import RunningArm, playing
 from wam_ros.topics import DEPTH, qos, stamp_of
 from wam_ros.wire import encoder
 from wam_studies.faults.answered_clock import AnsweredClock

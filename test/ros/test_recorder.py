@@ -28,6 +28,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
+from ros_network import Network
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from sensor_msgs.msg import JointState
@@ -44,7 +45,7 @@ from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
-from wam_ros.testing import Network, RunningArm
+from wam_ros.testing import RunningArm
 from wam_ros.topics import header, qos
 
 CONFIG = Path(__file__).parents[2] / "config" / "wam.yaml"
