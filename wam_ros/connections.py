@@ -14,7 +14,7 @@ from wam_description.wiring import Declaration
 from wam_ros.health import Diagnostics, Health, problem_of
 from wam_ros.inlets import Inlets
 from wam_ros.long_steps import STEPS
-from wam_ros.messages import message_type, read_status
+from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.network import Place, require_name
 from wam_ros.outlets import Outlets
 from wam_ros.parameters import declare
@@ -129,7 +129,11 @@ class StackNode(TolerantNode):
         return False
 
     def _hear(self, data: bytes) -> None:
-        status = read_status(deserialized(data, self._status_type, STATUS))
+        try:
+            status = read_status(deserialized(data, self._status_type, STATUS))
+        except Refused as reason:
+            self.health.refuse(STATUS, str(reason))
+            return
         if status.node in self.peers.names:
             self.peers.hear(status)
         if status.node != self.get_name():

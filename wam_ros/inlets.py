@@ -132,22 +132,11 @@ class Inlets:
             except Refused as reason:
                 self._health.refuse(topic, str(reason), reason.is_late)
 
-        is_local = self._subscribe(topic, receive)
+        is_local = self.listen(topic, receive)
         self.claims[topic] = claim = PublisherClaim(self._node, topic, self.subscriptions[topic])
 
-    def listen(self, topic: str, take: Callable[[bytes], None]) -> None:
-        """Subscribe to the bytes of messages; `take` may raise Refused."""
-
-        def receive(data: bytes) -> None:
-            try:
-                take(data)
-            except Refused as reason:
-                self._health.refuse(topic, str(reason), reason.is_late)
-
-        self._subscribe(topic, receive)
-
-    def _subscribe(self, topic: str, receive: Callable[[bytes], None]) -> bool:
-        """Subscribe; whether the messages come without the middleware, see `wam_ros.local_bus`."""
+    def listen(self, topic: str, receive: Callable[[bytes], None]) -> bool:
+        """Subscribe to the bytes of messages; whether they come without the middleware, see `wam_ros.local_bus`."""
         node, row, bus = self._node, self._interface.topics[topic], self._bus
         profile, name = listening(row), topic_name(node, row)
         if not row.latched and self._shared.timing.mode == "realtime":
