@@ -150,18 +150,18 @@ def _names(bench: DriverBench) -> str:
 
 def _refusals(bench: DriverBench) -> str:
     names, bad = list(bench.contract.motors), bench.bad()
-    wrong = {
-        "NaN": (names, [math.nan, *bad[1:]]),
-        "infinite": (names, [math.inf, *bad[1:]]),
-        "short": (names, bad[:-1]),
-        "empty": (names, []),
-        "unknown name": (["nobody", *names[1:]], bad),
-        "doubled name": ([names[-1], *names[1:]], bad),
-    }
+
+    def made(names: list[str], values: list[float]) -> Callable[[int], object]:
+        return lambda stamp: joint_state(stamp, names, State([], [], values))
+
     return bench.bears(
         {
-            what: lambda stamp, names=names, values=values: joint_state(stamp, names, State([], [], values))
-            for what, (names, values) in wrong.items()
+            "NaN": made(names, [math.nan, *bad[1:]]),
+            "infinite": made(names, [math.inf, *bad[1:]]),
+            "short": made(names, bad[:-1]),
+            "empty": made(names, []),
+            "unknown name": made(["nobody", *names[1:]], bad),
+            "doubled name": made([names[-1], *names[1:]], bad),
         }
     )
 
