@@ -43,7 +43,7 @@ def cost(case: Case, v: Array) -> float:
     return float((v - case.posture) @ (v - case.posture) + RANK * (off + short))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(12))
 def test_the_bounds_hold_and_no_velocity_within_them_is_better(seed: int) -> None:
     case, random = random_case(seed), np.random.default_rng(seed)
     found = solve(*case).velocity
@@ -55,7 +55,7 @@ def test_the_bounds_hold_and_no_velocity_within_them_is_better(seed: int) -> Non
     assert all(cost(case, np.clip(other, case.low, case.high)) >= best * (1.0 - 1e-5) - 2e-6 for other in others)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(12))
 def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: int) -> None:
     case = random_case(seed, rows=seed % 4, pushes=0)
     far = np.full(N, 1e9)
@@ -74,7 +74,7 @@ def test_the_closed_form_is_the_solution_of_the_whole_quadratic_program(seed: in
     assert found.velocity == pytest.approx(linearly, abs=NEAR), "the guard judges what is commanded"
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_limits_that_are_not_reached_change_no_bit(seed: int) -> None:
     case, far = random_case(seed, rows=1, pushes=0), np.full(N, 1e9)
     free = solve(case.rows, case.posture, [], -far, far).velocity

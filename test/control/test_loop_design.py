@@ -175,7 +175,7 @@ PLANT = FrictionNode(0.1, 10.0, 2000.0, 1000.0, 0.5, 0.5)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", [0.85, 0.95, 0.995, 1.005, 1.5])
+@pytest.mark.parametrize("part", [0.85, 0.995, 1.005])
 def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_not(part: float) -> None:
     margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
     text = loop_design(PLANT, IntegralLoop(part * margin), 500.0, 2e-3).text()

@@ -66,7 +66,7 @@ def test_the_estimator_feels_nothing_of_it() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mass", "side", "force"), [(0.1, -1.0, 10.0), (0.3, 1.0, 10.0), (2.0, 1.0, 30.0)])
+@pytest.mark.parametrize(("mass", "side", "force"), [(0.1, -1.0, 10.0), (2.0, 1.0, 30.0)])
 def test_a_force_is_refused_by_the_mass_that_nobody_knows_of(mass: float, side: float, force: float) -> None:
     """10 N were 11.2 N with 0.1 kg, and 13.5 N with 0.3 kg, without a reason."""
     direction = triple(side * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])

@@ -148,7 +148,7 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gain", [0.3, 0.5, 0.87])
+@pytest.mark.parametrize("gain", [0.3, 0.87])
 def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
     for make, own, group in (
         (Loop, OWN, "force"),

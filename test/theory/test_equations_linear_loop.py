@@ -74,8 +74,8 @@ def test_testbed_gains_of_section_5_6() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0, 1, 2, 5])
-@pytest.mark.parametrize("period", [0.02, 0.3, 2.0])
+@pytest.mark.parametrize("delay", [0, 1, 5])
+@pytest.mark.parametrize("period", [0.02, 2.0])
 def test_sampled_margin_is_where_the_exact_response_begins_to_grow(delay: int, period: float) -> None:
     values = (1.3, 0.8, 2.0, 3.0)
     margin = linear_loop.sampled_margin(*values, period, delay)
@@ -102,8 +102,8 @@ def test_sampled_margin_has_a_pole_on_the_circle_at_its_frequency() -> None:
     assert np.abs(poles).max() == pytest.approx(1.0, abs=1e-5)
 
 
-@pytest.mark.parametrize("delay", [0, 1, 50])
-@pytest.mark.parametrize("zeta", [1e-3, 0.05, 1.0, 30.0])
+@pytest.mark.parametrize("delay", [0, 50])
+@pytest.mark.parametrize("zeta", [1e-3, 1.0, 30.0])
 def test_sampled_margin_tends_to_the_continuous_one_at_every_rate(zeta: float, delay: int) -> None:
     j, ktr, kc = 0.1, 1000.0, 1000.0
     w = math.sqrt((ktr + kc) / j)

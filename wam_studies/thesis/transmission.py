@@ -58,27 +58,22 @@ def resonances_sample(runs: Mapping[str, Recording]) -> Result:
 
 
 def allocation(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `stiffness-allocation`."""
+    """The experiment `stiffness-allocation`, or one of its sweeps, from motor and joint only."""
     rows, curves = [], []
     for name, run in runs.items():
-        found, label, ends = transfer(run), name.replace("_", " "), swept(run)
-        rows.append(_resonance(run, found, "lower", f"{label}, "))
+        found, label = transfer(run), name.replace("_", " ")
+        row = _resonance(run, found, "lower", f"{label}, ")
+        ends = 0.5 * float(row.predicted), 3.0 * float(row.predicted)
+        rows.append(row)
         curves += [_gain(label, found, *ends), _theory("(4.3)", run, found, *ends)]
     for ratio in (14, 30):
-        joint, motor = (runs[f"reducer_at_{where}_N_{ratio}"].shared.arm for where in ("joint", "motor"))
-        stiffness = joint.circuits[0].stiffness / motor.circuits[0].stiffness
-        label = f"stiffness with reducer at joint over at motor, N {ratio}"
-        rows.append(near(label, stiffness_gain(joint), stiffness, "", "(4.1)", 1e-3))
+        names = [f"reducer_at_{where}_N_{ratio}" for where in ("joint", "motor")]
+        if all(name in runs for name in names):
+            joint, motor = (runs[name].shared.arm for name in names)
+            stiffness = joint.circuits[0].stiffness / motor.circuits[0].stiffness
+            label = f"stiffness with reducer at joint over at motor, N {ratio}"
+            rows.append(near(label, stiffness_gain(joint), stiffness, "", "(4.1)", 1e-3))
     return Result(rows, [_gains(curves)])
-
-
-def allocation_sample(runs: Mapping[str, Recording]) -> Result:
-    """One of the sweeps of `stiffness-allocation`, from motor and joint only."""
-    ((name, run),) = runs.items()
-    found = transfer(run)
-    row = _resonance(run, found, "lower", f"{name.replace('_', ' ')}, ")
-    line = _gain("measured", found, 0.5 * float(row.predicted), 3.0 * float(row.predicted))
-    return Result([row], [_gains([line])])
 
 
 def _gain(label: str, found: Transfer, low: float, high: float) -> Line:
