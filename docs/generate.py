@@ -38,7 +38,6 @@ from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
 from wam_studies.figures.panels import Panels, distances, draw_panels
 from wam_studies.force_benchmark import usual_tasks
-from wam_studies.force_benchmark.elbow import elbow, elbow_table
 from wam_studies.plant import table as plant_table
 from wam_studies.scorecard import measures
 from wam_studies.scorecard import report as scorecard
@@ -410,7 +409,7 @@ def refusals() -> str:
 def measure_forces() -> None:
     """Press with a nearly straight elbow, do the force tasks, and keep their tables."""
     configuration, docs = Configuration.load(CONFIGURATION), ROOT / "docs"
-    (docs / "elbow.txt").write_text(elbow_table(elbow(configuration)), encoding="utf-8")
+    (docs / "elbow.txt").write_text(usual_tasks.elbow_table(configuration), encoding="utf-8")
     done = usual_tasks.table(list(usual_tasks.perform_all(configuration)))
     (docs / "force-tasks.txt").write_text(done + "\n", encoding="utf-8")
 

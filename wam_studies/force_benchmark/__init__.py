@@ -7,6 +7,5 @@ controllers    what a user would write in place of the force loop
 outcome        done, refused, ended with a reason, or silent; cycles and overshoot
 groupings      the classes into which tasks are divided
 study          many tasks in the harness; picture draws them
-usual_tasks    the tasks by which the loop was first measured, position estimated and pinned (docs/force.md)
-elbow          a wall ahead and a rod at the side of a nearly straight arm (docs/force.md)
+usual_tasks    the tasks by which the loop was first measured, and a nearly straight arm (docs/force.md)
 """

@@ -7,8 +7,12 @@ position estimated and with it pinned.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
+import numpy as np
+
+from wam_analysis.table import markdown
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult
@@ -27,6 +31,7 @@ class UsualSurface:
 
 
 USUAL = UsualSurface()
+FORCES = (5.0, 15.0)  # N, of the nearly straight arm
 
 
 class ForceTaskRow(NamedTuple):
@@ -93,3 +98,22 @@ def _cell(task: Task, result: TaskResult) -> str:
         return "refused"
     error, over = (100.0 * (force / task.force - 1.0) for force in (result.mean, result.peak))
     return f"{error:+.0f} ({over:+.0f})" + (" *" if result.reason else "")
+
+
+def elbow_table(base: Configuration, seconds: float = 3.0) -> str:
+    """Mean and peak of the true force of a nearly straight arm, N, in Markdown; with a star for a reason.
+
+    The elbow is bent by 0 to 0.5 rad, against a wall ahead and a rod at its side.
+    """
+    arm = base.shared.arm
+    body, cover, length = RigidBody(arm), arm.covers.names[-1], arm.covers.length[-1]
+    lines = []
+    for bend in [round(0.05 * k, 2) for k in range(11)]:
+        q = (0.0, -1.0, 0.0, math.pi / 2.0 - bend)
+        tip, aside = body.point(q, cover, (length, 0.0, 0.0)), body.cover_pose(q, cover).rotation[:, 2]
+        wall = Surface(cover, length, triple(tip / np.linalg.norm(tip)), USUAL.stiffness, USUAL.friction, True)
+        side = Surface(cover, 0.28, triple(aside), USUAL.stiffness, USUAL.friction, False)
+        done = [perform(base, Task(q, surface, force), seconds) for surface, force in product((wall, side), FORCES)]
+        lines.append([f"{bend:g}", *(f"{one.mean:.2f} ({one.peak:.2f})" + " *" * bool(one.reason) for one in done)])
+    head = ["bend [rad]", *(f"{where} {force:g} N" for where, force in product(("radial", "lateral"), FORCES))]
+    return markdown(head, lines)
