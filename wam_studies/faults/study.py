@@ -34,15 +34,15 @@ class FaultKind(NamedTuple):
 
 
 KINDS: Final = {
-    "messages": FaultKind("messages", 960, 6, messages.play, LOCKSTEP),
-    "messages-realtime": FaultKind("messages", 960, 6, messages.play, REALTIME),
-    "parameters": FaultKind("sets", 2000, 20, parameter_sets.play, LOCKSTEP),
+    "messages": FaultKind("messages", 960, 3, messages.play, LOCKSTEP),
+    "messages-realtime": FaultKind("messages", 960, 3, messages.play, REALTIME),
+    "parameters": FaultKind("sets", 2000, 10, parameter_sets.play, LOCKSTEP),
     "losses": FaultKind("losses", 108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
     "losses-realtime": FaultKind("losses", 108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
-    "publishers": FaultKind("publishers", 90, 4, second_publishers.play, LOCKSTEP),
-    "publishers-realtime": FaultKind("publishers", 90, 4, second_publishers.play, REALTIME),
+    "publishers": FaultKind("publishers", 90, 3, second_publishers.play, LOCKSTEP),
+    "publishers-realtime": FaultKind("publishers", 90, 3, second_publishers.play, REALTIME),
     "disks": FaultKind("disks", 12, 1, disks.play, LOCKSTEP),
-    "bags": FaultKind("bags", 3000, 60, bags.play, LOCKSTEP),
+    "bags": FaultKind("bags", 3000, 30, bags.play, LOCKSTEP),
     "interruptions": FaultKind("interruptions", 100, 0, interruptions.play, {}),
 }
 
