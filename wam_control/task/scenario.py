@@ -24,13 +24,13 @@ from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
     "name": "text; needed",
-    "seconds": "s of the arm's time; with `until_force` at most; needed",
+    "seconds": "s of the arm's time; needed. With `until_force` the longest time",
     "posture": "rad, an angle for each joint at the end of the step; the arm arrives a little later",
     "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` may be left out",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
     "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: N on the world, in `base` or in the "
-    "frame of a link. Optional: `contact_position`, m along the link, pins the force; `rise`, s, is "
-    "its time to rise",
+    "frame of a link. Optional: `contact_position`, m along the link, is where it acts; `rise`, s, "
+    "is its time to rise",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
     "torque": "N m, a torque for each joint",
     "until_force": "N; the step ends when a contact of this force is detected, and fails without one",
