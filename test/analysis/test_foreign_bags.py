@@ -325,7 +325,7 @@ def test_nothing_is_found_in_a_quiet_bag(make: Any, tmp_path: Path) -> None:
     invented = [name for name in numbers if name.endswith(("dry friction", "viscous friction", "inertia"))]
     sections = {section.key: section for section in analysis.sections}
     assert invented == []
-    assert sections["stability"].shows == sections["stick_slip"].shows == sections["force"].shows == ()
+    assert not any(sections[key].shows for key in ("stability", "stick_slip", "force"))
     lines = [one.measured for one in sections["frequency"].findings if one.quantity == "frequency"]
     assert all(any(f == pytest.approx(known, rel=CLOSE) for known in THERE.get(make.__name__, ())) for f in lines)
 
@@ -374,7 +374,7 @@ def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     sent += wrenches("/wrench", time, np.full((len(time), 3), math.nan))
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
     assert numbers["/joint_states: missed periods"] == 0.0
-    happened = " ".join(analysis.sections[0].sentences + analysis.sections[1].sentences)
+    happened = " ".join(line for section in analysis.sections[:2] for line in section.sentences)
     assert "/joint_states: b without a value that is a number." in happened
     assert f"/wrench: {len(time)} forces, none of which is a number." in happened
 
@@ -402,7 +402,7 @@ def cycling(time: Any, frequency: float, size: float, joints: int = 2, noise: fl
 
 
 def section(analysis: Analysis, key: str) -> tuple[str, ...]:
-    return next(one for one in analysis.sections if one.key == key).sentences
+    return tuple(next(one for one in analysis.sections if one.key == key).sentences)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,8 @@ def model_values(shared: Shared, found: Identification, source: str) -> dict[str
     source : the recording.
     """
     result = identified(found)
-    groups = _by_group(result)
+    every = dict.fromkeys(name.rpartition(".")[0] for name in result.names)
+    groups = {group: result.values[found.unknowns.places(group)] for group in every}
     values: dict[str, Any] = {"model.source": source}
     for group, each in groups.items():
         if group.startswith("motors.") and group != "motors.torque_difference":
@@ -98,14 +99,6 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
             "--excite"
         )
     return ""
-
-
-def _by_group(result: Identified) -> dict[str, Numbers]:
-    """Values by group, as 'motors.viscous', in the order of motors, joints or links."""
-    found: dict[str, list[float]] = {}
-    for name, value in zip(result.names, result.values.tolist(), strict=True):
-        found.setdefault(name.rpartition(".")[0], []).append(value)
-    return {group: np.array(values) for group, values in found.items()}
 
 
 def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Numbers]) -> dict[str, Any]:

@@ -72,10 +72,10 @@ def unknowns(shared: Shared) -> Unknowns:
     present: list[float] = []
     sd: list[float] = []
 
-    def add(group: str, of: list[str], values: Numbers, sds: Numbers) -> None:
+    def add(group: str, of: list[str], values: Numbers | float, sds: Numbers | float) -> None:
         names.extend(f"{group}.{name}" for name in of)
-        present.extend(values)
-        sd.extend(np.maximum(sds, IDENTIFY.least_sd))
+        present.extend(np.broadcast_to(values, len(of)))
+        sd.extend(np.broadcast_to(np.maximum(sds, IDENTIFY.least_sd), len(of)))
 
     every = list(arm.motors.names)
     through = lumped.T @ at_joints.coulomb
@@ -89,32 +89,17 @@ def unknowns(shared: Shared) -> Unknowns:
         add(f"motors.static_{way}", every, drop + lumped.T @ drop_at_joints, IDENTIFY.friction * level)
     for way in DIRECTIONS:
         load = np.array(getattr(motors, f"load_{way}"))
-        add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, np.full(len(every), IDENTIFY.load))
+        add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, IDENTIFY.load)
     viscous = np.array(motors.viscous) + (lumped**2).T @ at_joints.viscous
     add("motors.viscous", every, viscous, IDENTIFY.viscous * viscous)
     add("motors.inertia", every, np.array(motors.inertia), IDENTIFY.rotor * np.array(motors.inertia))
     sharing = [int(m) for m in np.flatnonzero(matrix[list(joints)].any(axis=0))]
-    add(
-        "motors.torque_difference",
-        [every[m] for m in sharing[1:]],
-        np.zeros(len(sharing[1:])),
-        np.full(len(sharing[1:]), IDENTIFY.constants_difference),
-    )
+    add("motors.torque_difference", [every[m] for m in sharing[1:]], 0.0, IDENTIFY.constants_difference)
     chosen = [arm.joints.names[j] for j in joints]
-    here = list(joints)
-    add(
-        "joints.coulomb",
-        chosen,
-        np.array(at_joints.coulomb)[here],
-        IDENTIFY.friction * np.array(at_joints.coulomb)[here],
-    )
-    add("joints.load", chosen, np.array(at_joints.load)[here], np.full(len(here), IDENTIFY.load))
-    add(
-        "joints.viscous",
-        chosen,
-        np.array(at_joints.viscous)[here],
-        IDENTIFY.viscous * np.array(at_joints.viscous)[here],
-    )
+    coulomb, load, viscous = np.array([at_joints.coulomb, at_joints.load, at_joints.viscous])[:, list(joints)]
+    add("joints.coulomb", chosen, coulomb, IDENTIFY.friction * coulomb)
+    add("joints.load", chosen, load, IDENTIFY.load)
+    add("joints.viscous", chosen, viscous, IDENTIFY.viscous * viscous)
     mass, n = np.array(links.mass), len(links.mass)
     centre, inertia = np.reshape(links.centre, (n, 3)), np.reshape(links.inertia, (n, 3))
     of_links = list(arm.links.names)
