@@ -38,6 +38,11 @@ STRAIN = 60.0 / 0.375 / 9500.0  # 6.4.5: (T2 - T1)/EA at the peak torque of 60 i
 ARM = Configuration.load(packaged("wam")).shared.arm
 
 
+def acceleration(ratio: float) -> float:
+    """Of the link without contact, rad/s^2 per torque of the motor, its cable rigid."""
+    return ratio / (LINK + ratio**2 * ROTOR)
+
+
 def psi(gamma: float) -> float:
     (_, first), (_, second) = own.breakaways(UNIT, gamma, 1.0, 2)
     return -second / first
@@ -123,7 +128,12 @@ ITEMS: list[tuple[str, Callable[[], Any], Callable[[], Any], float]] = [
         lambda: cable.stiffness_with_reducer(5.0, 1.0, N, 0.3),
         EQUATION,
     ),
-    ("4.1.2 N_m, 104 in print", lambda: 105.96, lambda: resonance.matched_ratio(ROTOR, LINK), PRINTED),
+    (
+        "4.1.2 N_m, of the greatest acceleration",
+        lambda: own.bisect(lambda n: acceleration(1.1 * n) < acceleration(n / 1.1), 1.0, 1e3),
+        lambda: resonance.matched_ratio(ROTOR, LINK),
+        EQUATION,
+    ),
     ("4.2 (4.2)", lambda: math.sqrt(N**2 * K_TR / LINK), lambda: resonance.position_bandwidth(LINK, K_TR, N), EQUATION),
     (
         "4.3.1 (4.3) at 20 Hz",
@@ -292,5 +302,7 @@ def test_a_higher_gain_costs_power_and_margin_and_saves_delay() -> None:
 
 
 def test_loss_of_a_stage_goes_with_its_tension() -> None:
-    """6.4.1: the same power at twice the speed has half of the tension."""
-    assert cable.stage_loss([6.0, 3.0], 0.01, 4e4, 1.0, 1.0) == pytest.approx([6.0 / 0.01 / 4e4, 3.0 / 0.01 / 4e4])
+    """6.4.1: the same power at twice the speed has half of the tension; the loss is that of the speeds, (6.3)."""
+    ea, loose, difference = 4e4, 100.0, np.array([600.0, 300.0])
+    lost = 1.0 - (1.0 + loose / ea) / (1.0 + (loose + difference) / ea)
+    assert cable.stage_loss(difference * 0.01, 0.01, ea, 1.0, 1.0) == pytest.approx(lost, rel=0.02)
