@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -21,7 +20,7 @@ from wam_description.nodes import EACH, ONE
 from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
-from wam_ros.node import make_node
+from wam_ros.node import make_node, parameter_file
 from wam_ros.process_signals import HELD_UP, LISTENER_GONE
 from wam_ros.processors import placed_groups
 from wam_ros.run import FIRST, LAST, PARENT, Closing, Connection, prepare_logging_directory
@@ -71,15 +70,6 @@ def node_names(configuration: Configuration) -> dict[str, str]:
         where there is no such node.
     """
     return {entry: declared(entry).name for entry in configuration.shared.nodes}
-
-
-@contextmanager
-def parameter_file(configuration: Configuration) -> Iterator[Path]:
-    """The values of a configuration as a file that ROS reads, as long as the context lasts."""
-    with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
-        file = Path(folder) / "parameters.yaml"
-        file.write_text(configuration.text, encoding="utf-8")
-        yield file
 
 
 class Processes(Closing):

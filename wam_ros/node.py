@@ -4,8 +4,8 @@ import importlib
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import pairwise, takewhile
 from pathlib import Path
@@ -338,6 +338,15 @@ def main() -> None:
         run(makers, arguments)
 
 
+@contextmanager
+def parameter_file(configuration: Configuration) -> Iterator[Path]:
+    """The values of a configuration as a file that ROS reads, as long as the context lasts."""
+    with TemporaryDirectory(prefix="wam_stack_") as folder:
+        file = Path(folder) / "parameters.yaml"
+        file.write_text(configuration.text, encoding="utf-8")
+        yield file
+
+
 def named_file(given: str, before: str, files: ExitStack) -> str:
     """An argument of the command line; after --params-file a whole file for a configuration's name or an overlay."""
     if before != "--params-file":
@@ -351,7 +360,4 @@ def named_file(given: str, before: str, files: ExitStack) -> str:
             return given  # what ROS can read, or complains about
     else:
         path = packaged(given)
-    text = Configuration.load(path).text
-    file = Path(files.enter_context(TemporaryDirectory(prefix="wam_stack_")), "parameters.yaml")
-    file.write_text(text, encoding="utf-8")
-    return str(file)
+    return str(files.enter_context(parameter_file(Configuration.load(path))))

@@ -23,8 +23,7 @@ from wam_description.parameters import ParameterError, build, fields, like, para
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
 from wam_description.wiring import SetParameters as SetParametersRequest
-from wam_ros.bring_up import parameter_file
-from wam_ros.node import AdaptedNode, make_node
+from wam_ros.node import AdaptedNode, make_node, parameter_file
 from wam_ros.requests import refusal_of
 
 ROOT = Path(__file__).parents[2]

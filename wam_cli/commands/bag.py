@@ -59,9 +59,8 @@ def _record(given: argparse.Namespace) -> None:
         own[f"{RECORDER}:directory"] = str(given.directory)
     configuration = configuration_of(given).with_values(own)
     recording_folder(configuration, given.name)
-    from wam_ros.bring_up import parameter_file  # the other requests need no ROS
-    from wam_ros.client import StackClient
-    from wam_ros.node import node_makers
+    from wam_ros.client import StackClient  # the other requests need no ROS
+    from wam_ros.node import node_makers, parameter_file
     from wam_ros.run import run as run_node
 
     with StackClient(given.namespace) as stack:

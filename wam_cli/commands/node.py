@@ -3,8 +3,7 @@
 import argparse
 
 from wam_cli.options import configuration_of, take_configuration
-from wam_ros.bring_up import parameter_file
-from wam_ros.node import node_makers
+from wam_ros.node import node_makers, parameter_file
 from wam_ros.process_signals import end_at_once_on_signals
 from wam_ros.run import run as run_node
 
