@@ -70,11 +70,10 @@ class ErrorEffects:
         has_dither: bool,
         centres: CentreEffects,
     ) -> None:
-        inverse, motors, joints = side.map.motor_from_joint, side.motors, side.joints
+        inverse = side.map.motor_from_joint
         n = self._n = len(inverse)
         self._from_motors, self._parameters, self._times = side.map.joint_from_motor, parameters, times
-        levels = 0.5 * np.array([*motors.dynamic, *joints.dynamic])
-        statics = np.array([*motors.static, *joints.static])
+        levels, statics = 0.5 * np.array(side.friction.dynamic), np.array(side.friction.static)
         self._sds = np.concatenate((parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics))
         through = self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model per signal

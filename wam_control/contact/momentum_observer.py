@@ -5,7 +5,6 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
-from operator import add, sub
 from typing import NamedTuple
 
 import numpy as np
@@ -99,7 +98,7 @@ class MomentumObserver:
             else ErrorEffects(side, parameters, times, cycle > 0, centres)
         )
         prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
-        noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
+        noise = (parameters.motor_noise * np.array(side.friction.dynamic[:n])) ** 2
         self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
         self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
         self.seen = self._begin()
@@ -111,8 +110,8 @@ class MomentumObserver:
     def _begin(self) -> Observation:
         """Forget all samples; the moment before them."""
         n = self._n
-        self._filters = self._filters.empty_copy()
-        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [], [], math.inf)
+        self._filters.reset()
+        self._last = _Sample(np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), math.inf)
         if self._load is not None:
             self._load.reset()
         self._side.reset()
@@ -122,7 +121,7 @@ class MomentumObserver:
         return self._observation()
 
     @property
-    def q(self) -> list[float]:
+    def q(self) -> Array:
         """Joint angles of the last sample, (n,), rad."""
         return self._last.q
 
@@ -155,7 +154,8 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            return self._update(JointSample(position, velocity, effort, [], [], dt))
+            q, qd, tau = np.array(state)
+            return self._update(JointSample(q, qd, tau, np.zeros(n), np.zeros(0), dt))
         if self._side.carries_nothing(state):
             self.reset()
             return True
@@ -166,27 +166,24 @@ class MomentumObserver:
     def _update(self, sample: JointSample) -> bool:
         """Take a sample of the joints."""
         q, qd, tau, friction, signals, dt = sample
-        body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
-        inertia = body.mass_matrix(at) if self._is_link_side else body.mass_matrix(at) + self._side.inertia
-        momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
-        known = list(map(sub, bias, friction)) if friction else bias
-        span = dt + self._gap
+        body, last = self._body, self._last
+        inertia = body.mass_matrix(q) if self._is_link_side else body.mass_matrix(q) + self._side.inertia
+        momentum, bias = inertia.dot(qd), body.momentum_bias(q, qd)
+        known, span = bias - friction, dt + self._gap
         is_first = not self._filters.count
-        if is_first:
-            external, model = [0.0] * self._n, [-torque for torque in bias]
-        else:
-            # map and a plain zip: strict=True takes as long as the work on four numbers
-            rates = [change / span for change in map(sub, momentum, last.momentum)]
-            model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
-            left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
-            external = list(map(sub, left, tau))
-        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
+        external, model = np.zeros(self._n), -bias
+        if not is_first:
+            rate = (momentum - last.momentum) / span
+            model = rate - 0.5 * (bias + last.bias)
+            external = rate - 0.5 * (known + last.known) - tau
+        values = np.concatenate((external, model, q, signals))
+        if not math.isfinite(float(momentum.sum() + known.sum() + values.sum())):
             self._gap += dt
             return False
-        self._filters.take([*external, *model, *q, *signals], span)
+        self._filters.take(values, span)
         if self._load is not None:
             self._load.observe(q, qd, span)
-        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, max(map(abs, qd))), 0.0
+        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, float(np.abs(qd).max())), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
@@ -223,12 +220,6 @@ class MomentumObserver:
         if self.is_ready and not self._is_link_side:
             self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
-
-    @property
-    def pose(self) -> list[float]:
-        """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
-        pose: list[float] = self.seen.pose.tolist()
-        return pose
 
     @property
     def load_torques(self) -> Array | None:
@@ -276,18 +267,18 @@ class _Sample(NamedTuple):
     Attributes
     ----------
     q : joint angles, (n,), rad.
-    momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
+    momentum : (n,), N m s.
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
     speed : of the fastest joint, rad/s.
     """
 
-    q: list[float]
-    momentum: list[float]
+    q: Array
+    momentum: Array
     inertia: Array
-    known: list[float]
-    bias: list[float]
+    known: Array
+    bias: Array
     speed: float
 
 
@@ -310,20 +301,20 @@ class _Filters:
     """
 
     def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
-        self.times, self.cycle, self.count = times, cycle, 0
-        self._n = n
-        self._values = np.zeros((len(times), size))
+        self.times, self.cycle, self._n = times, cycle, n
         self._ring = np.zeros((cycle, size))
         self._span = math.inf
-        self._keeps = self._takes = self._values  # one for each number: numpy multiplies by a single one more slowly
+        # one for each number: numpy multiplies by a single one more slowly
+        self._keeps = self._takes = np.zeros((len(times), size))
+        self.reset()
 
-    def empty_copy(self) -> "_Filters":
-        """The same without samples."""
-        return _Filters(self._n, self._values.shape[1], self.times, self.cycle)
+    def reset(self) -> None:
+        """Forget all samples."""
+        self.count, self._values = 0, np.zeros_like(self._keeps)
 
-    def take(self, values: list[float], span: float) -> None:
+    def take(self, present: Array, span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
-        present, before, n = np.array(values), self._values, self._n
+        before, n = self._values, self._n
         if not self.count:
             self._values = present + np.zeros_like(before)
         else:
