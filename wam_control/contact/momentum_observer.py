@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
-from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
+from wam_control.contact.error_effects import ErrorEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
 from wam_control.contact.motor_side import JointSample, MotorSide
@@ -91,13 +91,9 @@ class MomentumObserver:
         if not high and not use_joint_sensors:
             payload_sd = parameters.payload_uncertainty
         self._load = ToolLoad(arm, times) if payload_sd > 0.0 or high > 0.0 else None
-        centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
-        self._effects: GaugeEffects | ErrorEffects = (
-            GaugeEffects(n, parameters, centres)
-            if use_joint_sensors
-            else ErrorEffects(side, parameters, times, cycle > 0, centres)
-        )
-        prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
+        self._effects = ErrorEffects(self._body, side, parameters, times, cycle > 0)
+        # joint sensors lie behind the friction
+        prior = model_prior(arm, parameters, payload_sd, None if use_joint_sensors else model)
         noise = (parameters.motor_noise * np.array(side.friction.dynamic[:n])) ** 2
         self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
         self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
@@ -199,7 +195,10 @@ class MomentumObserver:
         """
         self._side.expect()
         self.seen = self._observation()
-        torques, covariance = self._errors.corrected(self.seen)
+        return self._corrected(self.seen)
+
+    def _corrected(self, seen: Observation) -> tuple[list[float], Array]:
+        torques, covariance = self._errors.corrected(seen)
         return torques.tolist(), self._errors.size * covariance
 
     def moment(self) -> Torques:
@@ -210,10 +209,7 @@ class MomentumObserver:
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
-        if len(self._filters.times) == 1:
-            return None
-        torques, covariance = self._errors.corrected(self._observation(1))
-        return torques.tolist(), self._errors.size * covariance
+        return self._corrected(self._observation(1)) if len(self._filters.times) > 1 else None
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
@@ -239,7 +235,7 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        load = None if self._load is None else self._load.torques()[which]
+        load = np.zeros(self._n) if self._load is None else self._load.torques()[which]
         means, velocity_sd = self._filters.means(which), self._side.velocity_sd
         return self._effects.observation(means, load, self._last.inertia, velocity_sd, which)
 

@@ -83,7 +83,7 @@ class MotorSide:
     def take(self, state: State, dt: float) -> JointSample | None:
         """Take a state of the motors `dt` seconds after the one before; None while velocities are not known."""
         fitted = self._velocity.take(state, dt)
-        return None if fitted is None else self._sample(fitted.state, fitted.dt)
+        return None if fitted is None else self._sample(*fitted)
 
     def _sample(self, state: State, dt: float) -> JointSample:
         theta, thetad, effort = state
