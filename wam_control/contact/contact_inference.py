@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence
 from wam_control.contact.contact_fusion import ContactFusion, Torques
@@ -94,7 +94,7 @@ class ContactInference:
 
     def infer(
         self,
-        q: Sequence[float],
+        q: ArrayLike,
         torques: Sequence[float],
         precision: Array,
         load: Array | None = None,
