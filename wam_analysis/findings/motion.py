@@ -31,11 +31,7 @@ def friction_section(recording: AnalysedRecording) -> Section:
         missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
         return Section("friction", "Friction", (sentence,), (), missing)
     alone = signals.load_from == CABLE
-    note = (
-        f"load from the {signals.load_from}"
-        if alone
-        else f"with the joint's friction; load from the {signals.load_from}"
-    )
+    note = "with the joint's friction; " * (not alone) + f"load from the {signals.load_from}"
     findings = []
     for i, (name, found) in enumerate(friction.items()):
         findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
@@ -43,23 +39,16 @@ def friction_section(recording: AnalysedRecording) -> Section:
         bearing = arm.joints
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
         findings += _friction_findings(name, found, configured, "cable torque less strain")
-    sentences = []
-    seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic.value)]
-    unsure = [
-        _named(name, kind)
-        for name, found in {**friction, **joints}.items()
-        for kind in UNITS
-        if getattr(found, kind).is_vague
-    ]
+    sentences, every = [], {**friction, **joints}
+    unsure = [_named(name, kind) for name, one in every.items() for kind in UNITS if getattr(one, kind).is_vague]
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
-    still = [name for name in {**friction, **joints} if name not in seen]
-    if still:
+    if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
-    every = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
-    return Section("friction", "Friction", every, findings, lacking, (), flagged)
+    stated = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
+    return Section("friction", "Friction", stated, findings, lacking, (), flagged)
 
 
 def identified(found: Friction, kind: str) -> float:

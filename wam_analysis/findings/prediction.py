@@ -144,27 +144,21 @@ def predict(node: Node, gain: float, proportional_gain: float) -> Predicted:
     if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
         nan = math.nan
         return Predicted(nan, nan, nan, nan, False, nan, nan)
-    zeta, gamma = (
-        float(linear_loop.damping_ratio(j, b, ktr, kc)),
-        float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain)),
-    )
     fs, fd = node.static_friction, node.dynamic_friction
-    driven_force = driven_period = math.nan
-    if math.isfinite(node.driven_stiffness):
-        soft = node.driven_stiffness
-        slow = float(linear_loop.damping_ratio(j, b, soft, kc))
-        driven_force = float(stiction.stiction_cycle_force(soft, kc, fs, fd, slow))
-        driven_period = float(stiction.stiction_cycle_period(gain, soft, kc, fs, fd, slow))
+    zeta = float(linear_loop.damping_ratio(j, b, ktr, kc))
+    gamma = float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain))
+
+    def cycle(stiffness: float) -> tuple[float, float]:
+        """Size, N, and period, s, of the stiction cycle with a stiffness between motor and joint."""
+        damped = float(linear_loop.damping_ratio(j, b, stiffness, kc))
+        size = stiction.stiction_cycle_force(stiffness, kc, fs, fd, damped)
+        return float(size), float(stiction.stiction_cycle_period(gain, stiffness, kc, fs, fd, damped))
+
+    driven = cycle(node.driven_stiffness) if math.isfinite(node.driven_stiffness) else (math.nan, math.nan)
     certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= HOLD.certain
-    return Predicted(
-        time_constant=float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc))),
-        force_peak_to_peak=float(stiction.stiction_cycle_force(ktr, kc, fs, fd, zeta)),
-        period=float(stiction.stiction_cycle_period(gain, ktr, kc, fs, fd, zeta)),
-        actuator_peak_to_peak=float(regimes.actuator_cycle(fd, ktr, gamma, zeta)),
-        is_certain=certain,
-        driven_peak_to_peak=driven_force,
-        driven_period=driven_period,
-    )
+    actuator = float(regimes.actuator_cycle(fd, ktr, gamma, zeta))
+    time_constant = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc)))
+    return Predicted(time_constant, *cycle(ktr), actuator, certain, *driven)
 
 
 class LargestForce(NamedTuple):
