@@ -107,7 +107,7 @@ class MomentumObserver:
         """Forget all samples; the moment before them."""
         n = self._n
         self._filters.reset()
-        self._last = _Sample(np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), math.inf)
+        self._last = _Sample(np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), np.full(n, math.inf))
         if self._load is not None:
             self._load.reset()
         self._side.reset()
@@ -173,13 +173,13 @@ class MomentumObserver:
             model = rate - 0.5 * (bias + last.bias)
             external = rate - 0.5 * (known + last.known) - tau
         values = np.concatenate((external, model, q, signals))
-        if not math.isfinite(float(momentum.sum() + known.sum() + values.sum())):
+        if not math.isfinite(float(values.dot(values) + momentum.dot(known))):
             self._gap += dt
             return False
         self._filters.take(values, span)
         if self._load is not None:
             self._load.observe(q, qd, span)
-        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, float(np.abs(qd).max())), 0.0
+        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, qd), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
@@ -250,7 +250,7 @@ class MomentumObserver:
             return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
         if not self.is_ready:
             return "too few samples yet"
-        if self._last.speed > CONTACT.at_rest:
+        if np.abs(self._last.qd).max() > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
         self._errors.zero(self.seen)
@@ -267,7 +267,7 @@ class _Sample(NamedTuple):
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
-    speed : of the fastest joint, rad/s.
+    qd : of the joints, (n,), rad/s.
     """
 
     q: Array
@@ -275,7 +275,7 @@ class _Sample(NamedTuple):
     inertia: Array
     known: Array
     bias: Array
-    speed: float
+    qd: Array
 
 
 class _Filters:

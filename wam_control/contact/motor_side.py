@@ -1,6 +1,7 @@
 """Samples of the motors as those of the joints, with the nominal friction on the way and how certain it is."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,11 +55,11 @@ class MotorSide:
         self.friction = ShaftFriction(arm, parameters, model)
         self._velocity = VelocityFit(len(self.inertia), parameters.motor_rest_velocity)
         self._parameters, self._has_dither = parameters, has_dither
-        self._torque: Array | None = None
+        self._torque: Sequence[float] = ()
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._torque = None
+        self._torque = ()
         self.friction.reset()
         self._velocity.reset()
 
@@ -92,11 +93,17 @@ class MotorSide:
         keep = 0.0 if self._has_dither else math.exp(-dt / self._parameters.friction_memory)
         found = self.friction.of([*thetad, *qd], keep, dt)
         through = self.map.joint_torques(found.friction[:n])
-        tau_motor, tau = np.array(effort), self.map.joint_torques(effort)
-        friction, sliding = np.array([*found.friction[:n], *through]), np.array(found.sliding)
-        loaded = np.abs(np.array([*effort, *tau]) - friction) * sliding
-        rate = (tau_motor - (tau_motor if self._torque is None else self._torque)) / dt
-        self._torque = tau_motor
-        signals = np.concatenate((sliding, np.abs(sliding), found.resting, found.shape, loaded, rate))
-        q = np.array(self.map.joint_positions(theta))
-        return JointSample(q, np.array(qd), np.array(tau), friction[n:] + found.friction[n:], signals, dt)
+        tau, sliding = self.map.joint_torques(effort), found.sliding
+        friction = [a + b for a, b in zip(through, found.friction[n:], strict=True)]
+        transmitted = [a - f for a, f in zip([*effort, *tau], [*found.friction[:n], *through], strict=True)]
+        signals = [
+            *sliding,
+            *map(abs, sliding),
+            *found.resting,
+            *found.shape,
+            *(abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)),
+            *((torque - before) / dt for torque, before in zip(effort, self._torque or effort, strict=True)),
+        ]
+        self._torque = effort
+        q = self.map.joint_positions(theta)
+        return JointSample(np.array(q), np.array(qd), np.array(tau), np.array(friction), np.array(signals), dt)
