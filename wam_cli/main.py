@@ -30,7 +30,7 @@ COMMANDS = {
     "sweep": "play a scenario with many parameter sets; write table and plot",
     "evaluate": "run a benchmark, such as contact or force; draw the figures",
     "guard": "show how stable a force loop is",
-    "conform": "test a driver by each row of docs/driver.md",
+    "conform": "test a driver against the contract in docs/driver.md",
     "model": "print the arm as URDF or MJCF, or its scorecard",
 }
 

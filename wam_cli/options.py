@@ -310,7 +310,7 @@ def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
         metavar="FILE",
         help="file of finished runs, which are not computed again; default: %(default)s",
     )
-    kept.add_argument("--fresh", action="store_true", help="compute every run, keep none")
+    kept.add_argument("--fresh", action="store_true", help="compute every run again and keep none")
 
 
 @contextmanager

@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steps",
         action="store_true",
-        help="print the report of 'wam demo': was each command carried out; exit code 1 if a result is NO or the run "
+        help="print, as 'wam demo', whether each command was carried out; exit code 1 if a result is NO or the run "
         "failed",
     )
     take_arm(parser)

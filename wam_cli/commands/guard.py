@@ -48,7 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
     for name, (_, text) in LOOP.items():
         own.add_argument(f"--{name}", type=float, help=text)
-    own.add_argument("--bag", type=Path, help="take numbers that are not given from this recording")
+    own.add_argument("--bag", type=Path, help="recording from which missing numbers are taken")
     own.add_argument(
         "--picture", type=PICTURE, help="draw the loop and the bound of stability into this PNG, PDF or SVG"
     )

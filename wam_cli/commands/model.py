@@ -16,7 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "format",
         choices=("urdf", "mjcf", "scorecard"),
-        help="the arm as URDF or MJCF, or the table of chapter 3: requisites for force control",
+        help="the arm as URDF or MJCF, or the requirements for force control of chapter 3",
     )
     parser.add_argument(
         "--ros2-control",
