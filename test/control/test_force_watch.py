@@ -228,10 +228,21 @@ def test_an_oscillation_is_reported_with_its_size_and_ends_and_the_arm_is_slowed
     assert pressed.last(2.0 * SETTLING + 0.1) == []
 
 
-@pytest.mark.parametrize(("size", "share", "is_reported"), [(0.0, 1.0, False), (0.1, 1.0, False), (0.2, 0.25, False)])
-def test_a_swing_below_the_reported_one_slows_the_arm_down(size: float, share: float, is_reported: bool) -> None:
+@pytest.mark.parametrize(
+    ("size", "sd", "share", "is_reported"),
+    [
+        (0.0, 0.0, 1.0, False),
+        (0.1, 0.0, 1.0, False),
+        (0.2, 0.0, 0.25, False),
+        (0.4, 0.1, 0.25, True),
+        (0.4, 0.3, 1.0, False),  # the sensors make such a swing, too
+    ],
+)
+def test_a_swing_below_the_reported_one_slows_the_arm_down(
+    size: float, sd: float, share: float, is_reported: bool
+) -> None:
     oscillation = Oscillation()
-    found = [oscillation.step(swing(size)(k * DT), FORCE, OWN, DT) for k in range(600)]
+    found = [oscillation.step(swing(size)(k * DT), FORCE, sd, OWN, DT) for k in range(600)]
     assert oscillation.share == share
     assert any(found) is is_reported
 

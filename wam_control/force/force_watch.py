@@ -104,9 +104,17 @@ class Oscillation:
         """There is nothing to see yet."""
         self._turns, self._faint = Turns(), Turns()
 
-    def step(self, force: float, desired: float, own: ForceLoopParameters, dt: float) -> Event | None:
-        """The event of one period."""
-        least, window = own.limits.cycle_force * abs(desired), own.limits.settling_time
+    def step(self, force: float, desired: float, sd: float, own: ForceLoopParameters, dt: float) -> Event | None:
+        """The event of one period.
+
+        Parameters
+        ----------
+        force, desired : measured and commanded, N or N m.
+        sd : by which the sensors disturb the measured force; a swing within `FORCE.certain` of it to each side is none.
+        own : parameters of the force loop.
+        dt : s.
+        """
+        least, window = max(own.limits.cycle_force * abs(desired), 2.0 * FORCE.certain * sd), own.limits.settling_time
         count = self._turns.step(force, least, window, dt)
         # a cycle that grows is seen late, and with a wrong size; one that is slower than the loop is not its own
         faint = self._faint.step(force, FORCE.faint_swing * least, FORCE.turns * rise_time(own), dt)
@@ -190,7 +198,9 @@ class ForceWatch:
         self._has_settled = self._has_settled or (is_reached and not self._off.is_on)
         events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
-            events += filter(None, [self.oscillation.step(known.force, desired, own, dt)])
+            sd = own.sensing.torque_sd
+            sd = axis.sensed.error(np.full(len(torques), sd)) if axis.sensed else sd
+            events += filter(None, [self.oscillation.step(known.force, desired, sd, own, dt)])
         else:
             self.oscillation.rest()
         return events
