@@ -12,10 +12,13 @@ from wam_description.reasons import Reason
 REASONS: Final = {
     Reason.MOMENT_ONLY: "only the moment is measured on this link: the contact position is unknown, the force is a "
     "lower bound",
-    Reason.POSITION: "the torques do not identify the contact position: they are small, or the elbow is straight or at "
-    "90 deg",
-    Reason.LINKS: "the torques do not identify the link: they are small, the elbow is straight, or the contact is near "
-    "it",
+    Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
+    Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
+    Reason.SHOULDER: "the axes of the shoulder leave one of its moments unmeasured in this pose",
+    Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
+    Reason.ELBOW: "torque of the elbow near 0: a contact there and one on the inner link cannot be distinguished",
+    Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
+    Reason.LINKS: "the torques do not identify the link",
     Reason.MORE: "one contact does not explain the torques",
     Reason.ALONG: "the force may act along the link: then its torques are the same at every position, and on the link "
     "before",

@@ -145,12 +145,12 @@ def test_a_push_on_the_inner_link_is_told_from_one_on_the_outer() -> None:
 
 POSE_BENT = (0.25, -1.3, 0.0, 1.0)
 AMBIGUOUS = [
-    ((0.3, -1.0, 0.2, 0.0), "outer_link", (0.28, 0, 0), (0, 6, 0), Reason.POSITION),
-    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 6), Reason.POSITION),
-    ((0.3, 0.0, math.pi / 2, 0.5), "outer_link", (0.28, 0, 0), (0, 6, 0), Reason.POSITION),
-    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 3), Reason.LINKS),
-    (POSE, "outer_link", (0.0, 0, 0), (0, 0, 6), Reason.LINKS),
-    (POSE_BENT, "inner_link", (0.5, 0, 0.5 * 0.04064 / L3), (0, 0, 6), Reason.LINKS),
+    ((0.3, -1.0, 0.2, 0.0), "outer_link", (0.28, 0, 0), (0, 6, 0), Reason.BENT),
+    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 6), Reason.STRAIGHT),
+    ((0.3, 0.0, math.pi / 2, 0.5), "outer_link", (0.28, 0, 0), (0, 6, 0), Reason.SHOULDER),
+    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 3), Reason.STRAIGHT_LINK),
+    (POSE, "outer_link", (0.0, 0, 0), (0, 0, 6), Reason.ELBOW),
+    (POSE_BENT, "inner_link", (0.5, 0, 0.5 * 0.04064 / L3), (0, 0, 6), Reason.ELBOW),
     (POSE, "inner_link", (0.3, 0, 0), (0, 6, 0), Reason.MOMENT_ONLY),
 ]
 
@@ -183,7 +183,7 @@ def test_unknown_places_always_have_a_reason_and_the_least_force() -> None:
 def test_a_place_lost_in_noise_leaves_the_force_that_the_longest_lever_needs() -> None:
     tau = torques(POSE, "outer_link", (0.2, 0, 0), (0, 2, 0))
     outer = of(INFERENCE.infer(POSE, tau.tolist(), np.eye(4) / 1.0**2), "outer_link")
-    assert Reason.POSITION in outer.reasons
+    assert Reason.WEAK in outer.reasons
     levers = torques(POSE, "outer_link", (L4, 0, 0), (0, 1, 0))
     assert outer.force[1] == pytest.approx(levers @ tau / (levers @ levers), rel=0.03)
 
@@ -291,14 +291,16 @@ def test_a_single_joint_reports_what_it_measures() -> None:
     inference = ContactInference(arm, RigidBody(arm), dataclasses.replace(PARAMETERS, weights=(1.0,)))
     (found,) = inference.infer([0.4], [1.2], np.array([[SD**-2]]))
     assert found.cover == "outer_link"
-    assert found.probability == pytest.approx(1.0)
+    assert found.probability == 1.0
     assert math.isnan(found.position)
     assert Reason.MOMENT_ONLY in found.reasons
     assert found.moment == pytest.approx((0.0, 0.0, 1.2), rel=0.01)
     assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)
 
 
-@pytest.mark.parametrize(("q", "cover", "point", "force", "reason"), AMBIGUOUS)
+@pytest.mark.parametrize(
+    ("q", "cover", "point", "force", "reason"), [case for case in AMBIGUOUS if case[4] != Reason.SHOULDER]
+)
 def test_reasons_follow_from_the_arms_structure_and_not_from_a_number_of_joints(
     q: tuple[float, ...], cover: str, point: tuple[float, ...], force: tuple[float, ...], reason: Reason
 ) -> None:
@@ -315,7 +317,7 @@ def test_a_shoulder_of_two_axes_leaves_a_moment_unmeasured_in_every_pose(theta3:
     q, tau = (-1.0, theta3, 0.5), torques((0.0, -1.0, theta3, 0.5), "outer_link", (0.2, 0, 0), (0, 0.6, 0))[1:]
     inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
     found = of(inference.infer(q, tau.tolist(), np.eye(3) / 0.3**2), "outer_link")
-    assert Reason.POSITION in found.reasons
+    assert Reason.SHOULDER in found.reasons
 
 
 @pytest.mark.slow
@@ -395,14 +397,16 @@ def test_odds_of_a_force_along_the_tube_are_those_of_quadrature() -> None:
     tau = torques(q, "outer_link", (L4, 0, 0), (-4, 1, 0)) + np.array([0.05, -0.05, 0.03, -0.02])
     axial = torques(q, "outer_link", (L4, 0, 0), (1, 0, 0))
     assert np.linalg.norm(axial) > 0.1
-    ahead, one, two = (torques(q, "outer_link", (L4, 0, 0), e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    scale, precision = PARAMETERS.force_scale, np.linalg.inv(COARSE)
-    size = abs(tau @ precision @ ahead) / (ahead @ precision @ ahead + scale**-2)
+    columns = [tau, *(torques(q, "outer_link", (L4, 0, 0), e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))]
+    rows = np.zeros((7, 4))
+    rows[:4] = columns
+    g, scale = rows @ np.linalg.inv(COARSE) @ rows.T, PARAMETERS.force_scale
+    size = abs(g[0, 1]) / (g[1, 1] + scale**-2)
     logs = []
     for lean in CONTACT.end_slopes:
-        rows = np.array((tau, scale * ahead, lean * size * one, lean * size * two))
-        logs.append(contact_fit.log_evidence(rows @ precision @ rows.T))
-    found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * tau @ precision @ tau
+        ((rr, ra), (_, aa)), volume = contact_fit.widened(g.tolist(), [(2, lean * size)], [(3, lean * size)], slice(2))
+        logs.append(contact_fit.log_evidence(rr, ra, aa, scale) - 0.5 * volume)
+    found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * g[0, 0]
     assert found == pytest.approx(along_by_quadrature(q, tau), abs=1e-3)
 
 
@@ -426,6 +430,18 @@ def test_certain_torques_of_a_pose_that_is_nearly_singular_are_explained() -> No
     best = INFERENCE.infer(q, tau, np.diag([1e12, 50.0, 1e12, 1e12]))[0]
     assert best.cover == "outer_link"
     assert best.position == pytest.approx(0.376, abs=0.01)
+
+
+def test_evidence_is_finite_where_rounding_would_make_a_determinant_negative() -> None:
+    g = np.zeros((7, 7))
+    g[:4, :4] = [
+        [1e3, 1e3, 1e6, 1e6],
+        [1e3, 1e3, 1e9, 1e9],
+        [1e6, 1e9, 1e12, 1e12],
+        [1e6, 1e9, 1e12 * (1 + 1e-13), 1e12],
+    ]
+    wide, volume = contact_fit.widened(g.tolist(), [(2, 5.0)], [(3, 5.0)], slice(2))
+    assert np.isfinite([*wide[0], *wide[1], volume]).all()
 
 
 def test_a_place_is_not_between_those_of_a_push_from_the_side_and_of_one_on_the_end() -> None:

@@ -158,10 +158,10 @@ def test_the_friction_of_a_shaft_that_creeps_back_is_uncertain_before_it_reaches
     rest = OWN.motor_rest_velocity
     sizes = {}
     for keep in (0.97, 0.0):
-        shafts = ShaftFriction(ARM, OWN, None)
+        shafts = ShaftFriction(ARM.motors, OWN, rest)
         for _ in range(400):
-            shafts.of([40.0 * rest] * 8, keep, DT)
-        sizes[keep] = [shafts.of([speed * rest] * 8, keep, DT).shape[0] for speed in (0.9, -0.9)]
+            shafts.of([40.0 * rest] * 4, keep, DT)
+        sizes[keep] = [shafts.of([speed * rest] * 4, keep, DT).shape[0] for speed in (0.9, -0.9)]
     ahead, back = sizes[0.97]
     assert ahead < 1.0
     assert back > 4.0

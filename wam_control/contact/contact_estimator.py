@@ -124,16 +124,12 @@ class ContactEstimator:
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._fusion = ContactFusion(parameters.inference.fusion_time)
-        self._pressed_at: Array | None = None  # rad, where the arm presses or last pressed; None once it has left
-        self._is_blind, self.refused = False, 0
-        self._forget()
-
-    def _forget(self) -> None:
-        self._fusion.reset()
-        self._in_contact = self._is_above = False
+        self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
         # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
         self._before: tuple[float, list[float], float] = 0.0, [], 0.0
+        self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
+        self.refused = 0
 
     def brake(self, on: bool) -> None:
         """Set whether brakes hold the motors, whose torques then carry no information."""
@@ -146,7 +142,10 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
-        self._forget()
+        self._before = 0.0, [], 0.0
+        self._fusion.reset()
+        self._in_contact = self._is_above = False
+        self._ended = -math.inf
 
     def restarted_copy(self) -> "ContactEstimator":
         """Another one that has seen no sample, but knows what this one has learned and keeps at a `reset`."""
@@ -191,7 +190,9 @@ class ContactEstimator:
         torques = tuple(residual)
         sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
-            self._forget()
+            self._in_contact = self._is_above = False
+            self._ended = -math.inf
+            self._fusion.reset()
             reason = Reason.BRAKED if self._is_blind else Reason.TOO_EARLY
             return ContactEstimate(torques, sd, 0.0, False, reasons=reason)
         precision = inverse(covariance)
@@ -211,9 +212,8 @@ class ContactEstimator:
                 self._fusion.reset()
             return ContactEstimate(torques, sd, statistic, False, warning=observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        hypotheses = self._inference.infer(
-            observer.seen.pose, torques, precision, load, self._fusion, observer.moment()
-        )
+        now = observer.moment() if parameters.inference.fusion_time else None
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
         best = hypotheses[0]
         return ContactEstimate(
@@ -237,20 +237,22 @@ class ContactEstimator:
         """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
         then, before, late = self._before
         passed = self._observer.age - then
+        if before and not passed:
+            return late
+        late, change = 0.0, float(precision.dot(torques).dot(np.subtract(torques, before or torques)))
         if passed > 0.0:
-            change = abs(float(precision.dot(torques).dot(np.subtract(torques, before or torques))))
-            late = self._delay / passed * change / max(statistic, CONTACT.smallest_statistic)
-            self._before = self._observer.age, torques, late
+            late = self._delay / passed * abs(change) / max(statistic, CONTACT.smallest_statistic)
+        self._before = self._observer.age, torques, late
         return late
 
     def _is_touched(self, is_pressing: bool) -> bool:
         """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
         q, at = self._observer.q, self._pressed_at
-        if is_pressing and (self._in_contact or at is not None):
+        if is_pressing and (self._in_contact or at):
             self._pressed_at = q
-        elif at is not None and np.abs(at - q).max() > MOTION.left_angle:
-            self._pressed_at = None
-        return self._in_contact or self._pressed_at is not None
+        elif at and any(abs(a - b) > MOTION.left_angle for a, b in zip(at, q, strict=True)):
+            self._pressed_at = []
+        return self._in_contact or bool(self._pressed_at)
 
     def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above

@@ -11,26 +11,28 @@ Every hypothesis explains the torques r by some torques C of forces with normal 
 
 All that is needed of arm and torques are inner products, weighted with the inverse of the covariance S: the Gram matrix
 of Z = (r, A_1, A_2, B_1, B_2, t, a), 7 by 7.  With S' it is G - U (1 + V)^-1 U^T, U = Z^T S^-1 C, V = C^T S^-1 C
-(Woodbury).  That of (r, C) alone gives log p: with 1 added to the variance of each of C, its determinant is |1 + V|
-times r^T S'^-1 r.
+(Woodbury).
 """
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
-from wam_description.small_matrices import inverse
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Gram = list[list[float]]
+Torques = Sequence[tuple[int, float]]  # a sum of columns of Z: index and factor of each
 TWIST, AXIAL = 5, 6  # among these columns
+# a piece of a link: log of the probability density of a contact, per metre; position and width, m; link; whether it is
+# that of a force along the tube
+Piece = tuple[float, float, float, int, bool]
 
 
 class Fit(NamedTuple):
@@ -67,15 +69,48 @@ class Fit(NamedTuple):
     residual: float
 
 
-def log_evidence(gram: Array) -> Array:
-    """Log of the probability of torques r by torques C of unit variance, up to the constant -1/2 log |S|.
+def widened(gram: Gram, one: Torques, two: Torques, kept: slice) -> tuple[Gram, float]:
+    """Gram matrix, and log |S'| / |S|, if two torques of unit variance are in the covariance, too.
 
-    `gram` (..., k, k) is that of (r, C).
+    Of the Gram matrix only the rows and columns `kept` are computed.
     """
-    wide = gram + np.diag([0.0] + [1.0] * (gram.shape[-1] - 1))
-    whole, volume = (np.linalg.slogdet(part)[1] for part in (wide, wide[..., 1:, 1:]))
-    found: Array = -0.5 * (np.exp(whole - volume) + volume)
+    u, v = _products(gram, one), _products(gram, two)
+    w11, w12 = 1.0 + sum([part * u[i] for i, part in one]), sum([part * u[i] for i, part in two])
+    w22 = 1.0 + sum([part * v[i] for i, part in two])
+    determinant = max(w11 * w22 - w12 * w12, w11 + w22 - 1.0)  # at least this, but for rounding
+    u, v, w11, w12, w22 = u[kept], v[kept], w11 / determinant, w12 / determinant, w22 / determinant
+    found = []
+    for row, a, b in zip(gram[kept], u, v):  # noqa: B905
+        p, q = w22 * a - w12 * b, w11 * b - w12 * a
+        found.append([g - p * x - q * y for g, x, y in zip(row[kept], u, v)])  # noqa: B905
+    return found, math.log(determinant)
+
+
+def _products(gram: Gram, torques: Torques) -> list[float]:
+    """Inner products of torques with all columns of Z."""
+    (i, part), *more = torques
+    found = [part * g for g in gram[i]]
+    for i, part in more:
+        found = [a + part * g for a, g in zip(found, gram[i])]  # noqa: B905
     return found
+
+
+def log_evidence(rr: float, ra: float, aa: float, scale: float) -> float:
+    """Log of the probability of torques r by a force of the torques a per newton, up to the constant -1/2 log |S|.
+
+    Parameters
+    ----------
+    rr, ra, aa : their inner products.
+    scale : prior standard deviation of the force, N.
+    """
+    wide = aa + scale**-2
+    return -0.5 * (rr - ra * ra / wide + math.log(wide * scale * scale))
+
+
+def log_evidence_of_weight(rr: float, ra: float, aa: float, scale: float) -> float:
+    """The same for a force of one sign: twice the probability that it is positive."""
+    positive = 0.5 * math.erfc(-ra / math.sqrt(2.0 * (aa + scale**-2)))
+    return log_evidence(rr, ra, aa, scale) + math.log(2.0 * max(positive, CONTACT.least_chance))
 
 
 class _Link(NamedTuple):
@@ -102,8 +137,8 @@ class _Link(NamedTuple):
         terms = (*n11, *n12, a2[2] + precision, 2.0 * a2[4], b2[4], r[1], r[3], 0.0, r[2], r[4], 0.0)
         return cls(gram, precision, math.log(precision) - 0.5 * (r[0] + volume), terms)
 
-    def force(self, x: Any) -> Any:
-        """Most likely force at x, the part of r^T W r that it explains, its covariance 11, 12, 22; for arrays, too."""
+    def force(self, x: float) -> tuple[Pair, float, Triple]:
+        """Most likely force at position x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
         p0, p1, p2, q0, q1, q2, s0, s1, s2, c0, c1, _, e0, e1, _ = self.terms
         n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
         torque1, torque2 = c0 + x * c1, e0 + x * e1
@@ -111,25 +146,36 @@ class _Link(NamedTuple):
         f1, f2 = (n22 * torque1 - n12 * torque2) / determinant, (n11 * torque2 - n12 * torque1) / determinant
         return (f1, f2), f1 * torque1 + f2 * torque2, (n22 / determinant, -n12 / determinant, n11 / determinant)
 
-    def log_density(self, x: Array) -> Array:
-        """Log of the probability of the torques for a contact at positions x."""
+    def log_density(self, x: float) -> float:
+        """Log of the probability of the torques for a contact at x, up to a constant of the link."""
         _, explained, (s11, s12, s22) = self.force(x)
-        found: Array = 0.5 * (explained + np.log(s11 * s22 - s12 * s12)) + self.constant
-        return found
+        return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
 
     def torque_position_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the position, m, by the torques alone, the force unknown: a Schur complement.
 
         Not by a pseudo-inverse of the whole information, which is small exactly where the position is undetermined.
         """
+        p0, p1, p2, q0, q1, q2, s0, s1, s2, *_ = self.terms
         _, a1, a2, b1, b2 = self.gram[:5]
-        f1, f2 = force
-        _, _, (s11, s12, s22) = _Link.of(self.gram, self.precision * CONTACT.weak_prior, 0.0).force(x)
+        (f1, f2), less = force, self.precision * (1.0 - CONTACT.weak_prior)
+        n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
         v1 = f1 * (a1[3] + x * b1[3]) + f2 * (a1[4] + x * b1[4])
         v2 = f1 * (a2[3] + x * b1[4]) + f2 * (a2[4] + x * b2[4])
-        known = v1 * v1 * s11 + 2.0 * v1 * v2 * s12 + v2 * v2 * s22
+        known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
         information = f1 * f1 * b1[3] + 2.0 * f1 * f2 * b1[4] + f2 * f2 * b2[4] - known
-        return float(information) ** -0.5 if information > 0.0 else math.inf
+        return information**-0.5 if information > 0.0 else math.inf
+
+
+class _Part:
+    """Pieces of a link: sums of their weights, these times position, m, and square, m^2; ends of the 90 % set, m."""
+
+    def __init__(self, start: float, end: float) -> None:
+        # of a link without any piece the position is unknown
+        self.mass, self.first = CONTACT.least_chance, 0.5 * CONTACT.least_chance * (start + end)
+        self.second = CONTACT.least_chance * (start * start + start * end + end * end) / 3.0
+        self.along = self.first_along = 0.0
+        self.low = self.high = math.nan
 
 
 class ContactFit:
@@ -148,28 +194,13 @@ class ContactFit:
     def __init__(
         self, start: Sequence[float], end: Sequence[float], radius: Sequence[float], parameters: InferenceParameters
     ) -> None:
-        given = self._given = parameters
-        count, tip, slopes = given.positions, CONTACT.end_length, np.array(CONTACT.end_slopes)
-        self._ends, self._radius = list(zip(start, end, strict=True)), list(radius)
-        self._steps = (np.arange(count) + 0.5) / count  # the middle of each
-        # of each piece: weight, then log of the frequency of contacts, per metre; position, width, m; link
-        pieces = []
-        for i, ((low, high), weight) in enumerate(zip(self._ends, given.weights, strict=True)):
-            pieces += [(weight / count, low, (high - low) / count, i)] * count
-            pieces.append((given.end_weight * (i > 0), low, tip, i))
-            pieces.append((given.end_weight * (i + 1 < len(self._ends)), high, tip, i))
-        pieces.append((given.along_weight, 0.5 * (low + high), high - low, i))
-        pieces += [(given.along_weight / len(slopes), high, tip, i)] * len(slopes)
-        self._pieces = np.array(pieces).T
-        self._of = 1.0 * (np.arange(i + 1)[:, None] == self._pieces[3])  # (links, pieces): 1 for those of each link
-        self._pieces[0] = np.log(np.maximum(self._pieces[0] / self._pieces[2], CONTACT.least_chance))
-        # by force along the last link: r, torques if its line is not the axis, in both directions across it, its own
-        self._is_along = np.arange(-len(pieces), 0) >= -1 - len(slopes)
-        self._along = np.zeros((1 + len(slopes), 7, 4))
-        self._along[:, 0, 0] = self._along[:, AXIAL, 3] = 1.0
-        self._along[0, 3, 1] = self._along[0, 4, 2] = math.sqrt(0.5) * radius[-1]
-        for i in (1, 2):
-            self._along[1:, i, i], self._along[1:, i + 2, i] = slopes, slopes * high
+        self._given, self._radius, self._ends = parameters, list(radius), list(zip(start, end, strict=True))
+        # logs of the frequency of contacts per metre
+        self._frequency = [math.log(w / (b - a)) for (a, b), w in zip(self._ends, parameters.weights, strict=True)]
+        steps = (np.arange(parameters.positions) + 0.5) / parameters.positions  # the middle of each
+        row = np.array([a + (b - a) * steps for a, b in self._ends])
+        self._row = row.tolist()
+        self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
 
     def __call__(self, gram: Array, other: float = -math.inf) -> list[Fit]:
         """Fit a contact to each link.
@@ -179,74 +210,126 @@ class ContactFit:
         gram : (links, 7, 7), Z^T S^-1 Z for each link.
         other : log of the probability of the torques, with its weight, if no contact but something else explains them.
         """
-        links = self._links(gram)
-        value, place, width, _ = self._on_links(links, gram[-1])
-        top = float(value.max())
-        weight = np.exp(np.maximum(value - top, -CONTACT.largest_exponent)) * width
-        # half of each piece that is in the set, the most probable first; of the last one only what fills it
-        order, room = np.argsort(-value), np.empty_like(weight)
-        room[order] = CONTACT.reported_probability * weight.sum() - weight[order].cumsum()
-        half = 0.5 * width * np.clip(room / weight + 1.0, 0.0, 1.0)
-        is_in = self._of * half > 0.0
-        low, high = np.where(is_in, place - half, math.inf), np.where(is_in, place + half, -math.inf)
-        along = weight * self._is_along
-        sums = weight, weight * place, weight * (place * place + width * width / 12.0), along, along * place
-        parts = self._of @ np.array(sums).T
-        total = float(weight.sum()) + math.exp(min(other - top, CONTACT.largest_exponent))
-        found = zip(links, parts.tolist(), low.min(axis=1).tolist(), high.max(axis=1).tolist(), self._ends, strict=True)
-        return [self._fit(*each, total) for each in found]
+        grams: list[Gram] = gram.tolist()
+        links = [self._link(i, one) for i, one in enumerate(grams)]
+        pieces = self._along(len(grams) - 1, grams[-1])
+        for i, (link, values) in enumerate(zip(links, self._log_density(links), strict=True)):
+            pieces += self._grid(i, link, values)
+            pieces += self._at_ends(i, link)
+        floor = max(pieces)[0] - CONTACT.search_depth
+        pieces = [piece for piece in pieces if piece[0] > floor]
+        pieces.sort(reverse=True)
+        parts, total = self._parts(pieces)
+        total += math.exp(min(other - pieces[0][0], CONTACT.largest_exponent))
+        return [self._fit(link, part, total, ends) for link, part, ends in zip(links, parts, self._ends, strict=True)]
 
-    def _links(self, gram: Array) -> list[_Link]:
-        """The links with the tangential force in the covariance, of the size at the likeliest of some places.
+    def _link(self, i: int, gram: Gram) -> _Link:
+        """A link with the tangential force in the covariance, of the size at the likeliest of some places.
 
         Twist: the line of the force has a moment arm about the axis.  Axial: a friction force along the surface, one
         radius off the axis.
         """
-        given, columns, precisions = self._given, np.zeros((len(gram), 7, 2)), []
-        for i, (one, (start, end), radius) in enumerate(zip(gram.tolist(), self._ends, self._radius, strict=True)):
-            link = _Link.of(one, given.force_scale**-2, 0.0)
-            found = [link.force(start + (end - start) * part) for part in (1 / 6, 1 / 2, 5 / 6)]
-            largest = max([(explained, math.hypot(*force)) for force, explained, _ in found])[1]
-            _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for force, each, s in found])
-            size, turn = math.hypot(f1, f2) + CONTACT.smallest_force, given.friction * radius
-            columns[i, TWIST, 0] = given.moment_arm_offset * radius * size
-            columns[i, 3:, 1] = turn * f1, turn * f2, 0.0, given.friction * size
-            precisions.append(min(link.precision, 1.0 / (largest * largest + CONTACT.smallest_force)))
-        products = gram @ columns
-        inner = np.eye(2) + columns.transpose(0, 2, 1) @ products
-        wide = gram - products @ inverse(inner) @ products.transpose(0, 2, 1)
-        volume = np.linalg.slogdet(inner)[1]
-        return [_Link.of(*each) for each in zip(wide.tolist(), precisions, volume.tolist(), strict=True)]
+        given, radius, (start, end) = self._given, self._radius[i], self._ends[i]
+        precision = given.force_scale**-2
+        link = _Link.of(gram, precision, 0.0)
+        found = [link.force(start + (end - start) * part) for part in (1 / 6, 1 / 2, 5 / 6)]
+        largest = max([(explained, math.hypot(*force)) for force, explained, _ in found])[1]
+        _, (f1, f2) = max([(each + math.log(s[0] * s[2] - s[1] * s[1]), force) for force, each, s in found])
+        size, turn = math.hypot(f1, f2) + CONTACT.smallest_force, given.friction * radius
+        twist = [(TWIST, given.moment_arm_offset * radius * size)]
+        axial = [(AXIAL, given.friction * size), (3, turn * f1), (4, turn * f2)]
+        wide, volume = widened(gram, twist, axial, slice(5))
+        return _Link.of(wide, min(precision, 1.0 / (largest * largest + CONTACT.smallest_force)), volume)
 
-    def _on_links(self, links: Sequence[_Link], gram: Array) -> Array:
-        """The pieces, (4, pieces), with the log of the density; where a peak is narrow, those of the grid are in it."""
-        pieces, count = self._pieces.copy(), len(self._steps)
-        for i, link in enumerate(links):
-            low, high = self._ends[i]
-            value, x, width, _ = pieces[:, i * (count + 2) : (i + 1) * (count + 2)]
-            for _ in range(1 + CONTACT.refinements):
-                width[:count] = step = (high - low) / count
-                x[:count] = low + (high - low) * self._steps
-                density = link.log_density(x)
-                likely = x[:count][density[:count] > density[:count].max() - CONTACT.search_depth]
-                if len(likely) >= CONTACT.few_positions:
-                    break
-                low, high = max(likely[0] - step, low), min(likely[-1] + step, high)
-            value += density
-        # a force along the tube equals the same force at its start: no joint torques distinguish them
-        scale = self._given.force_scale
-        size = abs(float(gram[0, AXIAL])) / (float(gram[AXIAL, AXIAL]) + scale**-2) + CONTACT.smallest_force
-        basis = self._along * (1.0, size, size, max(scale, size))
-        pieces[0, -len(basis) :] += log_evidence(basis.transpose(0, 2, 1) @ gram @ basis)
-        return pieces
+    def _log_density(self, links: Sequence[_Link]) -> list[list[float]]:
+        """`_Link.log_density` of all pieces of the grid."""
+        terms = np.array([link.terms for link in links]).reshape(-1, 5, 3) @ self._powers
+        n11, n12, n22, c1, c2 = terms.transpose(1, 0, 2)
+        determinant = n11 * n22 - n12 * n12
+        explained = (n22 * c1 * c1 - 2.0 * n12 * c1 * c2 + n11 * c2 * c2) / determinant
+        found: list[list[float]] = (0.5 * (explained - np.log(determinant))).tolist()
+        return found
 
-    def _fit(self, link: _Link, part: list[float], low: float, high: float, ends: Pair, total: float) -> Fit:
-        (mass, first, second, along, first_along), (start, end) = part, ends
-        place = first_along / along if along > 0.5 * mass else (first - first_along) / (mass - along)
+    def _grid(self, i: int, link: _Link, values: list[float]) -> list[Piece]:
+        """Pieces with a contact from the side; a peak that is narrower than some is divided into pieces of its own."""
+        x, (start, end) = self._row[i], self._ends[i]
+        width = (end - start) / len(x)
+        for refined in range(CONTACT.refinements + 1):
+            floor = max(values) - CONTACT.search_depth
+            likely = [(value, place) for value, place in zip(values, x) if value > floor]  # noqa: B905
+            if len(likely) >= CONTACT.few_positions or refined == CONTACT.refinements:
+                break
+            low, high = max(likely[0][1] - width, start), min(likely[-1][1] + width, end)
+            width = (high - low) / CONTACT.peak_positions
+            x = [low + (k + 0.5) * width for k in range(CONTACT.peak_positions)]
+            values = [link.log_density(place) for place in x]
+        constant = link.constant + self._frequency[i]
+        return [(value + constant, place, width, i, False) for value, place in likely]
+
+    def _at_ends(self, i: int, link: _Link) -> list[Piece]:
+        """A contact where two links meet, which is more frequent there than elsewhere along them."""
+        (start, end), width, weight = self._ends[i], CONTACT.end_length, self._given.end_weight
+        if not weight:
+            return []
+        constant = link.constant + math.log(weight / width)
+        places = [start + 0.5 * width] * (i > 0) + [end - 0.5 * width] * (i + 1 < len(self._ends))
+        return [(link.log_density(x) + constant, x, width, i, False) for x in places]
+
+    def _along(self, i: int, gram: Gram) -> list[Piece]:
+        """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
+
+        A force along the tube equals the same force at its start: no joint torques distinguish them.
+        """
+        scale, weight, (start, end) = self._given.force_scale, self._given.along_weight, self._ends[i]
+        if not weight:
+            return []
+        size = abs(gram[0][AXIAL]) / (gram[AXIAL][AXIAL] + scale**-2) + CONTACT.smallest_force
+        arm, length, found = math.sqrt(0.5) * self._radius[i] * size, end - start, []
+        pieces = [([(3, arm)], [(4, arm)], start + 0.5 * length, length, 1)]
+        for slope in CONTACT.end_slopes:
+            lean, far = slope * size, slope * size * end
+            pieces.append(
+                ([(1, lean), (3, far)], [(2, lean), (4, far)], end, CONTACT.end_length, len(CONTACT.end_slopes))
+            )
+        for one, two, x, width, count in pieces:
+            ((rr, ra), (_, aa)), volume = widened(gram, one, two, slice(0, None, AXIAL))
+            value = log_evidence(rr, ra, aa, max(scale, size)) - 0.5 * volume
+            found.append((value + math.log(weight / (count * width)), x, width, i, True))
+        return found
+
+    def _parts(self, pieces: list[Piece]) -> tuple[list[_Part], float]:
+        """What the pieces, the most probable first, are of each link, and the sum of their weights."""
+        top = pieces[0][0]
+        weighted = [(math.exp(value - top) * width, x, width, i, is_along) for value, x, width, i, is_along in pieces]
+        total, passed = sum([each[0] for each in weighted]), 0.0
+        enough, parts = CONTACT.reported_probability * total, [_Part(*ends) for ends in self._ends]
+        for weight, x, width, i, is_along in weighted:
+            part = parts[i]
+            part.mass += weight
+            part.first += weight * x
+            part.second += weight * (x * x + width * width / 12.0)
+            if is_along:
+                part.along += weight
+                part.first_along += weight * x
+            if passed < enough:
+                passed += weight
+                low, high = x - 0.5 * width, x + 0.5 * width
+                # of the last one what fills the set, on the side of the others; an end is not divided
+                if passed > enough and width != CONTACT.end_length:
+                    unused = width * (passed - enough) / weight
+                    below = 0.5 if math.isnan(part.low) else float(x > part.low)
+                    low, high = low + (1.0 - below) * unused, high - below * unused
+                part.low, part.high = min(low, part.low), max(high, part.high)  # of a NaN the first one is taken
+        return parts, total
+
+    def _fit(self, link: _Link, part: _Part, total: float, ends: Pair) -> Fit:
+        start, end = ends
+        is_along, rest = part.along > 0.5 * part.mass, part.mass - part.along
+        place = part.first_along / part.along if is_along else (part.first - part.first_along) / rest
         place = min(max(place, start), end)
-        variance = max(0.0, (second - 2.0 * place * first) / mass + place * place)
+        variance = max(0.0, (part.second - 2.0 * place * part.first) / part.mass + place * place)
         force, explained, (s11, s12, s22) = link.force(place)
-        step = 0.5 * (end - start) / len(self._steps)
+        step = 0.5 * (end - start) / len(self._row[0])
         ahead, _, _ = link.force(place + step)
         d1, d2 = (ahead[0] - force[0]) / step, (ahead[1] - force[1]) / step
         size = math.hypot(*force) + CONTACT.smallest_force
@@ -255,12 +338,12 @@ class ContactFit:
         radial = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22
         return Fit(
-            probability=mass / total,
+            probability=part.mass / total,
             position=place,
             position_sd=math.sqrt(variance),
-            low=max(low, start) if low < high else math.nan,
-            high=min(high, end) if low < high else math.nan,
-            along=along / mass,
+            low=max(part.low, start),
+            high=min(part.high, end),
+            along=part.along / part.mass,
             force=force,
             force_sd=math.sqrt(radial),
             direction_sd=min(math.sqrt(about) / size, math.pi),

@@ -162,30 +162,38 @@ class ContactFusion:
             self._past = self._of(list(moments), now, np.array(guess)) if moments else None
 
     def _of(self, moments: list[_Seen], now: Torques, guess: Array) -> _Past:
-        n, last, count = len(now.residual), moments[-1].torques, len(moments)
-        each, torques = np.arange(count), [moment.torques for moment in moments]
-        effects = np.concatenate([at.effects for at in torques])
+        n, last = len(now.residual), moments[-1].torques
+        effects = np.concatenate([moment.torques.effects for moment in moments])
         shared = effects @ last.covariance
         common = shared @ effects.T
-        common.reshape(count, n, count, n)[each, :, each] += np.array([at.own for at in torques])
         places, chances = guess[:, 0], np.sqrt(guess[:, 1])
-        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
-        found = rows[: len(places)]
-        sides, slopes = _sides(found[:, :, -1:], places)
+        found, count = len(places), len(moments)
+        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
+        for j, moment in enumerate(moments):
+            rows[:, :, j] = moment.rows
+        sides, slopes = _sides(rows[:found, :, -1:], places)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
         forces = solutions(levers, present @ last.residual)  # (links, 3), N
-        moved = CONTACT.slip * np.abs(np.array([at.pose for at in torques]) - now.pose).max(axis=1)
-        elapsed = now.time + CONTACT.moves_on - np.array([at.time for at in torques])
+        moved = CONTACT.slip * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
+        elapsed = np.array([now.time + CONTACT.moves_on - moment.torques.time for moment in moments])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
-        ways = np.multiply.outer(moved + self._speed * elapsed, slope)
-        certain = common[-n:, -n:]
-        sizes = [_grown(at.residual, last.residual, certain, way) for at, way in zip(torques, ways, strict=True)]
+        certain = common[-n:, -n:] + last.own
+        ways = (moved + self._speed * elapsed).tolist()
+        sizes = [
+            _grown(moment.torques.residual, last.residual, certain, way * slope)
+            for moment, way in zip(moments, ways, strict=True)
+        ]
         rows[:, 1:] *= np.array(sizes)[:, None]
-        sides, slopes = _sides(found, places)
+        sides, slopes = _sides(rows[:found], places)
+        for j, moment in enumerate(moments):
+            common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
         covariance = common.copy()
         turned = sides * (chances * CONTACT.force_turn * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
-        covariance.reshape(count, n, count, n)[each, :, each] += np.einsum("lkjn,lkjm->jnm", turned, turned)
+        for j in range(count):
+            of = slice(n * j, n * j + n)
+            side = turned[:, :, j].reshape(-1, n)
+            covariance[of, of] += side.T @ side
         per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
         link = int(chances.argmax())
         unknown = np.concatenate(
@@ -196,13 +204,13 @@ class ContactFusion:
             )
         )
         slides = probability_of_slide(
-            np.concatenate([at.residual for at in torques]),
+            np.concatenate([moment.torques.residual for moment in moments]),
             self._widening * (covariance + unknown.T @ unknown),
             CONTACT.slide_speed * (per_metre[link] * elapsed[:, None]).reshape(-1),
         )
         self._speed = _speed(slides)
         far = np.multiply.outer(chances, moved + self._speed * elapsed)
-        slips = (per_metre * far[:, :, None]).reshape(len(places), -1)
+        slips = (per_metre * far[:, :, None]).reshape(found, -1)
         covariance += slips.T @ slips
         rows = rows.reshape(len(rows), 7, count * n)
         precision = inverse(covariance)

@@ -7,12 +7,13 @@ moment only.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence
+from wam_control.contact.contact_fit import ContactFit, Fit, log_evidence_of_weight
 from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
@@ -25,6 +26,9 @@ from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
+
+# how close to an ambiguous pose or direction that is given as the reason, and to one at right angles
+NEAR, FAR = math.cos(math.radians(20.0)), math.sin(math.radians(20.0))
 
 
 class Hypothesis(NamedTuple):
@@ -67,9 +71,11 @@ class Hypothesis(NamedTuple):
 
 class _Cover(NamedTuple):
     name: str
-    start: float  # m, ends of the tube along the cover's x axis
-    end: float
+    start: list[float]  # (3,), m, ends of the tube's axis in the cover's frame
+    end: list[float]
     wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
+    across: list[list[float]]  # (3, 2), directions across the tube, near the cover's y and z
+    joints: int  # number of joints that move the cover
     is_moment_only: bool
 
 
@@ -82,19 +88,35 @@ def detection_statistic(torques: Sequence[float], precision: Array) -> float:
 class ContactInference:
     """Gives one hypothesis per cover, from the probabilities of contact positions along it.
 
-    Any joints, links and covers will do.
+    Any joints, links and covers will do.  Where joints meet in a shoulder, with a cover from there to the next joint,
+    the elbow, and a cover from that on, reasons name poses of these two.
+
+    Attributes
+    ----------
+    jacobians : (covers, 6, n), of the covers in the last pose.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
-        self._covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
+        self._covers = covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
         lengths("inference", arm.covers.names, {"weights": parameters.weights})
-        self._fit = ContactFit(arm.covers.start[::3], arm.covers.end[::3], arm.covers.radius, parameters)
-        self._wrenches = np.array([cover.wrenches for cover in self._covers])
+        start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
+        self._fit = ContactFit(start, end, arm.covers.radius, parameters)
+        # of the one joint between a cover of which a moment alone is measured and one that is located
+        self._elbow = next(
+            (
+                i
+                for i, (inner, outer) in enumerate(pairwise(covers), start=1)
+                if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1
+            ),
+            None,
+        )
+        self._wrenches = np.array([cover.wrenches for cover in covers])
+        self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
     def infer(
         self,
-        q: ArrayLike,
+        q: Sequence[float],
         torques: Sequence[float],
         precision: Array,
         load: Array | None = None,
@@ -123,10 +145,10 @@ class ContactInference:
         if size > CONTACT.smallest_sd**-2:
             precision = inverse(inverse(precision) + CONTACT.smallest_sd**2 * np.eye(len(torques)))
         at = np.array(q)
-        jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
+        self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
         rows = np.zeros((links + 1, 7, len(torques)))  # the last are those of a payload
         rows[:, 0] = torques
-        np.matmul(self._wrenches, jacobians, out=rows[:links, 1:])
+        np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
         if load is not None:
             rows[links, 1] = load
         gram = fusion.gram(rows, now) if fusion is not None and now is not None else None
@@ -134,11 +156,9 @@ class ContactInference:
             gram = rows @ precision @ rows.transpose(0, 2, 1)
         payload = -math.inf
         if load is not None and given.payload_weight:
-            scale = np.array([1.0, given.force_scale / STANDARD_GRAVITY])
-            found = gram[links, :2, :2] * np.outer(scale, scale)
-            # a mass is positive: twice the probability that it is
-            chance = math.erfc(-float(found[0, 1]) / math.sqrt(2.0 * (1.0 + float(found[1, 1]))))
-            payload = math.log(given.payload_weight * max(chance, CONTACT.least_chance)) + float(log_evidence(found))
+            payload = math.log(given.payload_weight)
+            (rr, ra), (_, aa) = gram[links, :2, :2].tolist()
+            payload += log_evidence_of_weight(rr, ra, aa, given.force_scale / STANDARD_GRAVITY)
         fits = self._fit(gram[:links], payload)
         order = sorted(range(links), key=lambda i: -fits[i].probability)
         best, moments = fits[order[0]], 1
@@ -147,23 +167,27 @@ class ContactInference:
             fusion.remember(rows, now, [(fit.position, fit.probability) for fit in fits], best.residual)
         reasons = NO_REASON
         if best.probability < given.identification_threshold:
-            reasons |= Reason.LINKS
+            reasons = self._why_ambiguous(q, set(order[:2]), fits)
         if 1.0 - sum([fit.probability for fit in fits]) > CONTACT.noted_probability:
             reasons |= Reason.PAYLOAD
-        return tuple([self._hypothesis(self._covers[i], fits[i], reasons, moments) for i in order])
+        return tuple([self._hypothesis(q, i, fits[i], reasons, moments) for i in order])
 
-    def _hypothesis(self, cover: _Cover, fit: Fit, reasons: Reason, moments: int) -> Hypothesis:
-        is_unknown = cover.is_moment_only or fit.torque_position_sd > cover.end - cover.start
+    def _hypothesis(self, q: Sequence[float], i: int, fit: Fit, reasons: Reason, moments: int) -> Hypothesis:
+        cover = self._covers[i]
+        start, end = cover.start[0], cover.end[0]
+        is_unknown = cover.is_moment_only or fit.torque_position_sd > end - start
         residual = fit.residual / moments
         if fit.along > (CONTACT.noted_probability if reasons & ~Reason.PAYLOAD else 0.5):
             reasons |= Reason.ALONG
         if is_unknown:
-            reasons |= Reason.MOMENT_ONLY if cover.is_moment_only else Reason.POSITION
+            reasons |= self._why_unknown(q, i, fit)
         if residual > self._parameters.largest_residual:
             reasons |= Reason.MORE
-        place = cover.end if is_unknown else fit.position
+        place = end if is_unknown else fit.position
         f1, f2 = fit.force_at_end if is_unknown else fit.force
-        x, y, z, m1, m2, m3 = np.array((f1, f2, place * f1, place * f2)).dot(cover.wrenches[:4]).tolist()
+        share = (place - start) / (end - start)
+        force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.across])
+        point = _triple([first + share * (last - first) for first, last in zip(cover.start, cover.end, strict=True)])
         return Hypothesis(
             cover=cover.name,
             probability=fit.probability,
@@ -171,15 +195,62 @@ class ContactInference:
             position_sd=math.nan if is_unknown else fit.position_sd,
             low=fit.low,
             high=fit.high,
-            force=(x, y, z),
+            force=force,
             force_sd=math.nan if is_unknown else fit.force_sd,
             is_lower_bound=is_unknown,
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
-            moment=(m1, m2, m3),
+            moment=_cross(point, force),
             residual=residual,
             reasons=reasons,
         )
+
+    def _why_unknown(self, q: Sequence[float], i: int, fit: Fit) -> Reason:
+        """Why the position on a cover is unknown."""
+        if self._covers[i].is_moment_only:
+            return Reason.MOMENT_ONLY
+        if i == self._elbow:
+            in_plane, straight, bent = self._at_elbow(q, i, fit)
+            if in_plane > NEAR and bent > NEAR:
+                return Reason.BENT
+            if in_plane < FAR and straight > NEAR:
+                return Reason.STRAIGHT
+            axes = self.jacobians[i - 1][3:, : self._covers[i - 1].joints]
+            # of three axes 1 - cos of the angle of two, as theta2
+            if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:
+                return Reason.SHOULDER
+        return Reason.WEAK
+
+    def _why_ambiguous(self, q: Sequence[float], likeliest: set[int], fits: list[Fit]) -> Reason:
+        """Why the link is not identified."""
+        i = self._elbow
+        if i is not None and likeliest == {i - 1, i}:
+            fit = fits[i]
+            in_plane, straight, _ = self._at_elbow(q, i, fit)
+            if straight > NEAR and in_plane < FAR:
+                return Reason.STRAIGHT_LINK
+            if fit.position - self._covers[i].start[0] < 2.0 * fit.position_sd:
+                return Reason.ELBOW
+        return Reason.LINKS
+
+    def _at_elbow(self, q: Sequence[float], i: int, fit: Fit) -> tuple[float, float, float]:
+        """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
+        cover = self._covers[i]
+        inner, outer = (self._body.cover_pose(q, self._covers[j].name).rotation for j in (i - 1, i))
+        cosine = min(1.0, abs(float(inner[:, 0] @ outer[:, 0])))
+        force = np.array(cover.across) @ fit.force
+        hinge = self.jacobians[i][3:, cover.joints - 1]
+        size = float(np.linalg.norm(force))
+        out_of_plane = abs(float(force @ hinge)) / size if size > 0.0 else 1.0
+        return math.sqrt(max(0.0, 1.0 - out_of_plane**2)), cosine, math.sqrt(1.0 - cosine**2)
+
+
+def _triple(values: Sequence[float]) -> Triple:
+    return values[0], values[1], values[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
@@ -200,5 +271,12 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
     moments = np.concatenate(
         (np.cross(origin, across), np.cross(slope, across), axis[None], np.cross(origin, axis)[None])
     )
-    # where no joint moves the start of the tube, only the product of x and force is measured
-    return _Cover(name, start[0], end[0], np.hstack((forces, moments)), not body.moves(name, origin))
+    return _Cover(
+        name=name,
+        start=start.tolist(),
+        end=end.tolist(),
+        wrenches=np.hstack((forces, moments)),
+        across=across.T.tolist(),
+        joints=arm.links.names.index(covers.links[i]) + 1,
+        is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
+    )

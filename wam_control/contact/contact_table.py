@@ -9,6 +9,11 @@ from wam_description.arm import Arm
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
+_COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
+_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
+_FORCE, _DIRECTION_SD = (_COLUMN[name] for name in ("force_x", "direction_sd"))
+_LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
+
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
     """Rows in the order of `HYPOTHESIS_COLUMNS`, the most probable hypothesis first."""
@@ -31,16 +36,16 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
     """The contact of the most probable hypothesis; none without a row or a table."""
     if table is None or not table.rows:
         return NO_CONTACT
-    row = dict(zip(HYPOTHESIS_COLUMNS, table.rows[0], strict=True))
-    force = row["force_x"], row["force_y"], row["force_z"]
-    sd, probability, direction_sd = row["position_sd"], row["probability"], row["direction_sd"]
-    return Contact(covers[int(row["link"])], row["position"], force, sd, probability, direction_sd)
+    row = table.rows[0]
+    x, y, z = row[_FORCE : _FORCE + 3]
+    cover = covers[int(row[_LINK])]
+    return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD])
 
 
 def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, ...]:
     """The parts of covers that hold the contact with 90 % probability in all."""
-    rows = [dict(zip(HYPOTHESIS_COLUMNS, row, strict=True)) for row in table.rows] if table else []
-    parts = (LikelyRange(covers[int(row["link"])], row["low"], row["high"]) for row in rows)
+    rows = () if table is None else table.rows
+    parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
     return tuple(part for part in parts if part.low < part.high)
 
 

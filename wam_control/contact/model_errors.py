@@ -81,6 +81,7 @@ class ModelErrors:
     ----------
     size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
         at least 1.
+    beyond : names of the errors that are certainly larger than tolerable, the largest first.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
@@ -89,6 +90,7 @@ class ModelErrors:
         self._through, self._to_motors = through, np.linalg.inv(through)
         # arrays are replaced, never changed: others may keep them
         self.errors, self.covariance, self.noise, self.size = prior.errors, prior.covariance, noise, 1.0
+        self.beyond = self._beyond()
         self._waiting: deque[Observation] = deque()
         self._pose = _Pose(np.full(len(through), np.inf))
         self._since = self._contact = self._hold = 0.0
@@ -99,14 +101,6 @@ class ModelErrors:
         sds = np.sqrt(self.covariance.diagonal()).tolist()
         return dict(zip(self._prior.names, map(TrackedError, self.errors.tolist(), sds), strict=True))
 
-    @property
-    def beyond(self) -> list[str]:
-        """Names of the errors that are certainly larger than tolerable, the largest first."""
-        excess = np.abs(self.errors) - CONTACT.sure * np.sqrt(self.covariance.diagonal())
-        ratio = excess / self._prior.tolerable
-        found = np.flatnonzero(ratio > 1.0)
-        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []
-
     def reset(self) -> None:
         """Forget the samples that wait, not the errors."""
         self._waiting.clear()
@@ -115,7 +109,7 @@ class ModelErrors:
     def learn(self, other: "ModelErrors") -> None:
         """Take over what another one has learned."""
         self.errors, self.covariance, self._pose = other.errors, other.covariance, other._pose
-        self.noise, self.size = other.noise, other.size
+        self.noise, self.size, self.beyond = other.noise, other.size, other.beyond
 
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
@@ -143,6 +137,7 @@ class ModelErrors:
         self.errors = self.errors + gain @ innovation
         corrected = self.covariance - gain @ gain_torques.T
         self.covariance = 0.5 * (corrected + corrected.T)
+        self.beyond = self._beyond()
 
     def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
@@ -164,7 +159,7 @@ class ModelErrors:
             self._contact += span
             self._hold = min(CONTACT.hold_off * self._contact, CONTACT.longest_hold_off)
             self._waiting.clear()
-        else:
+        elif self._hold > 0.0:
             self._hold, self._contact = self._hold - span, 0.0
         self._since += span
         if self._since < CONTACT.learn_interval:
@@ -176,6 +171,7 @@ class ModelErrors:
         ):
             self._leave(seen.pose)
         if not in_contact and self._hold <= 0.0:
+            self._contact = 0.0
             self._waiting.append(seen)
             if len(self._waiting) > CONTACT.hindsight / CONTACT.learn_interval and statistic < CONTACT.gate:
                 before = self._waiting.popleft()
@@ -191,6 +187,7 @@ class ModelErrors:
         if before.elsewhere is not None:
             self.errors, self.covariance = before.elsewhere
             self._grow(before.rested)
+            self.beyond = self._beyond()
             self._waiting.clear()
 
     def _grow(self, span: float) -> None:
@@ -211,3 +208,9 @@ class ModelErrors:
         self.noise = np.maximum(0.0, self.noise + rate * seen.moving * (at_motors * at_motors - known - self.noise))
         rest = covariance - seen.effects @ (self.covariance @ seen.effects.T)
         self._take(innovation, covariance + (CONTACT.correlated - 1.0) * rest, seen)
+
+    def _beyond(self) -> list[str]:
+        excess = np.abs(self.errors) - CONTACT.sure * np.sqrt(self.covariance.diagonal())
+        ratio = excess / self._prior.tolerable
+        found = np.flatnonzero(ratio > 1.0)
+        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []

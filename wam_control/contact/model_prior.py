@@ -47,46 +47,57 @@ def load_error(shaft: str) -> str:
     return f"load friction of {shaft}"
 
 
-def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None) -> ModelPrior:
-    """The errors of the model of an arm.
+def model_prior(
+    arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None, use_joint_sensors: bool = False
+) -> ModelPrior:
+    """The errors of the model of an arm; joint sensors show those of masses, centres of mass and payload alone.
 
     Parameters
     ----------
     arm, given : the arm as modelled, and how certain that is.
     payload_sd : kg.
     model : the identified one, if there is any.
+    use_joint_sensors : whether the torques are those of joint sensors.
     """
     n, shafts, joints = len(arm.joints.names), [*arm.motors.names, *arm.joints.names], arm.joints.names
     # the load friction of a joint that one motor drives is that of the motor
     driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
     loads = [*[given.load_uncertainty] * n, *np.where(driven_by > 1, given.load_uncertainty, 0.0)]
-    friction = math.hypot(given.moving_uncertainty, given.asymmetry_uncertainty)
-    widest = CONTACT.tolerable_payload + given.payload[1] - given.payload[0]
-    # of each error: name, standard deviation, what is tolerable
-    rows: list[tuple[str, float, float]] = [
-        *((friction_error(name, way), friction, CONTACT.tolerable_friction) for way in WAYS for name in shafts),
-        *((f"masses at {name}", given.mass_uncertainty, CONTACT.tolerable_mass) for name in joints),
-        *((load_error(name), load, CONTACT.tolerable_torque) for name, load in zip(shafts, loads, strict=True)),
-        *(
-            (f"torque constant of {name}", given.torque_scale_uncertainty, CONTACT.tolerable_torque)
-            for name in arm.motors.names
+    # of each kind: names, standard deviations, what is tolerable
+    kinds: list[tuple[list[str], float | list[float], float]] = [
+        (
+            [friction_error(name, way) for way in WAYS for name in shafts],
+            math.hypot(given.moving_uncertainty, given.asymmetry_uncertainty),
+            CONTACT.tolerable_friction,
         ),
-        *(
-            (f"centre of mass of {name} along {axis}", given.centre_uncertainty, CONTACT.tolerable_centre)
-            for name in arm.links.names
-            for axis in "xyz"
+        ([f"masses at {name}" for name in joints], given.mass_uncertainty, CONTACT.tolerable_mass),
+        ([*map(load_error, shafts)], loads, CONTACT.tolerable_torque),
+        (
+            [f"torque constant of {name}" for name in arm.motors.names],
+            given.torque_scale_uncertainty,
+            CONTACT.tolerable_torque,
         ),
-        ("delay of the torques", given.torque_delay_uncertainty, CONTACT.tolerable_delay),
-        ("payload", payload_sd, widest),
+        (
+            [f"centre of mass of {name} along {axis}" for name in arm.links.names for axis in "xyz"],
+            given.centre_uncertainty,
+            CONTACT.tolerable_centre,
+        ),
+        (["delay of the torques"], given.torque_delay_uncertainty, CONTACT.tolerable_delay),
+        (["payload"], payload_sd, CONTACT.tolerable_payload + given.payload[1] - given.payload[0]),
     ]
-    names, sds, tolerable = zip(*rows, strict=True)
-    errors, limit = np.zeros(len(rows)), np.square(sds)
-    covariance = np.diag(limit)
-    both = np.arange(2 * n)
-    covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
-    if model is not None and model.is_identified:
-        _identify(arm, model, errors, covariance)
-    return ModelPrior(names, errors, covariance, limit, np.array(tolerable))
+    if use_joint_sensors:
+        kinds = [kinds[1], kinds[4], kinds[6]]
+    names = tuple(name for each, _, _ in kinds for name in each)
+    sds, tolerable = (
+        np.concatenate([np.broadcast_to(kind[which], len(kind[0])) for kind in kinds]) for which in (1, 2)
+    )
+    errors, covariance = np.zeros(len(names)), np.diag(np.square(sds))
+    if not use_joint_sensors:
+        both = np.arange(2 * n)
+        covariance[both, 2 * n + both] = covariance[2 * n + both, both] = given.moving_uncertainty**2
+        if model is not None and model.is_identified:
+            _identify(arm, model, errors, covariance)
+    return ModelPrior(names, errors, covariance, np.square(sds), tolerable)
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:

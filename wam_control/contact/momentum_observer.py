@@ -5,13 +5,14 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
+from operator import add, sub
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact.contact_fusion import Torques
-from wam_control.contact.error_effects import ErrorEffects
+from wam_control.contact.error_effects import CentreEffects, ErrorEffects, GaugeEffects
 from wam_control.contact.model_errors import ModelErrors, Observation, TrackedError
 from wam_control.contact.model_prior import model_prior
 from wam_control.contact.motor_side import JointSample, MotorSide
@@ -91,10 +92,14 @@ class MomentumObserver:
         if not high and not use_joint_sensors:
             payload_sd = parameters.payload_uncertainty
         self._load = ToolLoad(arm, times) if payload_sd > 0.0 or high > 0.0 else None
-        self._effects = ErrorEffects(self._body, side, parameters, times, cycle > 0)
-        # joint sensors lie behind the friction
-        prior = model_prior(arm, parameters, payload_sd, None if use_joint_sensors else model)
-        noise = (parameters.motor_noise * np.array(side.friction.dynamic[:n])) ** 2
+        centres = CentreEffects(self._body, np.multiply(arm.links.mass, parameters.mass_scale).tolist())
+        self._effects: GaugeEffects | ErrorEffects = (
+            GaugeEffects(n, parameters, centres)
+            if use_joint_sensors
+            else ErrorEffects(side, parameters, times, cycle > 0, centres)
+        )
+        prior = model_prior(arm, parameters, payload_sd, model, use_joint_sensors)
+        noise = (parameters.motor_noise * np.array(side.motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, side.map.motor_from_joint.T, noise)
         self._filters = _Filters(n, (3 if use_joint_sensors else 14) * n, times, cycle)
         self.seen = self._begin()
@@ -106,8 +111,8 @@ class MomentumObserver:
     def _begin(self) -> Observation:
         """Forget all samples; the moment before them."""
         n = self._n
-        self._filters.reset()
-        self._last = _Sample(np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), np.full(n, math.inf))
+        self._filters = self._filters.empty_copy()
+        self._last = _Sample([0.0] * n, [], np.zeros((n, n)), [], [], math.inf)
         if self._load is not None:
             self._load.reset()
         self._side.reset()
@@ -117,7 +122,7 @@ class MomentumObserver:
         return self._observation()
 
     @property
-    def q(self) -> Array:
+    def q(self) -> list[float]:
         """Joint angles of the last sample, (n,), rad."""
         return self._last.q
 
@@ -150,8 +155,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._is_link_side:
-            q, qd, tau = np.array(state)
-            return self._update(JointSample(q, qd, tau, np.zeros(n), np.zeros(0), dt))
+            return self._update(JointSample(position, velocity, effort, [], [], dt))
         if self._side.carries_nothing(state):
             self.reset()
             return True
@@ -162,24 +166,27 @@ class MomentumObserver:
     def _update(self, sample: JointSample) -> bool:
         """Take a sample of the joints."""
         q, qd, tau, friction, signals, dt = sample
-        body, last = self._body, self._last
-        inertia = body.mass_matrix(q) if self._is_link_side else body.mass_matrix(q) + self._side.inertia
-        momentum, bias = inertia.dot(qd), body.momentum_bias(q, qd)
-        known, span = bias - friction, dt + self._gap
+        body, at, speed, last = self._body, np.array(q), np.array(qd), self._last
+        inertia = body.mass_matrix(at) if self._is_link_side else body.mass_matrix(at) + self._side.inertia
+        momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
+        known = list(map(sub, bias, friction)) if friction else bias
+        span = dt + self._gap
         is_first = not self._filters.count
-        external, model = np.zeros(self._n), -bias
-        if not is_first:
-            rate = (momentum - last.momentum) / span
-            model = rate - 0.5 * (bias + last.bias)
-            external = rate - 0.5 * (known + last.known) - tau
-        values = np.concatenate((external, model, q, signals))
-        if not math.isfinite(float(values.dot(values) + momentum.dot(known))):
+        if is_first:
+            external, model = [0.0] * self._n, [-torque for torque in bias]
+        else:
+            # map and a plain zip: strict=True takes as long as the work on four numbers
+            rates = [change / span for change in map(sub, momentum, last.momentum)]
+            model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, last.bias))]  # noqa: B905
+            left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, last.known))]  # noqa: B905
+            external = list(map(sub, left, tau))
+        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        self._filters.take(values, span)
+        self._filters.take([*external, *model, *q, *signals], span)
         if self._load is not None:
             self._load.observe(q, qd, span)
-        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, qd), 0.0
+        self._last, self._gap = _Sample(q, momentum, inertia, known, bias, max(map(abs, qd))), 0.0
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
         self.age += span
@@ -195,10 +202,7 @@ class MomentumObserver:
         """
         self._side.expect()
         self.seen = self._observation()
-        return self._corrected(self.seen)
-
-    def _corrected(self, seen: Observation) -> tuple[list[float], Array]:
-        torques, covariance = self._errors.corrected(seen)
+        torques, covariance = self._errors.corrected(self.seen)
         return torques.tolist(), self._errors.size * covariance
 
     def moment(self) -> Torques:
@@ -209,13 +213,22 @@ class MomentumObserver:
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
-        return self._corrected(self._observation(1)) if len(self._filters.times) > 1 else None
+        if len(self._filters.times) == 1:
+            return None
+        torques, covariance = self._errors.corrected(self._observation(1))
+        return torques.tolist(), self._errors.size * covariance
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
         if self.is_ready and not self._is_link_side:
             self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
+
+    @property
+    def pose(self) -> list[float]:
+        """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
+        pose: list[float] = self.seen.pose.tolist()
+        return pose
 
     @property
     def load_torques(self) -> Array | None:
@@ -235,7 +248,7 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        load = np.zeros(self._n) if self._load is None else self._load.torques()[which]
+        load = None if self._load is None else self._load.torques()[which]
         means, velocity_sd = self._filters.means(which), self._side.velocity_sd
         return self._effects.observation(means, load, self._last.inertia, velocity_sd, which)
 
@@ -250,7 +263,7 @@ class MomentumObserver:
             return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
         if not self.is_ready:
             return "too few samples yet"
-        if np.abs(self._last.qd).max() > CONTACT.at_rest:
+        if self._last.speed > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()
         self._errors.zero(self.seen)
@@ -263,19 +276,19 @@ class _Sample(NamedTuple):
     Attributes
     ----------
     q : joint angles, (n,), rad.
-    momentum : (n,), N m s.
+    momentum : (n,), N m s; before the first sample it is empty, as what follows but the inertia.
     inertia : (n, n), kg m^2.
     known : torques of the model, (n,), N m, with friction.
     bias : the same without friction.
-    qd : of the joints, (n,), rad/s.
+    speed : of the fastest joint, rad/s.
     """
 
-    q: Array
-    momentum: Array
+    q: list[float]
+    momentum: list[float]
     inertia: Array
-    known: Array
-    bias: Array
-    qd: Array
+    known: list[float]
+    bias: list[float]
+    speed: float
 
 
 class _Filters:
@@ -297,20 +310,20 @@ class _Filters:
     """
 
     def __init__(self, n: int, size: int, times: Sequence[float], cycle: int) -> None:
-        self.times, self.cycle, self._n = times, cycle, n
+        self.times, self.cycle, self.count = times, cycle, 0
+        self._n = n
+        self._values = np.zeros((len(times), size))
         self._ring = np.zeros((cycle, size))
         self._span = math.inf
-        # one for each number: numpy multiplies by a single one more slowly
-        self._keeps = self._takes = np.zeros((len(times), size))
-        self.reset()
+        self._keeps = self._takes = self._values  # one for each number: numpy multiplies by a single one more slowly
 
-    def reset(self) -> None:
-        """Forget all samples."""
-        self.count, self._values = 0, np.zeros_like(self._keeps)
+    def empty_copy(self) -> "_Filters":
+        """The same without samples."""
+        return _Filters(self._n, self._values.shape[1], self.times, self.cycle)
 
-    def take(self, present: Array, span: float) -> None:
+    def take(self, values: list[float], span: float) -> None:
         """Take a sample, `span` seconds after the one before; if that is long, the torques in it are unknown."""
-        before, n = self._values, self._n
+        present, before, n = np.array(values), self._values, self._n
         if not self.count:
             self._values = present + np.zeros_like(before)
         else:

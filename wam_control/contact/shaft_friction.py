@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from wam_control.contact.observer_parameters import ObserverParameters
 from wam_control.contact.thresholds import CONTACT
-from wam_description.arm import Arm
-from wam_description.model import ArmModel
+from wam_description.parts import Joints, Motors
 
 LONGEST = 6.0 * CONTACT.steep_angle
 
@@ -39,32 +38,34 @@ class ShaftFriction:
 
     Parameters
     ----------
-    arm : as modelled; its n shafts are motors, then joints.
+    shafts : with their friction as modelled.
     parameters : the uncertainty of the model.
-    model : the identified model, of which the Stribeck velocities v_s are; None for none.
+    rest_velocity : rad/s, above which Coulomb friction is full.
+    stribeck : (n,), Stribeck velocity v_s of each, rad/s; empty where it is not known.
+    is_identified : whether the friction towards zero speed was identified.
 
     Attributes
     ----------
     dynamic, static : (n,), N m, nominal F_d and F_s.
     """
 
-    def __init__(self, arm: Arm, parameters: ObserverParameters, model: ArmModel | None) -> None:
-        scale, both, count = parameters.friction_scale, (arm.motors, arm.joints), len(arm.joints.names)
-        self.dynamic = [scale * f for shafts in both for f in shafts.dynamic_friction]
-        self.static = [scale * f for shafts in both for f in shafts.static_friction]
-        self._viscous = [scale * b for shafts in both for b in shafts.viscous_friction]
-        speeds = parameters.motor_rest_velocity, parameters.joint_rest_velocity
-        known = (model.motors.stribeck_velocity, model.joints.stribeck_velocity) if model else ((), ())
-        self._slowest = [speed for speed in speeds for _ in range(count)]
-        self._stribeck = [
-            v
-            for given, speed in zip(known, speeds, strict=True)
-            for v in given or [CONTACT.usual_stribeck * speed] * count
-        ]
-        is_identified = model is not None and model.is_identified
+    def __init__(
+        self,
+        shafts: Motors | Joints,
+        parameters: ObserverParameters,
+        rest_velocity: float,
+        stribeck: Sequence[float] = (),
+        is_identified: bool = False,
+    ) -> None:
+        scale = parameters.friction_scale
+        self.dynamic = [scale * f for f in shafts.dynamic_friction]
+        self.static = [scale * f for f in shafts.static_friction]
+        self._viscous = [scale * b for b in shafts.viscous_friction]
+        self._rest_velocity = rest_velocity
+        self._stribeck = stribeck or [CONTACT.usual_stribeck * rest_velocity] * len(self.dynamic)
         self._slow = CONTACT.slow if is_identified else CONTACT.slow * CONTACT.assumed_stribeck
         self._rise = [is_identified * (s - d) for s, d in zip(self.static, self.dynamic, strict=True)]
-        self._rest = self._slowest
+        self._rest = [rest_velocity] * len(self.dynamic)
         self.reset()
 
     def reset(self) -> None:
@@ -72,9 +73,13 @@ class ShaftFriction:
         self._held = [0.0] * len(self.dynamic)
         self._travel = [0.0] * len(self.dynamic)
 
+    def learn(self, other: "ShaftFriction") -> None:
+        """Take over how certain the velocities are from another one."""
+        self._rest = list(other._rest)
+
     def expect(self, velocity_sd: Sequence[float]) -> None:
         """Take the standard deviations of the velocities, (n,), rad/s: a shaft slower than them may be at rest."""
-        self._rest = [max(least, CONTACT.rest_noise * sd) for least, sd in zip(self._slowest, velocity_sd, strict=True)]
+        self._rest = [max(self._rest_velocity, CONTACT.rest_noise * sd) for sd in velocity_sd]
 
     def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
         """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
@@ -82,6 +87,7 @@ class ShaftFriction:
         `keep` is the decay of the memory in it, 0 for none: with a dither.
         """
         friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
+        slowest = self._rest_velocity
         for i, v in enumerate(velocity):
             share = v / self._rest[i]
             if share >= 1.0 or share <= -1.0:
@@ -96,7 +102,7 @@ class ShaftFriction:
             friction.append(level * (share + (1.0 - fraction) * held[i]) + self._viscous[i] * v)
             sliding.append(share)
             resting.append(1.0 - share * share)
-            slow, since = turned / self._slow, abs(travel[i]) / self._slowest[i]
+            slow, since = turned / self._slow, abs(travel[i]) / slowest
             if travel[i] * v < 0.0 < keep:
                 since = 0.0  # it turns back; a dither ends each of its swings in that way
             uncertain = math.exp(-slow) if slow < LONGEST else 0.0

@@ -36,10 +36,10 @@ class ToolLoad:
     def reset(self) -> None:
         """Forget the motion."""
         self._torques, self._span = self._nothing, 0.0
-        self._now: tuple[Array, Array] | None = None
         self._before: tuple[Array, Array] | None = None
+        self._now: tuple[list[float], list[float]] = [], []
 
-    def observe(self, q: Array, qd: Array, span: float) -> None:
+    def observe(self, q: list[float], qd: list[float], span: float) -> None:
         """Follow one sample of the joints, (n,) rad and rad/s, `span` seconds after the one before."""
         self._now, self._span = (q, qd), self._span + span
         if self._before is None or self._span > CONTACT.load_span * self._times[0, 0]:
@@ -47,9 +47,9 @@ class ToolLoad:
 
     def torques(self) -> Array:
         """The torques, (filters, n), N m."""
-        if self._now is not None and self._span > 0.0:
+        if self._span > 0.0:
             q, qd = self._now
-            momentum, bias = self._body.mass_matrix(q) @ qd, self._body.momentum_bias(q, qd)
+            momentum, bias = self._body.mass_matrix(q) @ np.array(qd), self._body.momentum_bias(q, qd)
             before, mean = self._before or (momentum, bias)
             keep = np.exp(-self._span / self._times) if self._before else 0.0
             # as an external torque: that of the motors on the load, with the opposite sign

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,13 @@ from wam_control.contact.thresholds import CONTACT
 from wam_description.signals import State
 
 THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
+
+
+class FittedState(NamedTuple):
+    """State in the middle of the window; the state before is `dt` seconds older."""
+
+    state: State
+    dt: float
 
 
 class VelocityFit:
@@ -33,7 +41,7 @@ class VelocityFit:
         """Forget the samples, not the error of the angles."""
         self._samples: deque[tuple[float, State]] = deque(maxlen=2 * CONTACT.half_windows[-1] + 1)
         self._time, self._middle = 0.0, math.nan
-        self._period, self.delay = math.inf, 0.0
+        self._period = self._scale = self.delay = 0.0
 
     def learn(self, other: "VelocityFit") -> None:
         """Take over the error of the angles from another one."""
@@ -42,24 +50,17 @@ class VelocityFit:
     @property
     def sd(self) -> list[float]:
         """Standard deviation of the velocity of each shaft, rad/s."""
-        half = CONTACT.half_windows[self._choice]
-        # half a window and more: sum of the squared distances from the middle; none: a difference of two
-        squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
-        scale = THIRD / (math.sqrt(squares) * self._period)
-        return [scale * mean for mean in self._third]
+        return [self._scale * mean for mean in self._third]
 
-    def take(self, state: State, dt: float) -> tuple[State, float] | None:
-        """Take a sample `dt` seconds after the last; None while the window fills or grows.
-
-        The result is the state in the middle of the window, and how much older the one before is, s.
-        """
+    def take(self, state: State, dt: float) -> FittedState | None:
+        """Take a sample `dt` seconds after the last; None while the window fills or grows."""
         samples = self._samples
         self._time += dt
         samples.append((self._time, state))
         self._follow(dt)
         half = CONTACT.half_windows[self._choice]
         if half == 0:
-            return state, dt
+            return FittedState(state, dt)
         if len(samples) <= 2 * half:
             return None
         window = list(samples)[-2 * half - 1 :]
@@ -71,7 +72,7 @@ class VelocityFit:
         times -= middle
         velocity = times @ (angles - angles[half]) / (times @ times)  # of a shaft at rest exactly zero
         fitted = State(angles.mean(axis=0).tolist(), velocity.tolist(), window[half][1].effort)
-        return fitted, dt if math.isnan(before) else middle - before
+        return FittedState(fitted, dt if math.isnan(before) else middle - before)
 
     def _follow(self, dt: float) -> None:
         """Follow the error of the angles, and take a longer window where it calls for one."""
@@ -86,10 +87,22 @@ class VelocityFit:
                     if not size < CONTACT.largest_step:
                         continue
                     third[i] = mean + (CONTACT.follow_up if size > mean else CONTACT.follow_down) * (size - mean)
-        self._period, longer = dt, self._choice + 1
+        if dt != self._period:
+            self._period, self._scale = dt, self._sd_per_mean(dt)
+        longer = self._choice + 1
         if longer == len(CONTACT.half_windows):
             return
-        if max(self.sd) > CONTACT.velocity_sd and 2 * CONTACT.half_windows[longer] * dt < CONTACT.longest_window:
+        if (
+            self._scale * max(self._third) > CONTACT.velocity_sd
+            and 2 * CONTACT.half_windows[longer] * dt < CONTACT.longest_window
+        ):
             if self._choice == 0:
                 self._middle = self._time
             self._choice = longer
+            self._scale = self._sd_per_mean(dt)
+
+    def _sd_per_mean(self, dt: float) -> float:
+        half = CONTACT.half_windows[self._choice]
+        # half a window and more: sum of the squared distances from the middle; none: a difference of two
+        squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
+        return THIRD / (math.sqrt(squares) * dt)
