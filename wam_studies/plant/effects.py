@@ -12,11 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import mean_cycle
-from wam_description.effects import Ripples
+from wam_description.configuration import Configuration, packaged
+from wam_description.effects import Ripples, no_effects
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_driver.amplifier import Amplifier
+from wam_driver.driver import DriverParameters
+from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_studies.plant.force_response import force_step
 from wam_studies.plant.ideal_testbed import (
+    EMPTY,
     IMMOVABLE,
     LEVER,
     NOTHING,
@@ -319,6 +324,34 @@ def impact() -> PlantCurve:
     return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
 
 
+def damped_impact(step: float = RUN_STEP, damping: float = 20.0) -> PlantCurve:
+    """Greatest force of a tip that runs into a damped surface at 0.5 rad/s, over its stiffness, N/m, at a step, s.
+
+    The force of m x'' + b x' + k x = 0 with the mass m of (3.1); the cable is so long that the rotor has no effect.
+    """
+    arm, stiffness, below = ideal_testbed(), np.array([1e3, 4e3, 1.6e4]), 0.01
+    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    speed, mass, found, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, [], []
+    for k in stiffness.tolist():
+        law = (k,), (damping,), (0.0,), (0.0,)
+        floor = Obstacles(("floor",), ("plane",), (0.0, 0.0, -0.0254 - below), (0.0,) * 3, (2.0, 2.0, 0.0), *law)
+        plant = released_plant(arm, World(floor, NO_SPRINGS), step)
+        q = -float(np.arcsin(below / LEVER))
+        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), (-7.0, -0.5)
+        natural, decay = float(np.sqrt(k / mass)), damping / (2.0 * mass)
+        times = np.arange(0.0, np.pi / natural, 0.1 * step)
+        swing = np.sqrt(natural**2 - decay**2)
+        x = speed / swing * np.exp(-decay * times) * np.sin(swing * times)
+        v = speed * np.exp(-decay * times) * (np.cos(swing * times) - decay / swing * np.sin(swing * times))
+        expected.append(float((k * x + damping * v).max()))
+        forces = []
+        for _ in range(round(np.pi / natural / step)):
+            plant.step([0.0])
+            forces += [float(np.linalg.norm(load.force)) for load in plant.loads()]
+        found.append(max(forces))
+    return PlantCurve(stiffness, np.array(found), np.array(expected))
+
+
 def stiction_cycle(step: float = RUN_STEP) -> PlantCurve:
     """Stiction cycle of F_c, peak to peak, N m, with the exact one (5.8), at a step, s."""
     contact, gain, seconds = 1464.28, 4e-3, 16.0
@@ -373,3 +406,34 @@ def soft_cover(cover: float = 2000.0) -> PlantCurve:
     """Force, N, over depth, m, of a surface of 4000 N/m under a cover of this stiffness, N/m, in series (1.1.1)."""
     found = surface(0.0, cover)
     return found._replace(theory=found.theory / (1.0 + 4000.0 / cover))
+
+
+def current_loop(bandwidth: float = 100.0, delay: int = 2) -> PlantCurve:
+    """Current after a step of its command by 1 A, over time, s: a delay and a lag of first order.
+
+    Parameters
+    ----------
+    bandwidth : Hz.
+    delay : periods of 1 ms.
+    """
+    configuration = Configuration.load(packaged("testbed"))
+    parameters = configuration.node("driver", DriverParameters).amplifier
+    slow = replace(parameters, bandwidth=bandwidth, delay=delay)
+    amplifier = Amplifier(configuration.shared.arm.motors, slow, np.random.default_rng(0))
+    found = np.array([amplifier.step([1.0], 1e-3)[0] for _ in range(20)])
+    time = np.linspace(1e-3, 20e-3, 20)
+    return PlantCurve(time, found, -np.expm1(-2.0 * np.pi * bandwidth * np.maximum(time - 1e-3 * delay, 0.0)))
+
+
+def warm_friction(drop: float = 0.3) -> PlantCurve:
+    """Breakaway of a motor, N m, over the heat of its winding, 1 at its limit: it falls by `drop` of it."""
+    arm = ideal_testbed(friction=(50.0, 50.0))
+    arm = replace(arm, motors=replace(arm.motors, static_friction=(0.05,), dynamic_friction=(0.05,)))
+    heat = np.linspace(0.0, 1.0, 5)
+    found = []
+    for w in heat.tolist():
+        plant = Plant(arm, EMPTY, no_effects(arm), STEP, replace(COULOMB_STICTION, warm_drop=drop))
+        plant.brake(False)
+        plant.heat([w])
+        found.append(breakaway(plant, 0.045 * (1.0 - drop * w)))
+    return PlantCurve(heat, np.array(found), 0.05 * (1.0 - drop * heat))

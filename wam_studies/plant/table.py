@@ -30,6 +30,8 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "ripple": effects.ripple,
     "hardening surface": lambda: effects.surface(50.0),
     "impact": effects.impact,
+    "impact on a damped surface": lambda: effects.damped_impact(STEP),
+    "impact on a damped surface at 0.5 ms": effects.damped_impact,
     "backlash in the loop": effects.actuator_cycle_with_backlash,
     "backlash in a torque loop": effects.backlash_in_a_torque_loop,
     "sensor noise, 20 000 readings": noise,
@@ -38,6 +40,8 @@ EFFECTS: dict[str, Callable[[], PlantCurve]] = {
     "terminated cables": effects.terminated_creep,
     "gross slip": effects.gross_slip,
     "cover in series": effects.soft_cover,
+    "current loop": effects.current_loop,
+    "friction of a warm motor": effects.warm_friction,
 }
 
 
