@@ -27,6 +27,7 @@ from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
+MORE = 0.03  # of the commanded force, by which the true force may be further off over the bus
 WRIST = (
     0.08  # of the commanded force, by which that of the wrist may be off; a refused one is off by a quarter and more
 )
@@ -102,6 +103,16 @@ def force_errors(recording: AnalysedRecording) -> list[float]:
         at = (traces.stamp > hold.end - 10**9) & (traces.stamp <= hold.end)
         found.append(abs(float(np.linalg.norm(traces.true.force[at].mean(axis=0))) / hold.commanded - 1.0))
     return found
+
+
+@pytest.mark.slow
+def test_forces_over_the_bus_are_those_of_the_plain_driver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    configuration = at_rates_of_the_bus("barrett-wam4")
+    plain = force_errors(played(configuration, tmp_path / "plain"))
+    monkeypatch.setattr(wam_sim.simulation, "Driver", DriverOnBus)
+    over_bus = force_errors(played(configuration, tmp_path / "bus"))
+    assert len(plain) == len(over_bus) == 3
+    assert max(over_bus) < max(plain) + MORE, (plain, over_bus)
 
 
 @pytest.mark.slow

@@ -4,12 +4,15 @@ import argparse
 import asyncio
 import json
 import math
+import shutil
 import socket
+import subprocess
 import threading
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +23,7 @@ import mujoco
 import numpy as np
 import pytest
 from bag_comparison import compare
+from browser import browser
 from conftest import LONG
 from ros_network import Network
 
@@ -34,6 +38,7 @@ from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
 from wam_description.signals import (
     BASE,
+    NO_CONTACT,
     Contact,
     LikelyRange,
     NodeStatus,
@@ -52,6 +57,7 @@ from wam_ros.testing import RunningArm
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
+from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
@@ -62,7 +68,7 @@ from wam_live.scene import Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.messages import message_type  # noqa: E402
-from wam_ros.outlets import COPIED  # noqa: E402
+from wam_ros.outlets import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
 from wam_ros.topics import qos  # noqa: E402
 from wam_ros.wire import encoder  # noqa: E402
 
@@ -476,6 +482,17 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     assert source.snapshot(400_000_000).statuses["force_loop"].level is Level.OK
 
 
+def test_of_a_bag_without_hypotheses_the_estimated_contact_is_played_from_its_own_topics(alone: Path) -> None:
+    bag = read(alone)
+    whole = BagSource(AnalysedRecording(bag)).snapshot(400_000_000).estimated
+    topics = {name: columns for name, columns in bag.topics.items() if not name.endswith("contact/hypotheses")}
+    alike = BagSource(AnalysedRecording(bag._replace(topics=topics))).snapshot(400_000_000).estimated
+    assert (alike.cover, alike.position, alike.force) == (whole.cover, whole.position, whole.force)
+    assert alike.cover == "outer_link"
+    topics = {name: columns for name, columns in topics.items() if not name.endswith("/contact/point")}
+    assert BagSource(AnalysedRecording(bag._replace(topics=topics))).snapshot(400_000_000).estimated == NO_CONTACT
+
+
 def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: Network) -> None:
     listener, page = ros.node("listener"), ros.node("page")
     heard: list[str] = []
@@ -517,6 +534,25 @@ def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: Network) ->
     ros.wait(lambda: shown(1, 3_000_000_000).stamp == 3_000_000_000)
     assert stack.snapshot().true.cover == ""
     stack.node.destroy_node()
+
+
+def test_copies_for_the_page_are_few_and_newest_first(ros: Network) -> None:
+    sender, viewer = ros.node("sender"), ros.node("viewer")
+    copy = DisplayCopy(sender, BY_NAME["sim/disturbance"])
+    heard: list[int] = []
+    many = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    name = copy_name("sim/disturbance")
+    viewer.create_subscription(WrenchStamped, name, lambda message: heard.append(message.header.stamp.nanosec), many)
+    ros.wait(lambda: sender.count_subscribers(name) == 1 and viewer.count_publishers(name) == 1)
+    begin = time.monotonic()
+    for i in range(1000):
+        message = WrenchStamped()
+        message.header.stamp.nanosec = i
+        copy.send(message)
+    most = 2 + int((time.monotonic() - begin) / PERIOD)
+    ros.wait(lambda: heard)
+    assert len(heard) <= most
+    assert heard[0] == 0
 
 
 def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
@@ -587,9 +623,139 @@ def test_a_stack_starts_after_its_page_which_ends_with_it(domain_id: int, monkey
     assert port_is_free(port)
 
 
+def test_a_page_that_is_late_is_reported_once(
+    domain_id: int, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wam_cli.commands.live.LATE", 0.0)  # no page is there at once
+    with page_next_to(options("--port", str(port := free_port())), "wam"):
+        until(lambda: not port_is_free(port))
+    assert capfd.readouterr().out.count("still starting") == 1
+
+
+def test_nobody_waits_for_a_page_that_is_stopped(domain_id: int) -> None:
+    with page_next_to(options("--port", str(port := free_port())), "wam", lambda: True):
+        assert port_is_free(port)
+
+
 # a real browser
 
+FLAGS = (
+    "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+    "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--disable-dev-shm-usage", "--remote-allow-origins=*", "--window-size=1280,800",
+)  # fmt: skip
+
 PATIENCE = 100.0  # s
+ANSWERED = 40.0  # s, within which the browser answers on any machine that can draw
+
+
+class Tab:
+    """A page in Chromium, through its debugging protocol."""
+
+    def __init__(self, tab: Any) -> None:
+        self._socket, self._number = tab, 0
+
+    def ask(self, method: str, **values: Any) -> dict[str, Any]:
+        """One request and its answer."""
+        self._number += 1
+        self._socket.send(json.dumps({"id": self._number, "method": method, "params": values}))
+        while True:
+            try:
+                answer: dict[str, Any] = json.loads(self._socket.recv(timeout=ANSWERED))
+            except TimeoutError:
+                pytest.skip(f"the browser has not answered for {ANSWERED:g} s beside all that runs here")
+            if answer.get("id") == self._number:
+                return answer["result"]
+
+    def text(self) -> str:
+        """Everything that can be read on the page."""
+        found = self.ask("Runtime.evaluate", expression="document.body.innerText", returnByValue=True)
+        return str(found["result"].get("value", ""))
+
+    def mouse(self, kind: str, x: float, y: float, pressed: bool) -> None:
+        """Move, press or release the left button."""
+        button = {"button": "left" if pressed or kind == "mouseReleased" else "none", "buttons": int(pressed)}
+        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, clickCount=1, **button)
+
+    def click(self, label: str) -> None:
+        """Press a button by its label."""
+        find = f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {label!r}).click()"
+        self.ask("Runtime.evaluate", expression=find)
+
+
+@contextmanager
+def opened(address: str, folder: Path) -> Iterator[Tab]:
+    """A page in a browser without a screen."""
+    from websockets.sync.client import connect
+
+    profile = folder / "profile"
+    command = [browser(), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={profile}", address]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + LONG
+        while not (profile / "DevToolsActivePort").exists():
+            assert time.monotonic() < end, "the browser did not start"
+            assert process.poll() is None, "the browser ended"
+            time.sleep(0.1)
+        port = (profile / "DevToolsActivePort").read_text().split()[0]
+        with urllib.request.urlopen(f"http://{HOST}:{port}/json") as answer:
+            page = next(tab for tab in json.load(answer) if tab["type"] == "page")
+        with connect(page["webSocketDebuggerUrl"], max_size=2**27, ping_interval=None) as tab:
+            yield Tab(tab)
+    finally:
+        process.terminate()
+        process.wait()
+        shutil.rmtree(profile, ignore_errors=True)
+
+
+def pixel(camera: Any, size: tuple[float, float], point: Any) -> tuple[float, float]:
+    """Where a camera of the page sees a point of the base frame, px."""
+    w, x, y, z = camera.wxyz
+    right, down, ahead = turned((w, -x, -y, -z), np.asarray(point) - np.asarray(camera.position))
+    focal = 0.5 * size[1] / math.tan(0.5 * camera.fov)
+    return 0.5 * size[0] + focal * right / ahead, 0.5 * size[1] + focal * down / ahead
+
+
+@pytest.mark.slow
+def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_path: Path) -> None:
+    browser()
+    with running(domain_id, 0.3) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, scene = shown.page.panel, shown.page.scene
+        assert panel is not None
+        assert scene is not None
+        server = shown.page._server
+
+        def drive() -> None:
+            with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
+                until(lambda: "Emergency stop" in tab.text() and server.get_clients())
+                tab.click("Enable")
+                until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())
+                clients = list(server.get_clients().values())
+                until(lambda: clients[0].camera.image_width > 0)
+                camera = clients[0].camera
+                window = (camera.image_width, camera.image_height)
+                start = panel.snapshot.q
+                x, y = pixel(camera, window, scene.point("outer_link", 0.25))
+                tab.mouse("mouseMoved", x, y, False)
+                tab.mouse("mousePressed", x, y, True)
+                for i in range(1, 25):
+                    tab.mouse("mouseMoved", x + 12.0 * i, y, True)
+                    time.sleep(0.03)
+                until(lambda: panel.snapshot.true.cover == "outer_link")
+                until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
+                until(lambda: "you push with" in tab.text())
+                tab.mouse("mouseReleased", x + 288.0, y, False)
+                until(lambda: panel.snapshot.true.cover == "")
+                tab.click("Brake")
+                until(lambda: mode_of(shown) == "braked")
+
+        with ThreadPoolExecutor() as threads:
+            user = threads.submit(drive)
+            while not user.done():
+                spin()
+        user.result()
 
 
 def until(holds: Callable[[], Any]) -> None:
