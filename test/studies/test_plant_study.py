@@ -16,6 +16,8 @@ PROMISED = {
     "ripple": 1e-6,
     "hardening surface": 2e-3,
     "impact": 5e-3,  # (3.1) 0.5 %
+    "impact on a damped surface": 5e-3,
+    "impact on a damped surface at 0.5 ms": 1e-2,  # a contact begins between two steps
     "backlash in the loop": 1e-2,
     "backlash in a torque loop": 2e-3,  # a step of the plant is a thousandth of a cycle
     "sensor noise, 20 000 readings": 2e-2,  # 1/sqrt(2 n) is 0.5 %
@@ -24,6 +26,8 @@ PROMISED = {
     "terminated cables": 2e-2,  # parts of 0.05 rad of 6 rad
     "gross slip": 1e-6,
     "cover in series": 2e-3,
+    "current loop": 1e-9,
+    "friction of a warm motor": 1e-3,
 }
 
 
