@@ -10,8 +10,8 @@ from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames
 from wam_driver.bus.dry_run import heard, in_words, sent
 from wam_driver.bus.frames import BusGroup, BusNode, Frame
-from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import line_of
+from wam_driver.bus.parameters import BusParameters
 
 BUS4 = Configuration.load(packaged("barrett-wam4-bus"))
 

@@ -7,8 +7,8 @@ from wam_description.arm import Shared
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
 from wam_driver.bus.frames import BusGroup, BusNode, Frame
-from wam_driver.bus.interface import BusParameters
 from wam_driver.bus.line import Line
+from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS

@@ -7,7 +7,7 @@ from typing import Any
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
 from wam_driver.bus.frames import BusNode, Frame
-from wam_driver.bus.interface import SIMULATED, BusParameters
+from wam_driver.bus.parameters import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
 
