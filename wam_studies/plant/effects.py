@@ -216,8 +216,7 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
     """
     depths = np.linspace(1e-4, 0.01, 25)
     below = 0.01  # m below the link, which then touches with its tip only
-    law = (4e3,), (0.0,), (hardening,), (0.0,)
-    floor = Obstacles(("floor",), ("plane",), (0.0, 0.0, -0.0254 - below), (0.0,) * 3, (2.0, 2.0, 0.0), *law)
+    floor = _floor(below, 4e3, 0.0, hardening)
     plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS, cover_stiffness=cover))
     forces = []
     for depth in depths:
@@ -227,6 +226,13 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
         (load,) = plant.loads()
         forces.append(float(np.linalg.norm(load.force)))
     return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+
+
+def _floor(below: float, stiffness: float, damping: float, hardening: float) -> Obstacles:
+    """A plane this far below the link, m."""
+    position = (0.0, 0.0, -0.0254 - below)
+    law = (stiffness,), (damping,), (hardening,), (0.0,)
+    return Obstacles(("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), *law)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
@@ -333,8 +339,7 @@ def damped_impact(step: float = RUN_STEP, damping: float = 20.0) -> PlantCurve:
     arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
     speed, mass, found, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, [], []
     for k in stiffness.tolist():
-        law = (k,), (damping,), (0.0,), (0.0,)
-        floor = Obstacles(("floor",), ("plane",), (0.0, 0.0, -0.0254 - below), (0.0,) * 3, (2.0, 2.0, 0.0), *law)
+        floor = _floor(below, k, damping, 0.0)
         plant = released_plant(arm, World(floor, NO_SPRINGS), step)
         q = -float(np.arcsin(below / LEVER))
         plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), (-7.0, -0.5)
