@@ -312,3 +312,23 @@ def plant_a_sound_tree(root: Path) -> None:
     for package in ARROWS:
         names = " ".join(path.stem for path in (root / package).iterdir())
         (root / package / "__init__.py").write_text(f'"""{names}"""')
+
+
+def test_a_subclass_of_a_compiled_class_is_compiled_too() -> None:
+    """Compiled, the package could not be imported otherwise; the tests themselves run the plain files."""
+    listed = next(
+        ast.literal_eval(node.value)
+        for node in parsed((ROOT / "setup.py").read_text()).body
+        if isinstance(node, ast.Assign) and [called(target) for target in node.targets] == ["COMPILED"]
+    )
+    compiled = {path.removesuffix(".py").replace("/", ".") for path in listed}
+    classes = {
+        node.name: (module, {called(one) for one in node.bases})
+        for module, tree in modules_under(ROOT).items()
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }
+    native = {name for name, (module, _) in classes.items() if module in compiled}
+    plain = {name: sorted(bases & native) for name, (module, bases) in classes.items() if module not in compiled}
+    assert native
+    assert {name: bases for name, bases in plain.items() if bases} == {}
