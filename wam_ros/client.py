@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -370,7 +371,7 @@ class StackClient(Closing):
 
 def run_next_to(
     namespace: str,
-    make: Callable[[Any, Shared], Any],
+    make: Callable[[Any, Shared], Node],
     until: Callable[[], bool],
     between: Callable[[Any], object] = lambda node: None,
 ) -> None:

@@ -95,8 +95,8 @@ class ForceAxis(NamedTuple):
     precision: Array
     covariance_there: Array
 
-    def error(self, torque_sd: Array) -> float:
-        """Standard deviation of the force, N, by those of the torques (n,), N m."""
+    def error(self, torque_sd: Array | float) -> float:
+        """Standard deviation of the force, N, by those of the torques (n,), or of each of them, N m."""
         return float(np.linalg.norm(self.sense * torque_sd))
 
     def unexplained(self, torques: Array) -> float:

@@ -199,7 +199,7 @@ class ForceWatch:
         events += self._unexplained(axis, known, is_reached, torques, lasting, dt)
         if self.touch.is_there and not self.touch.is_bouncing:
             sd = own.sensing.torque_sd
-            sd = axis.sensed.error(np.full(len(torques), sd)) if axis.sensed else sd
+            sd = axis.sensed.error(sd) if axis.sensed else sd
             events += filter(None, [self.oscillation.step(known.force, desired, sd, own, dt)])
         else:
             self.oscillation.rest()
