@@ -29,12 +29,12 @@ class Node(NamedTuple):
 
 def exponential(matrix: Array, time: float) -> Array:
     """Of a matrix times a time, by squaring a Taylor series."""
-    scaled = matrix * (time / 2.0**20)
+    scaled = matrix * (time / 2.0**10)
     total, term = np.eye(len(matrix)), np.eye(len(matrix))
-    for i in range(1, 12):
+    for i in range(1, 20):
         term = term @ scaled / i
         total = total + term
-    for _ in range(20):
+    for _ in range(10):
         total = total @ total
     return total
 
@@ -122,29 +122,36 @@ def breakaways(node: Node, gain: float, desired: float, count: int) -> list[tupl
     return found
 
 
+def integral(of: Callable[[Array], Array], low: float, high: float) -> float:
+    """By Gauss and Legendre."""
+    places, weights = np.polynomial.legendre.leggauss(40)
+    return float(0.5 * (high - low) * weights @ of(0.5 * (high + low) + 0.5 * (high - low) * places))
+
+
 def arc_of_slip(loose: float, tight: float, friction: float) -> float:
-    """Arc over which friction on a pulley builds up from the loose tension to the tight one, by steps."""
-    tension, arc, step = loose, 0.0, 1e-5
-    while tension < tight:
-        tension *= 1.0 + friction * step + 0.5 * (friction * step) ** 2
-        arc += step
-    return arc
+    """Arc over which friction on a pulley builds up from the loose tension to the tight one, dT = mu T d(arc)."""
+    return integral(lambda tension: 1.0 / (friction * tension), loose, tight)
 
 
-def wam_tip(q: Iterable[float]) -> Array:
-    """Tip of the arm, in, by its Denavit-Hartenberg table: (alpha, a, d) before each joint, then 16 in along x."""
-    place = np.eye(4)
-    rows = ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (-90.0, 0.0, 22.0), (90.0, 0.0, 0.0))
-    for (alpha, a, d), angle in zip(rows, q, strict=True):
+def wam_frames(q: Iterable[float]) -> list[Array]:
+    """Frames of the joints and of the tip, in, by its Denavit-Hartenberg table: (alpha, a, d) before each joint."""
+    place, found = np.eye(4), []
+    rows = ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (-90.0, 0.0, 22.0), (90.0, 0.0, 0.0), (0.0, 16.0, 0.0))
+    for (alpha, a, d), angle in zip(rows, [*q, 0.0], strict=True):
         ca, sa = math.cos(math.radians(alpha)), math.sin(math.radians(alpha))
         ct, st = math.cos(angle), math.sin(angle)
         link = [[ct, -st, 0, a], [st * ca, ct * ca, -sa, -d * sa], [st * sa, ct * sa, ca, d * ca], [0, 0, 0, 1]]
         place = place @ np.array(link)
-    tip: Array = place @ np.array([16.0, 0.0, 0.0, 1.0])
-    return tip[:3]
+        found.append(place)
+    return found
+
+
+def wam_jacobian(q: Iterable[float]) -> Array:
+    """Of the tip, in/rad: each axis times the lever of the tip about it."""
+    *joints, tip = wam_frames(q)
+    return np.transpose([np.cross(one[:3, 2], tip[:3, 3] - one[:3, 3]) for one in joints])
 
 
 def square_wave_gain(amplitude: float) -> float:
-    """Fundamental of a unit square wave over the amplitude of the sine that switches it, by a Fourier sum."""
-    angle = (np.arange(20_000) + 0.5) * 2.0 * math.pi / 20_000
-    return float(2.0 * np.mean(np.sign(np.sin(angle)) * np.sin(angle)) / amplitude)
+    """Fundamental of a unit square wave over the amplitude of the sine that switches it, by its Fourier integral."""
+    return 2.0 / math.pi * integral(np.sin, 0.0, math.pi) / amplitude

@@ -17,8 +17,8 @@ from wam_theory.regimes import friction_dominated, gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 
 
-def _testbed(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> FrictionNode:
-    """Node of the testbed with k_c = k_tr and this zeta."""
+def equal_node(zeta: float, friction: tuple[float, float] = (0.0, 0.0)) -> FrictionNode:
+    """Node of the testbed with k_c = k_tr, this zeta, and this static and dynamic friction, N m."""
     stiffness = loop_node(loop_arm(0.0, friction), 1.0).transmission_stiffness
     bare = loop_node(loop_arm(0.0, friction), stiffness)
     return loop_node(loop_arm(2.0 * zeta * float(np.sqrt(2.0 * stiffness * bare.inertia)), friction), stiffness)
@@ -29,7 +29,7 @@ def describing_function() -> Panels:
 
     -1/N(A) is the negative real axis, b/N(A) = pi/4 b A/F_friction.
     """
-    node = _testbed(CASE.unity_zeta)
+    node = equal_node(CASE.unity_zeta)
     natural = float(np.sqrt(2.0 * node.contact_stiffness / node.inertia))
     omega, points = np.geomspace(0.05, 30.0, 4000), np.array([0.3, 0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0])
     curves = [("-b/N(A)", line_only([-4.4, 0.0], [0.0, 0.0]))]
@@ -46,8 +46,23 @@ def describing_function() -> Panels:
 
 def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
     """Velocity over a torque on the link with the loop closed, (frequencies,), from single steps of the plant."""
-    step, small = CASE.fine_step, 1e-6
-    plant = loop_plant(loop_arm(node.damping, (0.0, 0.0)), node.contact_stiffness, step=step)
+    matrix, inlet = closed_loop_map(node, gain)
+    z = np.exp(1j * omega * CASE.fine_step)
+    # for a torque held over a step, at the middle of the step
+    responses = [np.linalg.solve(value * np.eye(3) - matrix, inlet)[2] * np.sqrt(value) for value in z]
+    return np.array(responses)
+
+
+def closed_loop_map(node: FrictionNode, gain: float) -> tuple[Numbers, Numbers]:
+    """What a fine step of the plant does to x_m, x_l, v_l, (3, 3), and a torque on the link, N m, to them, (3,).
+
+    Parameters
+    ----------
+    node : its inertia is that of the testbed; without friction.
+    gain : G_I, rad/s/(N m).
+    """
+    small = 1e-6
+    plant = loop_plant(loop_arm(node.damping, (0.0, 0.0)), node.contact_stiffness, step=CASE.fine_step)
 
     def after(state: Numbers, torque: float) -> Numbers:
         plant.data.qpos[:] = RATIO * state[0], state[1]
@@ -56,12 +71,8 @@ def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbe
         plant.step([0.0])
         return np.array([plant.theta[0] / RATIO, plant.q[0], plant.qd[0]])
 
-    matrix = np.transpose([after(small * unit, 0.0) / small for unit in np.eye(3)])
-    inlet = after(np.zeros(3), small) / small
-    z = np.exp(1j * omega * step)
-    # for a torque held over a step, at the middle of the step
-    responses = [np.linalg.solve(value * np.eye(3) - matrix, inlet)[2] * np.sqrt(value) for value in z]
-    return np.array(responses)
+    columns = [after(small * unit, 0.0) / small for unit in np.eye(3)]
+    return np.transpose(columns), after(np.zeros(3), small) / small
 
 
 def stability_bound() -> Panels:
@@ -106,7 +117,7 @@ def plant_largest_step(gamma: float, zeta: float = CASE.unity_zeta, step: float 
     gamma, zeta : of the loop.
     step : of the plant, s.
     """
-    node = _testbed(zeta, (1.0, 1.0))
+    node = equal_node(zeta, (1.0, 1.0))
     gain = gamma * float(routh_gain(node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness))
 
     def grows(desired: float) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wam_analysis.drawing import SHAFTS, STYLE
 
 GREY = "#777777"
-SHADES = (*SHAFTS[1:5], SHAFTS[0])
+SHADES = (*SHAFTS[1:5], SHAFTS[0], *SHAFTS[5:])
 DPI = 200
 
 
