@@ -31,96 +31,101 @@ class Requirement(NamedTuple):
 
 REQUIREMENTS: Final = {
     "interface": Requirement(
-        "publishes motor_states, motor_currents, /clock, robot_description, status and /diagnostics, takes "
-        "motor_current_command, serves enable, estop, reset_fault",
-        "take names, types and quality of service from docs/topics.md; all of them are reliable",
+        "publishes motor_states, motor_currents, /clock, robot_description, status and /diagnostics; takes "
+        "motor_current_command; serves enable, estop, reset_fault",
+        "take names, types and quality of service from docs/topics.md; all topics are reliable",
     ),
     "rate": Requirement(
-        "a state in every period; a period of the steady clock is a period of the arm",
-        "publish from a timer of timing.period; give the process a priority or a processor of its own",
+        "publishes a state in every period of the steady clock",
+        "publish from a timer of timing.period; give the process a priority or its own processor",
     ),
     "stamps": Requirement(
-        "stamps rise strictly, are multiples of timing.period and above 0",
+        "publishes stamps that increase, are multiples of timing.period, and are above 0",
         "count the periods from 1 and stamp period number times timing.period, not the wall clock",
     ),
     "outer": Requirement(
-        "motor_currents and /clock in every outer period, with stamps of states",
+        "publishes motor_currents and /clock in every outer period, with the stamp of a state",
         "publish both where shared.timing.is_outer(stamp), with the stamp of the state",
     ),
     "arrays": Requirement(
-        "a state has position, velocity and effort of every motor by name, finite",
+        "names every motor in a state, with finite position, velocity and effort",
         "name the motors as arm.motors.names and fill all three arrays",
     ),
     "velocity": Requirement(
-        "velocity is the rate of position, rad/s and rad at the motor shaft",
+        "publishes positions of the motor shafts in rad, and their rates in rad/s",
         "convert encoder counts to radians of the motor, and differentiate with the period",
     ),
     "braked": Requirement(
-        "begins braked: commands give no current", "let no current flow unless the mode is enabled"
+        "starts braked: commands give no current",
+        "let no current flow unless the mode is enabled",
     ),
     "status": Requirement(
-        "status is latched, has mode, session and level, and is repeated at least every 0.25 s",
+        "latches its status, with mode, session and level, and repeats it every 0.25 s",
         "publish status transient local, depth 1; repeat it from a timer",
     ),
     "silence": Requirement(
-        "refuses enable while no commands come, and states why",
-        "answer enable with success false where the last command is older than the watchdog",
+        "refuses enable with the reason, if no commands come",
+        "refuse enable if the last command is older than the watchdog",
     ),
     "current": Requirement(
-        "enabled, the commanded amperes flow: motor_currents in A, effort of motor_states in N m",
+        "lets the commanded amperes flow when enabled; motor_currents has A, effort N m",
         "send A in motor_currents and A times arm.motors.torque_constant in the effort",
     ),
     "names": Requirement(
-        "a command is matched by name, not by index", "sort the values of a command by its names"
+        "matches a command by name, not by index",
+        "sort the values of a command by its names",
     ),
     "refusals": Requirement(
-        "NaN, infinite, short, empty, unknown, doubled: the whole command is refused, the last good one holds",
+        "refuses a whole command with NaN, infinite, missing, unknown or doubled values, and keeps the "
+        "last good one",
         "check the whole message before any value of it is used",
     ),
     "answers": Requirement(
-        "a command without a stamp, or with one of the future, is refused",
+        "refuses a command without a stamp, or with a stamp in the future",
         "refuse stamps that are not above 0 and at most that of the newest state",
     ),
     "watchdog": Requirement(
-        "without commands no current flows after 50 ms, and the mode is fault",
+        "stops the current 50 ms after the last command, and faults",
         "compare the newest state with the stamp of the last command in every period",
     ),
     "repetition": Requirement(
-        "a command that answers an old state again and again is as good as none",
+        "faults also if all commands answer the same old state",
         "let the watchdog use the stamp of the command, not only its arrival",
     ),
     "fault": Requirement(
-        "a fault is latched: enable is refused and names it; reset_fault ends braked",
+        "latches a fault: refuses enable and names the fault; reset_fault ends braked",
         "keep the first reason until reset_fault, which never enables",
     ),
     "disable": Requirement(
-        "enable with false stops the current at once and ends braked", "put on the brakes in the answer itself"
+        "stops the current at once and brakes, on enable with false",
+        "put on the brakes in the answer itself",
     ),
     "estop": Requirement(
-        "estop stops the current at once and latches a fault", "put on the brakes in the answer itself"
+        "stops the current at once and latches a fault, on estop",
+        "put on the brakes in the answer itself",
     ),
     "discard": Requirement(
-        "enable discards every command before it, and moves `since` to the next state",
-        "set the command to zero at enable, and since where the brakes are switched",
+        "discards older commands at enable, and sets `since` to the next state",
+        "set the command to zero at enable, and `since` when the brakes change",
     ),
     "peers": Requirement(
-        "a fault in the status of another node brakes the arm; enable is refused while there is one",
-        "listen to status: level ERROR with a fault trips the driver, which names both in an event of its status",
+        "brakes at a fault in the status of another node, and refuses enable as long as it lasts",
+        "read the status of all nodes; brake at level ERROR with a fault, and name both in an event",
     ),
     "claims": Requirement(
-        "two publishers of motor_current_command are a fault, whose event names the topic",
+        "faults if two publishers send motor_current_command, and names the topic in the event",
         "count the publishers of the topic in every status period",
     ),
     "agreement": Requirement(
-        "brakes, and refuses enable, while the statuses of two nodes have different values of `shared parameters`",
-        "compare them as text, with those of your own node where it has them: nodes of two configurations run",
+        "brakes and refuses enable while two nodes publish different `shared parameters`",
+        "compare them as text, and with your own node's; two configurations are in use",
     ),
     "end": Requirement(
-        "ended by SIGTERM it brakes first and reports that",
+        "brakes at SIGTERM, and reports that before it ends",
         "disable and publish the status before the node is destroyed",
     ),
     "session": Requirement(
-        "started again it is braked and its session is greater",
+        "is braked after a restart, and has a greater session number",
         "take the session from the wall clock in ms at the start",
     ),
 }  # fmt: skip
