@@ -180,7 +180,7 @@ PLANT = Benchmark(
 
 # the inner loop as C
 
-DIRECT, OVER, AS_PYTHON = "direct run, times real time", "substep over mj_step, ", ", plain Python"
+DIRECT, OVER, AS_PYTHON = "run without ROS, times real time", "substep over mj_step, ", ", plain Python"
 
 
 def installed() -> Path | None:

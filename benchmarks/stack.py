@@ -157,7 +157,7 @@ def speed(quick: bool) -> Measured:
             named = [base.with_values({"recorder:name": f"{how}_{turn}"}) for how in ("one", GROUPED, EACH)]
             yield {
                 FASTER: bare(base, 2.0 if quick else 20.0) / BARE,
-                "direct run": direct(base, length),
+                "run without ROS": direct(base, length),
                 "lockstep": lockstep(base),
                 "lockstep, recorded": lockstep(named[0], "recorder"),
                 "grouped, recorded": in_processes(named[1], GROUPED),
@@ -169,7 +169,7 @@ SPEED = Benchmark(
     speed,
     "times real time",
     (
-        Row("direct run", FASTER, 14.0, 20.0),
+        Row("run without ROS", FASTER, 14.0, 20.0),
         Row("lockstep", FASTER, 4.0, 5.5),
         Row("lockstep, recorded", FASTER, 3.0, 4.5),
         Row("grouped, recorded", FASTER, 1.8, 3.0),
