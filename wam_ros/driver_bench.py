@@ -89,7 +89,7 @@ class DriverBench(StackClient):
         self.is_answering = True
         self.after: list[Callable[[int], Any]] = []
         self.wanted: Callable[[int, list[float]], Any] | None = None
-        self._session = -1
+        self._session, self._spun = -1, math.inf
         self._command = self.publisher(COMMAND)
         for topic in KEPT:
             row = BY_NAME[topic]
@@ -171,10 +171,10 @@ class DriverBench(StackClient):
             kept.clear()
 
     def spin_once(self, seconds: float = CONFORMANCE_LIMITS.spin) -> None:
-        """As that of the client; a long one is a pause."""
-        begin = time.monotonic()
+        """As that of the client; a long time between the ends of two is a pause."""
         super().spin_once(seconds)
-        self.longest_pause = max(self.longest_pause, time.monotonic() - begin)
+        before, self._spun = self._spun, time.monotonic()
+        self.longest_pause = max(self.longest_pause, self._spun - before)
 
     def watch(self, seconds: float) -> None:
         """Let time pass."""
@@ -210,19 +210,34 @@ class DriverBench(StackClient):
         self.ask("reset_fault")
 
     def enable(self) -> None:
-        """From any state to enabled, with commands that come."""
+        """From any state to enabled, with commands that come, when a person has done what the driver waits for."""
         answer = (False, "")
+
+        def is_taken() -> bool:
+            nonlocal answer
+            answer = self.ask("enable", True)
+            return answer[0]
+
         for _ in range(CONFORMANCE_LIMITS.enable_attempts):
             self.brake()
             self.is_answering = True
             self.watch(CONFORMANCE_LIMITS.settle)
-            answer = self.ask("enable", True)
+            self.await_person(is_taken)
             if answer[0] and self.wait(lambda: self.status.mode == "enabled", REPLY):
                 self.forget()
                 self.watch(CONFORMANCE_LIMITS.settle)
                 if self.status.mode == "enabled":
                     return
         raise Untested(f"the driver cannot be enabled: {answer[1] or self.status.message or 'no answer'}")
+
+    def await_person(self, is_done: Callable[[], object]) -> None:
+        """Wait until something is done, no longer than the driver warns, and print what it warns of."""
+        warning, end = "", time.monotonic() + CONFORMANCE_LIMITS.person
+        while not is_done() and self.status.level is Level.WARN and time.monotonic() < end:
+            if self.status.message != warning:
+                warning = self.status.message
+                self.node.get_logger().warning(f"the driver waits; {warning}")
+            self.watch(CONFORMANCE_LIMITS.settle)
 
     def states(self) -> list[Arrived]:
         """The states that came."""

@@ -22,7 +22,10 @@ Check = Callable[[DriverBench], str]
 
 def _interface(bench: DriverBench) -> str:
     bench.wait(lambda: not bench.lacking(), CONFORMANCE_LIMITS.start)
-    return f"{', '.join(found)} not found" if (found := bench.lacking()) else ""
+    if found := bench.lacking():
+        return f"{', '.join(found)} not found"
+    bench.await_person(lambda: bench.arrived["motor_states"])
+    return ""
 
 
 def _rate(bench: DriverBench) -> str:
@@ -225,6 +228,7 @@ def _estop(bench: DriverBench) -> str:
 
 
 def _discard(bench: DriverBench) -> str:
+    bench.enable()
     bench.brake()
     bench.watch(CONFORMANCE_LIMITS.settle)
     since = bench.status.since

@@ -92,6 +92,7 @@ class ConformanceLimits:
     spin: float = 0.005  # s of one turn of the executor
     look: float = 0.4  # s of watching
     start: float = 60.0  # s, for a driver to appear on a busy machine
+    person: float = 600.0  # s, for a person to do what the driver waits for
     least_travel: float = 0.02  # rad, below which a velocity cannot be compared
     period_error: float = 0.05  # largest relative difference of the period
     vanish: float = 5.0  # s, for a publisher to vanish

@@ -403,6 +403,16 @@ def test_an_adapter_that_takes_nothing_more_is_stopped_by_the_heartbeat() -> Non
     assert last - begun <= 0.11
 
 
+def test_at_its_end_the_driver_leaves_no_active_arm_without_a_heartbeat() -> None:
+    rig = Rig()
+    rig.enable()
+    rig.bus.is_attended = False
+    rig.arm.close()
+    rig.bus.sleep(0.5)
+    assert rig.bus.controllers[10].values["MODE"] == SafetyMode.IDLE
+    assert rig.bus.controllers[10].values["ZERO"] == 1
+
+
 def test_after_a_lost_controller_the_start_is_repeated() -> None:
     rig = Rig()
     rig.enable()

@@ -90,6 +90,8 @@ def run(given: argparse.Namespace) -> int:
         DriverBench(configuration.shared, given.share, given.current, given.namespace) as bench,
         served(configuration, given.arm),
     ):
+        timing = configuration.shared.timing
+        set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
         driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
         try:
             if driver:
@@ -120,12 +122,11 @@ def served(configuration: Configuration, version: int) -> Iterator[None]:
 
 def _serve(configuration: Configuration, version: int) -> None:
     """Be the arm on the bus of a configuration, as prompt as the driver."""
-    set_priority(configuration.shared.timing.fifo_priority, configuration.shared.timing.niceness)
-    own = configuration.node("driver", BusParameters)
-    line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
-    arm = ServedArm(line, SimulatedBus(configuration.shared, own, version))
+    shared, own = configuration.shared, configuration.node("driver", BusParameters)
+    set_priority(shared.timing.fifo_priority, shared.timing.niceness)
+    arm = ServedArm(line_of(shared, own, time.perf_counter, time.sleep), SimulatedBus(shared, own, version))
     while True:
-        arm.answer(configuration.shared.timing.period)
+        arm.answer(shared.timing.period)
 
 
 def _listen(configuration: Configuration, seconds: float) -> int:

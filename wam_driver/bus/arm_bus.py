@@ -106,8 +106,8 @@ class ArmBus:
             self._cycle.command(currents)
 
     def close(self) -> None:
-        """Brake, and end the connection."""
-        self.brake()
+        """Stop, as an active arm without a driver would end in E-stop and lose its zero, and end the connection."""
+        self.stop()
         self._host.line.close()
 
     def exchange(self, periods: int = 1) -> None:
