@@ -37,7 +37,7 @@ from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
 from wam_studies.figures.panels import Panels, distances, draw_panels
-from wam_studies.force_benchmark import usual_tasks
+from wam_studies.force_benchmark.straight_arm import elbow_table
 from wam_studies.plant import table as plant_table
 from wam_studies.scorecard import measures
 from wam_studies.scorecard import report as scorecard
@@ -271,7 +271,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "dither": lambda: dither(configuration),
         "refusals": refusals,
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
-        "force tasks": lambda: f"\n{(ROOT / 'docs' / 'force-tasks.txt').read_text(encoding='utf-8')}",
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
@@ -407,11 +406,8 @@ def refusals() -> str:
 
 
 def measure_forces() -> None:
-    """Press with a nearly straight elbow, do the force tasks, and keep their tables."""
-    configuration, docs = Configuration.load(CONFIGURATION), ROOT / "docs"
-    (docs / "elbow.txt").write_text(usual_tasks.elbow_table(configuration), encoding="utf-8")
-    done = usual_tasks.table(list(usual_tasks.perform_all(configuration)))
-    (docs / "force-tasks.txt").write_text(done + "\n", encoding="utf-8")
+    """Press with a nearly straight elbow, and keep the table."""
+    (ROOT / "docs" / "elbow.txt").write_text(elbow_table(Configuration.load(CONFIGURATION)), encoding="utf-8")
 
 
 def filled(text: str) -> str:

@@ -4,20 +4,18 @@ import math
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.constants import constants
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_theory.cable import efficiency, stage_loss, tensions
 from wam_theory.requisites import TOLERANCE, Measures, Requisite, scorecard
 from wam_theory.stiction import stiction_cycle_force
 
-Array = NDArray[np.float64]
 POSES = 15  # of each joint apart from the first, which does not change the torques
 DIRECTIONS = 180
 

@@ -133,9 +133,11 @@ def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:
         is_pinned=True,
         is_tared=True,
         ramp=0.0,
-        motor_friction=(1.186, 0.822, 0.815, 0.824),
-        joint_friction=(0.802, 0.853, 1.057, 0.802),
-        cables=(0.986, 0.903, 0.992, 1.063),
+        mismatch={
+            "motor_friction": (1.186, 0.822, 0.815, 0.824),
+            "joint_friction": (0.802, 0.853, 1.057, 0.802),
+            "stiffness": (0.986, 0.903, 0.992, 1.063),
+        },
         asymmetry=-0.015,
     )
     task = Task((-1.011, 1.243, 2.07, -0.741), surface, 14.63, conditions)

@@ -18,9 +18,8 @@ from wam_studies.force_benchmark.controllers import Admittance, TorqueControl
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
 from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import NOMINAL, RANGES, Task, TaskConditions, configured, draw, steps
+from wam_studies.force_benchmark.tasks import NOMINAL, RANGES, Task, TaskConditions, configured, draw, steps, triple
 from wam_studies.force_benchmark.trial import ForceTrial, inertia, knowable, perform
-from wam_studies.force_benchmark.usual_tasks import rod
 from wam_studies.harness import chosen_cases
 
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
@@ -76,7 +75,7 @@ def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) ->
     assert driver.plant.data.ncon == 0
     assert driver.plant.q == pytest.approx(task.q)
     factors = [a / b for a, b in zip(driver.plant.model.body_mass[-4:], WAM.links.mass, strict=True)]
-    assert factors == pytest.approx(task.conditions.mass)
+    assert factors == pytest.approx(task.conditions.mismatch["mass"])
 
 
 @pytest.mark.slow
@@ -323,7 +322,9 @@ def test_the_force_can_be_known_worse_the_rougher_the_surface_and_the_less_is_de
 
 @pytest.mark.parametrize("controller", [Admittance, TorqueControl])
 def test_what_a_user_would_write_presses_on_a_soft_rod_at_a_known_position(controller: type) -> None:
-    task = rod(CONFIGURATION, (0.0, -0.6, 0.0, 0.5), 0.3, 8.0)
+    q, cover = (0.0, -0.6, 0.0, 0.5), WAM.covers.names[-1]
+    across = triple(-RigidBody(WAM).cover_pose(q, cover).rotation[:, 1])
+    task = Task(q, Surface(cover, 0.3, across, 4000.0, 0.3, is_plane=False), 8.0)
     assert perform(CONFIGURATION, task, controller=controller).mean == pytest.approx(8.0, rel=0.1)
 
 
@@ -334,7 +335,7 @@ def test_cases_are_the_tasks_of_the_seed() -> None:
 
 def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
     every = [task.conditions for task in DRAWN]
-    for name, width in (("mass", 0.03), ("motor_friction", 0.2), ("cables", 0.1), ("torque_constant", 0.03)):
-        factors = np.array([getattr(conditions, name) for conditions in every])
+    for name, width in (("mass", 0.03), ("motor_friction", 0.2), ("stiffness", 0.1), ("torque_constant", 0.03)):
+        factors = np.array([conditions.mismatch[name] for conditions in every])
         assert 0.95 * width < float(np.abs(factors - 1.0).max()) <= width
     assert isinstance(every[0], TaskConditions)

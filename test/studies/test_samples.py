@@ -142,9 +142,9 @@ def test_a_changed_sample_and_a_changed_list_are_noticed(tmp_path: Path) -> None
     bag = tmp_path / "sample" / "step-response"
     shutil.copytree(BAGS / "sample" / "step-response", bag)
     first = entry.rows[0]
-    other = entry._replace(rows=(first._replace(measured=1.001 * first.measured), *entry.rows[2:]))
+    other = entry._replace(rows=[first | {"measured": 1.001 * first["measured"]}, *entry.rows[2:]])
     wrong = check(experiment, other, tmp_path)
-    assert [line.split("'")[1] for line in wrong] == [first.quantity, entry.rows[1].quantity]
+    assert [line.split("'")[1] for line in wrong] == [row["quantity"] for row in entry.rows[:2]]
     with (bag / "metadata.yaml").open("a") as stream:
         stream.write("\n")
     (line,) = check(experiment, entry, tmp_path)
@@ -186,8 +186,8 @@ def test_a_sample_is_recorded_cut_judged_and_listed_by_one_command(
     assert ended.value.code == 0
     assert "every sample is as the index lists it" in capfd.readouterr().out
     (entry,) = read_index(Path("bags")).values()
-    assert all(row.is_whole for row in entry.rows)
-    assert [row.quantity for row in entry.rows] == [row.quantity for row in ENTRIES["step-response"].rows]
+    assert all(row["is_whole"] for row in entry.rows)
+    assert [row["quantity"] for row in entry.rows] == [row["quantity"] for row in ENTRIES["step-response"].rows]
     assert entry.sha256["step-response_0.mcap"][:16] in Path("bags/README.md").read_text()
     assert (np.diff(read(Path("bags/sample/step-response")).topics["/wam/joint_sensors"].stamp_ns) == 1_000_000).all()
     assert not Path("bags/recorded").exists()

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from wam_control.contact.contact_estimator import ContactEstimate
 from wam_description.arm import Arm
+from wam_description.rigid_body import Array
 
 Mask = NDArray[np.bool_]
-Array = NDArray[np.float64]
 PAYLOAD = "payload"  # how hypotheses, reasons and warnings name a mass at the tool
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.overlay import estimator_values, model_values
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
+from wam_description.rigid_body import Array
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
 from wam_studies.contact.degradations import Degradation, Values, drawn
@@ -27,8 +27,6 @@ from wam_studies.contact.touches import (
     touches,
 )
 from wam_studies.identification.trial import play
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

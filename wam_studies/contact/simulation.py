@@ -9,13 +9,12 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import Load
 from wam_driver.safety import Mode
 from wam_sim.simulation import Simulation
 from wam_studies.contact.outcomes import (
     EVALUATION,
-    Array,
     ContactScore,
     EstimatedMoment,
     Mask,

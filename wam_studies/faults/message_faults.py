@@ -3,16 +3,15 @@
 A message is any object with `get_fields_and_field_types`, as ROS makes them; this module imports no ROS.
 """
 
+import math
 import struct
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from random import Random
 from typing import Any, Final, NamedTuple
 
 SECOND: Final = 10**9  # ns
-NOT_FINITE: Final = (float("nan"), float("inf"), float("-inf"))
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,6 @@ BROKEN: Final = BrokenValues()
 TEXTS: Final = ("", "x" * 10_000, "\x1b[2J\x1b[31m", "joint1", "base", "driver", "\U0001f9be", "../../etc", "[" * 500)
 
 Message = Any
-Stamps = Callable[[Random, int], int]
 
 
 class MessageLeaf(NamedTuple):
@@ -68,51 +66,52 @@ def leaves(message: Message) -> Iterator[MessageLeaf]:
             yield MessageLeaf(message, name, kind)
 
 
-def _chosen(message: Message, chance: Random, is_meant: Callable[[MessageLeaf], bool]) -> MessageLeaf | None:
-    found = list(filter(is_meant, leaves(message)))
-    return chance.choice(found) if found else None
-
-
 # changes of a message; False where it cannot be changed so
 
+Change = Callable[[Message, Random, int], bool]
 
-def with_numbers(message: Message, chance: Random, now: int, values: tuple[float, ...]) -> bool:
-    """Put one of the values into one number of a message, or into all of an array."""
+
+def _field(is_meant: Callable[[MessageLeaf], bool], value: Callable[[MessageLeaf, Random], Any]) -> Change:
+    """Put a value in the place of one of the fields that are meant."""
+
+    def change(message: Message, chance: Random, now: int) -> bool:
+        found = list(filter(is_meant, leaves(message)))
+        return bool(found) and (leaf := chance.choice(found)).put(value(leaf, chance))
+
+    return change
+
+
+def _numbers(values: tuple[float, ...]) -> Change:
+    """One of the values in one number of a message, or in all of an array."""
 
     def is_number(leaf: MessageLeaf) -> bool:
         is_float = leaf.kind.removeprefix("sequence<").startswith(("double", "float"))
         return is_float and not (leaf.is_sequence and not len(leaf.value))
 
-    leaf = _chosen(message, chance, is_number)
-    if leaf is None:
-        return False
-    value = chance.choice(values)
-    if not leaf.is_sequence:
-        return leaf.put(value)
-    numbers = list(leaf.value)
-    for i in range(len(numbers)) if chance.random() < 0.3 else [chance.randrange(len(numbers))]:
-        numbers[i] = value
-    return leaf.put(numbers)
+    def changed(leaf: MessageLeaf, chance: Random) -> Any:
+        value = chance.choice(values)
+        if not leaf.is_sequence:
+            return value
+        numbers = list(leaf.value)
+        for i in range(len(numbers)) if chance.random() < 0.3 else [chance.randrange(len(numbers))]:
+            numbers[i] = value
+        return numbers
+
+    return _field(is_number, changed)
 
 
-def with_lengths(message: Message, chance: Random, now: int) -> bool:
-    """Give an array another length."""
-    leaf = _chosen(message, chance, lambda leaf: leaf.is_sequence)
-    if leaf is None:
-        return False
+def _length(leaf: MessageLeaf, chance: Random) -> Any:
+    """An array of another length."""
     old = list(leaf.value)
     length = chance.choice([n for n in BROKEN.lengths if n != len(old)])
     filler = old[:1] or (["joint1"] if "string" in leaf.kind else [0] if "int" in leaf.kind else [0.3])
-    return leaf.put((old + filler * length)[:length])
+    return (old + filler * length)[:length]
 
 
-def with_texts(message: Message, chance: Random, now: int) -> bool:
-    """Replace, double or lose a name or a text."""
-    leaf = _chosen(message, chance, lambda leaf: "string" in leaf.kind)
-    if leaf is None:
-        return False
+def _text(leaf: MessageLeaf, chance: Random) -> Any:
+    """A name or a text replaced, doubled or lost."""
     if not leaf.is_sequence:
-        return leaf.put(chance.choice([text for text in TEXTS if text != leaf.value]))
+        return chance.choice([text for text in TEXTS if text != leaf.value])
     names = list(leaf.value) or ["joint1"]
     i, way = chance.randrange(len(names)), chance.randrange(4)
     if way == 0:
@@ -123,10 +122,21 @@ def with_texts(message: Message, chance: Random, now: int) -> bool:
         del names[i]
     else:
         names.append(names[0])
-    return leaf.put(names)
+    return names
 
 
-def permuted(message: Message, chance: Random, now: int) -> bool:
+def _is_integer(leaf: MessageLeaf) -> bool:
+    """Apart from those of a stamp."""
+    return leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
+
+
+def _extreme(leaf: MessageLeaf, chance: Random) -> int:
+    bits, is_signed = int("".join(filter(str.isdigit, leaf.kind))), not leaf.kind.startswith("u")
+    top = 2 ** (bits - is_signed)
+    return chance.choice([top - 1, top // 2, -top if is_signed else 0])
+
+
+def _permuted(message: Message, chance: Random, now: int) -> bool:
     """Change the order of names and values together, which means the same."""
     names = getattr(message, "name", None)
     if not isinstance(names, list) or not names:
@@ -138,20 +148,8 @@ def permuted(message: Message, chance: Random, now: int) -> bool:
     return True
 
 
-def with_integers(message: Message, chance: Random, now: int) -> bool:
-    """Put an extreme into an integer other than those of a stamp."""
-    leaf = _chosen(
-        message, chance, lambda leaf: leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
-    )
-    if leaf is None:
-        return False
-    bits, is_signed = int("".join(filter(str.isdigit, leaf.kind))), not leaf.kind.startswith("u")
-    top = 2 ** (bits - is_signed)
-    return leaf.put(chance.choice([top - 1, top // 2, -top if is_signed else 0]))
-
-
 def set_stamp(message: Message, nanoseconds: int) -> bool:
-    """Set the stamp in the header, ns, or any 64-bit pair where it is out of range; False where it has no header."""
+    """Set the stamp in the header, ns, the seconds limited to 32 bits; False where it has no header."""
     if not hasattr(message, "header"):
         return False
     sec, nanosec = divmod(nanoseconds, SECOND)
@@ -160,32 +158,17 @@ def set_stamp(message: Message, nanoseconds: int) -> bool:
     return True
 
 
-def stamped(message: Message, chance: Random, now: int, stamps: Stamps) -> bool:
-    """Set the stamp to another time."""
-    return set_stamp(message, stamps(chance, now))
+def _stamp(time: Callable[[Random, int], int]) -> Change:
+    return lambda message, chance, now: set_stamp(message, time(chance, now))
 
 
-STAMPS: Final[dict[str, Stamps]] = {
-    "future: next period": lambda chance, now: now + 1_000_000,
-    "future: next seconds": lambda chance, now: now + chance.randrange(2_000_000, 10 * SECOND),
-    "future: wall clock": lambda chance, now: 1_790_000_000 * SECOND + chance.randrange(SECOND),
-    "future: end of time": lambda chance, now: (2**31 - 1) * SECOND + SECOND - 1,
-    "past: zero": lambda chance, now: 0,
-    "past: negative": lambda chance, now: -chance.randrange(1, 2**31) * SECOND,
-    "past: stale": lambda chance, now: max(1_000_000, now - chance.randrange(200_000_000, 5 * SECOND)),
-}
+def _too_many_nanoseconds(message: Message, chance: Random, now: int) -> bool:
+    return hasattr(message, "header") and MessageLeaf(message.header.stamp, "nanosec", "").put(
+        chance.randrange(SECOND, 2**32)
+    )
 
 
-def with_excess_nanoseconds(message: Message, chance: Random, now: int) -> bool:
-    """A stamp with more nanoseconds than a second has."""
-    if not hasattr(message, "header"):
-        return False
-    message.header.stamp.nanosec = chance.randrange(SECOND, 2**32)
-    return True
-
-
-def unchanged(message: Message, chance: Random, now: int) -> bool:
-    """The message as it is."""
+def _unchanged(message: Message, chance: Random, now: int) -> bool:
     return True
 
 
@@ -214,9 +197,6 @@ def garbage(data: bytes, chance: Random) -> bytes:
 # the faults
 
 
-Change = Callable[[Message, Random, int], bool]
-
-
 class MessageFault(NamedTuple):
     """A way to break a message.
 
@@ -232,19 +212,28 @@ class MessageFault(NamedTuple):
     change: Change
 
 
+STAMPS: Final[dict[str, Callable[[Random, int], int]]] = {
+    "future: next period": lambda chance, now: now + 1_000_000,
+    "future: next seconds": lambda chance, now: now + chance.randrange(2_000_000, 10 * SECOND),
+    "future: wall clock": lambda chance, now: 1_790_000_000 * SECOND + chance.randrange(SECOND),
+    "future: end of time": lambda chance, now: (2**31 - 1) * SECOND + SECOND - 1,
+    "past: zero": lambda chance, now: 0,
+    "past: negative": lambda chance, now: -chance.randrange(1, 2**31) * SECOND,
+    "past: stale": lambda chance, now: max(1_000_000, now - chance.randrange(200_000_000, 5 * SECOND)),
+}
 GARBAGE: Final = "bytes that are no message"
 MESSAGE_FAULTS: Final = (
-    MessageFault("a number not finite", True, partial(with_numbers, values=NOT_FINITE)),
-    MessageFault("a huge number", True, partial(with_numbers, values=BROKEN.huge)),
-    MessageFault("a tiny number", False, partial(with_numbers, values=BROKEN.tiny)),
-    MessageFault("an array of another length", True, with_lengths),
-    MessageFault("a wrong text or name", True, with_texts),
-    MessageFault("names in another order", False, permuted),
-    MessageFault("an extreme integer", True, with_integers),
-    *(MessageFault(f"a stamp of the {name}", True, partial(stamped, stamps=stamps)) for name, stamps in STAMPS.items()),
-    MessageFault("a stamp of too many nanoseconds", True, with_excess_nanoseconds),
-    MessageFault("the same message again", False, unchanged),
-    MessageFault(GARBAGE, True, unchanged),
+    MessageFault("a number not finite", True, _numbers((math.nan, math.inf, -math.inf))),
+    MessageFault("a huge number", True, _numbers(BROKEN.huge)),
+    MessageFault("a tiny number", False, _numbers(BROKEN.tiny)),
+    MessageFault("an array of another length", True, _field(lambda leaf: leaf.is_sequence, _length)),
+    MessageFault("a wrong text or name", True, _field(lambda leaf: "string" in leaf.kind, _text)),
+    MessageFault("names in another order", False, _permuted),
+    MessageFault("an extreme integer", True, _field(_is_integer, _extreme)),
+    *(MessageFault(f"a stamp of the {name}", True, _stamp(time)) for name, time in STAMPS.items()),
+    MessageFault("a stamp of too many nanoseconds", True, _too_many_nanoseconds),
+    MessageFault("the same message again", False, _unchanged),
+    MessageFault(GARBAGE, True, _unchanged),
 )
 
 

@@ -7,5 +7,5 @@ controllers    what a user would write in place of the force loop
 outcome        done, refused, ended with a reason, or silent; cycles and overshoot
 groupings      the classes into which tasks are divided
 study          many tasks in the harness; picture draws them
-usual_tasks    the tasks by which the loop was first measured, and a nearly straight arm (docs/force.md)
+straight_arm   a nearly straight arm that presses ahead and aside (docs/force.md)
 """

@@ -8,19 +8,16 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact.contact_table import contact_of
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.guard import Report
 from wam_description.arm import Shared
 from wam_description.event import OBEYED, Event
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
-
-Array = NDArray[np.float64]
 
 
 class UsualController:

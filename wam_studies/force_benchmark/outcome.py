@@ -7,14 +7,12 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import limit_cycle
 from wam_description.event import CAUSE, OBEYED, Event
 from wam_description.event_text import sentence
+from wam_description.rigid_body import Array
 from wam_studies.force_benchmark.tasks import RANGES, Task
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

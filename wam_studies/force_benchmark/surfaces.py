@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 

@@ -104,7 +104,7 @@ class TaskConditions(NamedTuple):
     is_pinned : whether the contact position is configured, else estimated.
     is_tared : whether the external torques are tared before the force is commanded.
     ramp : time in which the commanded force rises, s.
-    mass, motor_friction, joint_friction, cables, torque_constant : factors of the true arm; () for none.
+    mismatch : factors of the true arm, by parameter of `driver:mismatch`.
     payload : mass at the tool that nobody declares, kg.
     asymmetry : of all friction, which then falls with the speed as Stribeck's, too; 0 for friction as configured.
     centres : m, by which the controllers are wrong about the centre of mass of each link, x y z of each; () for none.
@@ -116,11 +116,7 @@ class TaskConditions(NamedTuple):
     is_pinned: bool
     is_tared: bool
     ramp: float
-    mass: tuple[float, ...] = ()
-    motor_friction: tuple[float, ...] = ()
-    joint_friction: tuple[float, ...] = ()
-    cables: tuple[float, ...] = ()
-    torque_constant: tuple[float, ...] = ()
+    mismatch: Mapping[str, tuple[float, ...]] = {}
     payload: float = 0.0
     asymmetry: float = 0.0
     centres: tuple[float, ...] = ()
@@ -263,11 +259,13 @@ def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
         is_pinned=bool(random.random() < RANGES.pinned),
         is_tared=bool(random.random() < RANGES.tared),
         ramp=float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
-        mass=factors(RANGES.mass, len(arm.links.names)),
-        motor_friction=factors(RANGES.motor_friction, motors),
-        joint_friction=factors(RANGES.motor_friction, joints),
-        cables=factors(RANGES.cables, motors),
-        torque_constant=factors(RANGES.torque_constant, motors),
+        mismatch={
+            "mass": factors(RANGES.mass, len(arm.links.names)),
+            "motor_friction": factors(RANGES.motor_friction, motors),
+            "joint_friction": factors(RANGES.motor_friction, joints),
+            "stiffness": factors(RANGES.cables, motors),
+            "torque_constant": factors(RANGES.torque_constant, motors),
+        },
     )
 
 
@@ -354,7 +352,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
         "contact_estimator:observer.mass_scale": [1.0] * n,
         "contact_estimator:observer.friction_scale": 1.0,
         **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
-        **{f"driver:mismatch.{name}": list(factors) for name, factors in _mismatch(conditions).items() if factors},
+        **{f"driver:mismatch.{name}": list(factors) for name, factors in conditions.mismatch.items()},
     }
     if conditions.payload:
         values["driver:mismatch.payload"] = conditions.payload
@@ -382,16 +380,6 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
             "timing.dither_cycle": RANGES.dither_cycle,
         }
     return values
-
-
-def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
-    return {
-        "mass": conditions.mass,
-        "motor_friction": conditions.motor_friction,
-        "joint_friction": conditions.joint_friction,
-        "stiffness": conditions.cables,
-        "torque_constant": conditions.torque_constant,
-    }
 
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:

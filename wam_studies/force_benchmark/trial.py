@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.event import Code, Event, Level
 from wam_description.mismatch import true_arm
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_sim.simulation import Simulation
@@ -22,7 +21,6 @@ from wam_studies.force_benchmark.outcome import TaskResult, TaskTrace, evaluated
 from wam_studies.force_benchmark.surfaces import NAMES
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps
 
-Array = NDArray[np.float64]
 STOPPED = 1.0  # s, after which a task that is held or in fault is over
 # what else does a task: values of the configuration, and what takes the place of the force loop
 OTHERS: Mapping[str, tuple[Mapping[str, Any], type[UsualController] | None]] = {
@@ -33,7 +31,7 @@ OTHERS: Mapping[str, tuple[Mapping[str, Any], type[UsualController] | None]] = {
 
 
 class _Standing(NamedTuple):
-    """What driver and loop report in a period: as in `TaskTrace`."""
+    """What driver and loop report in a period: the last fields of `TaskTrace`."""
 
     event: Event
     is_stopped: bool
@@ -153,38 +151,18 @@ class TaskWatch:
             standing = self._standing
             stopped = stopped + period if standing.is_stopped else 0.0
         return [
-            TaskTrace(
-                forces=np.array(column),
-                period=period,
-                travel=float(way),
-                impact=impact,
-                event=standing.event,
-                is_stopped=standing.is_stopped,
-                is_fault=standing.is_fault,
-                predicted_cycle=standing.predicted_cycle,
-            )
+            TaskTrace(np.array(column), period, float(way), impact, *standing)
             for column, way in zip(zip(*forces, strict=True), travel, strict=True)
         ]
 
     @property
     def _standing(self) -> _Standing:
-        fault, node = self._run.driver.safety.fault, self._node
-        return _Standing(
-            self._event,
-            bool(fault) or node.event.holds,
-            bool(fault),
-            float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
-        )
-
-    @property
-    def _event(self) -> Event:
-        """Why the driver or the force loop does not do what is commanded."""
+        node, topics = self._node, ("force_command", "task_command")
+        cycle = float(node.guard_report.facts.get("limit cycle [N]", 0.0))
         if fault := self._run.driver.safety.fault:
-            return Event(Code.FAULT, Level.ERROR, {"reason": fault})
-        refusals = self._node.refusals
-        found = (refusals[topic] for topic in ("force_command", "task_command") if topic in refusals)
-        event: Event = next(found, self._node.event)
-        return event
+            return _Standing(Event(Code.FAULT, Level.ERROR, {"reason": fault}), True, True, cycle)
+        event = next((node.refusals[topic] for topic in topics if topic in node.refusals), node.event)
+        return _Standing(event, node.event.holds, False, cycle)
 
     def _along(self, q: list[float]) -> Array:
         """Position of each touched point along its force, m."""

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import unknowns
@@ -17,11 +16,9 @@ from wam_analysis.identification.regressor import Regressor
 from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, build_part
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import Obstacles
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

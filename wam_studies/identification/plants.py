@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from wam_analysis.identification.parameters import shared_joints
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
+from wam_description.rigid_body import Array
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
-
-Array = NDArray[np.float64]
 
 KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors", "all, real signals")
 

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wam_description.rigid_body import Array
 from wam_studies.harness import Study, option
 from wam_studies.identification.plants import KINDS
 from wam_studies.identification.trial import IdentificationResult, IdentificationTrial, run_trial
 from wam_studies.scores import Row, Scores, ScoreTable, exact
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_analysis.identification.fit import Identification, identify
 from wam_analysis.identification.motion import MotionSamples, evenly, motion
@@ -14,13 +13,11 @@ from wam_analysis.identification.regressor import Regressor
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
-from wam_description.rigid_body import RigidBody
+from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_studies.identification.excitation import moves, path
 from wam_studies.identification.plants import EXACT, MeasuredSignals, measured_signals, plant, true_friction
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,16 @@ One link on one motor, the testbed of section 5.6 with one effect at a time.  A 
 has a rotor of practically infinite inertia.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from wam_analysis.measures.limit_cycle import mean_cycle
+from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Ripples, no_effects
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
@@ -26,6 +28,7 @@ from wam_studies.plant.ideal_testbed import (
     LEVER,
     NOTHING,
     STEP,
+    Numbers,
     against_spring,
     breakaway,
     crept,
@@ -42,7 +45,6 @@ from wam_theory.friction_model import IntegralLoop
 from wam_theory.stick_slip import simulate
 from wam_theory.tension_element import coulomb_like_torque
 
-Numbers = NDArray[np.float64]
 CRITICAL = 0.8  # part of the stiffness at which the torque loop is marginal
 RUN_STEP = 5e-4  # s, that users run
 TURNS, FINE = 40, 1000  # cycles of the torque loop, and steps of each, so that it has practically no delay
@@ -61,6 +63,11 @@ class PlantCurve(NamedTuple):
         return float(np.abs(self.plant - self.theory).max() / np.abs(self.theory).max())
 
 
+def _curve(x: Numbers, plant: Callable[[float], float], theory: ArrayLike) -> PlantCurve:
+    """What the plant does at each x, next to theory."""
+    return PlantCurve(x, np.array([plant(value) for value in x.tolist()]), np.asarray(theory))
+
+
 def level(plant: float, theory: float) -> PlantCurve:
     """A single number."""
     return PlantCurve(np.zeros(1), np.array([plant]), np.array([theory]))
@@ -76,35 +83,34 @@ def slack() -> PlantCurve:
     (circuit,) = ideal_testbed().circuits
     stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
     theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
-    return PlantCurve(stretch, _stretched(stretch, slack=True), theory)
+    return _curve(stretch, _stretched(slack=True), theory)
 
 
-def backlash(play: float = 0.04) -> PlantCurve:
+def backlash() -> PlantCurve:
     """Torque of a circuit with backlash over its stretch, rad and N m."""
+    play = 0.04
     stretch = np.linspace(-2.5, 2.5, 101) * play
     theory = play_torque(stretch, ideal_testbed().circuits[0].stiffness, play)
-    return PlantCurve(stretch, _stretched(stretch, backlash=(play,)), theory)
+    return _curve(stretch, _stretched(backlash=(play,)), theory)
 
 
-def _stretched(stretch: Numbers, **effects: Any) -> Numbers:
-    """Torques of the circuit of a plant with these effects, N m, its link at rest."""
-    plant, torques = released_plant(ideal_testbed(), **effects), []
-    for value in stretch:
-        plant.data.qpos[:] = (value, 0.0)
+def _stretched(**effects: Any) -> Callable[[float], float]:
+    """Torque of the circuit of a plant with these effects, N m, over its stretch, its link at rest."""
+    plant = released_plant(ideal_testbed(), **effects)
+
+    def torque(stretch: float) -> float:
+        plant.data.qpos[:] = (stretch, 0.0)
         mujoco.mj_forward(plant.model, plant.data)
-        torques.append(plant.circuit_torque[0])
-    return np.array(torques)
+        return plant.circuit_torque[0]
+
+    return torque
 
 
-def creep_out_and_back(
-    torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0, rounds: int = 1, terminated: bool = False
-) -> PlantCurve:
-    """Creep of the link while the motor turns out and back under a constant load.
+def creep_out_and_back(seconds: float = 10.0, rounds: int = 1, terminated: bool = False) -> PlantCurve:
+    """Creep of the link while the motor turns out and back at 1 rad/s under a load of 40 N m at the joint.
 
     Parameters
     ----------
-    torque : load at the joint, N m.
-    speed : of the motor, rad/s.
     seconds : in each direction.
     rounds : out and back.
     terminated : whether the cables end on both pulleys; the theory is that of cables without ends.
@@ -114,11 +120,12 @@ def creep_out_and_back(
     PlantCurve
         over the motor's absolute travel, rad; angles at the joint, rad.
     """
+    torque = 40.0
     plant = _loaded(torque, terminated)
     rest = plant.q[0] - plant.theta[0] / 14.0
     travel, found, done = [], [], 0.0
     for direction in (1.0, -1.0) * rounds:
-        plant.data.qvel[:] = (direction * speed, direction * speed / 14.0)
+        plant.data.qvel[:] = (direction, direction / 14.0)
         for _ in range(round(seconds / STEP / 40)):
             before = plant.theta[0]
             _run(plant, 40 * STEP)
@@ -141,14 +148,14 @@ def _loaded(torque: float, terminated: bool = False) -> Plant:
 def efficiency_under_load() -> PlantCurve:
     """Power out over power in of slow turning under load, over the motor's torque, N m."""
     torques = np.linspace(1.0, 6.779, 6)
-    efficiencies = []
-    for torque in torques:
+
+    def efficiency(torque: float) -> float:
         plant = _loaded(-14.0 * torque)
         plant.data.qvel[:] = (5.0, 5.0 / 14.0)
         _run(plant, 1.5)
-        efficiencies.append(power_ratio(plant, 14.0 * torque, round(1.0 / STEP)))
-    theory = [limiting_efficiency(ideal_testbed(), torque) for torque in torques]
-    return PlantCurve(torques, np.array(efficiencies), np.array(theory))
+        return power_ratio(plant, 14.0 * torque, round(1.0 / STEP))
+
+    return _curve(torques, efficiency, [limiting_efficiency(ideal_testbed(), torque) for torque in torques])
 
 
 def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
@@ -176,11 +183,10 @@ def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
 def coulomb_like() -> PlantCurve:
     """Loss under torque control as a friction torque at the motor, over its torque, N m: (6.22) of all pulleys."""
     torques = np.linspace(1.0, 6.0, 6)
-    found = [torque_controlled(torque, 0.5)[1] for torque in torques.tolist()]
     cables = ideal_testbed().cables
     stages = list(zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, strict=True))
     theory = sum(2.0 * coulomb_like_torque(n * torques, r, ea) / n for n, r, ea in stages)
-    return PlantCurve(torques, np.array(found), np.asarray(theory))
+    return _curve(torques, lambda torque: torque_controlled(torque, 0.5)[1], theory)
 
 
 def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
@@ -218,14 +224,15 @@ def surface(hardening: float, cover: float = 0.0) -> PlantCurve:
     below = 0.01  # m below the link, which then touches with its tip only
     floor = _floor(below, 4e3, 0.0, hardening)
     plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS, cover_stiffness=cover))
-    forces = []
-    for depth in depths:
+
+    def force(depth: float) -> float:
         q = -np.arcsin((depth + below) / LEVER)
         plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), 0.0
         plant.step([0.0])
         (load,) = plant.loads()
-        forces.append(float(np.linalg.norm(load.force)))
-    return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+        return float(np.linalg.norm(load.force))
+
+    return _curve(depths, force, 4e3 * depths * (1.0 + hardening * depths))
 
 
 def _floor(below: float, stiffness: float, damping: float, hardening: float) -> Obstacles:
@@ -303,9 +310,8 @@ def backlash_in_a_torque_loop() -> PlantCurve:
     The last two are those of Luh, Fisher and Paul on the first two joints of the Stanford arm.
     """
     wanted = np.array([60.0, 150.0, 334.0, 477.0])
-    found = [1.0 / mean_cycle(*torque_loop_response(hertz)).period for hertz in wanted.tolist()]
     exact = [exact_cycle(torque_loop(hertz)).frequency / (2.0 * np.pi) for hertz in wanted.tolist()]
-    return PlantCurve(wanted, np.array(found), np.array(exact))
+    return _curve(wanted, lambda hertz: 1.0 / mean_cycle(*torque_loop_response(hertz)).period, exact)
 
 
 def impact() -> PlantCurve:
@@ -314,29 +320,33 @@ def impact() -> PlantCurve:
     F = v sqrt(J k); the cable is so long that the rotor has no effect.
     """
     stiffness = np.linspace(200.0, 2e4, 25)
-    arm = ideal_testbed()
-    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    arm = _with_long_cable()
     inertia = link_inertia(arm)
-    found = []
-    for k in stiffness:
-        world = World(NOTHING, Springs(("joint1",), (float(k),), (LEVER,), (0.0,), (False,)))
+
+    def force(k: float) -> float:
+        world = World(NOTHING, Springs(("joint1",), (k,), (LEVER,), (0.0,), (False,)))
         plant = released_plant(arm, world)
         plant.data.qvel[:] = (-7.0, -0.5)
         greatest = 0.0
         for _ in range(round(np.pi * np.sqrt(inertia / k) / LEVER / STEP)):
             plant.step([0.0])
-            greatest = max(greatest, -float(k) * LEVER * plant.q[0])
-        found.append(greatest)
-    return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
+            greatest = max(greatest, -k * LEVER * plant.q[0])
+        return greatest
+
+    return _curve(stiffness, force, 0.5 * np.sqrt(inertia * stiffness))
 
 
-def damped_impact(step: float = RUN_STEP, damping: float = 20.0) -> PlantCurve:
+def _with_long_cable() -> Arm:
+    arm = ideal_testbed()
+    return replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+
+
+def damped_impact(step: float = RUN_STEP) -> PlantCurve:
     """Greatest force of a tip that runs into a damped surface at 0.5 rad/s, over its stiffness, N/m, at a step, s.
 
     The force of m x'' + b x' + k x = 0 with the mass m of (3.1); the cable is so long that the rotor has no effect.
     """
-    arm, stiffness, below = ideal_testbed(), np.array([1e3, 4e3, 1.6e4]), 0.01
-    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    arm, stiffness, below, damping = _with_long_cable(), np.array([1e3, 4e3, 1.6e4]), 0.01, 20.0
     speed, mass, found, expected = 0.5 * LEVER, link_inertia(arm) / LEVER**2, [], []
     for k in stiffness.tolist():
         floor = _floor(below, k, damping, 0.0)
@@ -366,16 +376,16 @@ def stiction_cycle(step: float = RUN_STEP) -> PlantCurve:
     return level(float(np.ptp(found.force[late])), float(np.ptp(exact.contact_force[late])))
 
 
-def pretension(coefficient: float = 1e-4) -> PlantCurve:
+def pretension() -> PlantCurve:
     """Breakaway torque of the motor over the pretension, N m over N: what active pretension would lower, (6.5)."""
-    arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
+    arm, coefficient = ideal_testbed(friction=(50.0, 50.0)), 1e-4  # the link does not move
     tension = np.linspace(0.2, 1.0, 5) * arm.cables.pretension[0]
-    found = []
-    for value in tension.tolist():
+
+    def torque(value: float) -> float:
         less = replace(arm, cables=replace(arm.cables, pretension=(value,)))
-        plant = released_plant(less, tension_friction=(coefficient,))
-        found.append(breakaway(plant, 0.9 * coefficient * 2.0 * value))
-    return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)
+        return breakaway(released_plant(less, tension_friction=(coefficient,)), 0.9 * coefficient * 2.0 * value)
+
+    return _curve(tension, torque, coefficient * 2.0 * tension)
 
 
 def terminated_creep() -> PlantCurve:
@@ -385,18 +395,13 @@ def terminated_creep() -> PlantCurve:
     return found._replace(theory=0.5 * np.minimum(found.theory, found.theory[first][-1]))
 
 
-def gross_slip(wrap: float = 3.0 * np.pi, friction: float = 0.2) -> PlantCurve:
-    """Torque of the motor on a link that does not move, N m, over its angle times k_tr, N m; (6.16).
-
-    Parameters
-    ----------
-    wrap : of the cable on the pinion, rad.
-    friction : its coefficient.
-    """
+def gross_slip() -> PlantCurve:
+    """Torque of the motor on a link that does not move, N m, over its angle times k_tr, N m; (6.16)."""
+    wrapped = 3.0 * np.pi * 0.2  # turns of the cable on the pinion, rad, times its friction
     arm = ideal_testbed(rotor=IMMOVABLE, friction=(1e4, 1e4))
     (circuit,) = arm.circuits
-    plant, speed = released_plant(arm, capstan=wrap * friction), 1.0
-    most = 2.0 * circuit.pretension * circuit.radius * float(np.tanh(0.5 * wrap * friction))
+    plant, speed = released_plant(arm, capstan=wrapped), 1.0
+    most = 2.0 * circuit.pretension * circuit.radius * float(np.tanh(0.5 * wrapped))
     plant.data.qvel[0] = speed
     wanted, found = [], []
     for _ in range(round(1.5 * most / circuit.stiffness / speed / STEP)):
@@ -407,20 +412,15 @@ def gross_slip(wrap: float = 3.0 * np.pi, friction: float = 0.2) -> PlantCurve:
     return PlantCurve(expected, np.array(found), np.minimum(expected, most))
 
 
-def soft_cover(cover: float = 2000.0) -> PlantCurve:
-    """Force, N, over depth, m, of a surface of 4000 N/m under a cover of this stiffness, N/m, in series (1.1.1)."""
-    found = surface(0.0, cover)
-    return found._replace(theory=found.theory / (1.0 + 4000.0 / cover))
+def soft_cover() -> PlantCurve:
+    """Force, N, over depth, m, of a surface of 4000 N/m under a cover of 2000 N/m in series (1.1.1)."""
+    found = surface(0.0, 2000.0)
+    return found._replace(theory=found.theory / (1.0 + 4000.0 / 2000.0))
 
 
-def current_loop(bandwidth: float = 100.0, delay: int = 2) -> PlantCurve:
-    """Current after a step of its command by 1 A, over time, s: a delay and a lag of first order.
-
-    Parameters
-    ----------
-    bandwidth : Hz.
-    delay : periods of 1 ms.
-    """
+def current_loop() -> PlantCurve:
+    """Current after a step of its command by 1 A, over time, s: a delay and a lag of first order."""
+    bandwidth, delay = 100.0, 2  # Hz, periods of 1 ms
     configuration = Configuration.load(packaged("testbed"))
     parameters = configuration.node("driver", DriverParameters).amplifier
     slow = replace(parameters, bandwidth=bandwidth, delay=delay)
@@ -430,15 +430,16 @@ def current_loop(bandwidth: float = 100.0, delay: int = 2) -> PlantCurve:
     return PlantCurve(time, found, -np.expm1(-2.0 * np.pi * bandwidth * np.maximum(time - 1e-3 * delay, 0.0)))
 
 
-def warm_friction(drop: float = 0.3) -> PlantCurve:
+def warm_friction() -> PlantCurve:
     """Breakaway of a motor, N m, over the heat of its winding, 1 at its limit: it falls by `drop` of it."""
-    arm = ideal_testbed(friction=(50.0, 50.0))
+    arm, drop = ideal_testbed(friction=(50.0, 50.0)), 0.3
     arm = replace(arm, motors=replace(arm.motors, static_friction=(0.05,), dynamic_friction=(0.05,)))
     heat = np.linspace(0.0, 1.0, 5)
-    found = []
-    for w in heat.tolist():
+
+    def torque(w: float) -> float:
         plant = Plant(arm, EMPTY, no_effects(arm), STEP, replace(COULOMB_STICTION, warm_drop=drop))
         plant.brake(False)
         plant.heat([w])
-        found.append(breakaway(plant, 0.045 * (1.0 - drop * w)))
-    return PlantCurve(heat, np.array(found), 0.05 * (1.0 - drop * heat))
+        return breakaway(plant, 0.045 * (1.0 - drop * w))
+
+    return _curve(heat, torque, 0.05 * (1.0 - drop * heat))

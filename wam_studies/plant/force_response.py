@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_driver.plant import Plant
@@ -12,14 +11,13 @@ from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     RATIO,
     STEP,
+    Numbers,
     against_spring,
     ideal_testbed,
     link_inertia,
     released_plant,
 )
 from wam_theory.friction_model import FrictionNode
-
-Numbers = NDArray[np.float64]
 
 
 class PlantResponse(NamedTuple):

@@ -7,19 +7,17 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop_parameters import AXES
 from wam_description.arm import Arm, seconds
 from wam_description.world import Springs
-from wam_studies.figures.panels import Line, Series, line_only, measured
+from wam_studies.figures.panels import Line, Numbers, Series, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Motion, Verdict, simulate
 
-Numbers = NDArray[np.float64]
 LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
 ACROSS = 1  # y of the link's frame, along which the testbed presses
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wam_bag.arrays import Numbers
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.losses import CUT
 from wam_description.arm import Shared
@@ -14,7 +14,6 @@ from wam_sim.recorded_parameters import RecordedParameters
 from wam_sim.recording import recorded_run
 
 T = TypeVar("T")
-Numbers = NDArray[np.float64]
 
 
 class RecordedJoints(NamedTuple):
