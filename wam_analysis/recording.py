@@ -272,5 +272,5 @@ class AnalysedRecording:
 
     @cached_property
     def motion(self) -> TransmissionFindings:
-        """Friction and ripple of motors and joints."""
+        """Friction of motors and joints."""
         return transmission_findings(self.run, self.parameters)

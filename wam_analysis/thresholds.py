@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ShaftThresholds:
-    """When a shaft is at rest, what its friction and ripple can be known from, and when they are certain."""
+    """When a shaft is at rest, what its friction can be known from, and when they are certain."""
 
     # rest and motion
     motor_rest: float = 0.05  # rad/s; a slower motor is at rest
@@ -49,14 +49,6 @@ class ShaftThresholds:
     apart: float = 0.1
     agree: float = 0.2  # by which a recorded velocity may differ from the rate of the position
     least_work: float = 1e-3  # J below which no efficiency is given
-    # ripple
-    orders: int = 48  # of the ripple, cycles per turn
-    enough_turns: float = 1.2  # turns that determine it where they have no gaps
-    faint_ripple: float = 3.0  # times the median order; smaller ripple is not reported
-    slight_ripple: float = 0.05  # of the dry friction; smaller ripple is not reported either
-    cells: int = 4  # per turn and order, into which angles are binned
-    # condition number above which the angles have gaps that make ripple of any error of the torque
-    determined: float = 100.0
     release: int = 200_000_000  # ns after the brakes were released
     # s; with a longer period, cable torques do not show what a resonance does between samples
     slowest_period: float = 0.006
@@ -105,17 +97,13 @@ class CycleThresholds:
     lines: int = 3  # of a spectrum, that are reported
     # of a size: a cycle whose second half has less of the first, or more, is reported as changing
     changing: float = 0.9
-    # lines of a spectrum, frequency response
+    # lines of a spectrum
     first_line: int = 5  # lowest frequency, in 1/duration: below it a drift is no line
     # bins on each side at least and at most, half of the frequency, from which the noise is known
     neighbours: tuple[int, ...] = (8, 24)
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
     clear_line: float = 0.05  # of the largest line: smaller ones are not reported
-    coherent: float = 0.8  # coherence from which a response is taken
-    excited: float = 1e-4  # of the strongest part of the input
-    segment: float = 2.0  # s, of the signals whose spectra are averaged
-    segments: int = 6  # that are averaged at least: of fewer, noise is often coherent
     # steps and stability
     # part of the settling band that noise may fill after smoothing, four standard deviations of it
     step_quiet: float = 0.1

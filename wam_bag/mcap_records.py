@@ -8,14 +8,15 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import Any, Final
+from mmap import mmap
+from typing import Any, Final, NamedTuple
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Chunk, ChunkIndex
 from mcap.writer import MCAP0_MAGIC
 
 from wam_bag.arrays import Bytes
@@ -24,15 +25,20 @@ from wam_bag.errors import Damage, TooLargeError
 MAGIC: Final[bytes] = MCAP0_MAGIC
 HEAD: Final = struct.Struct("<BQ")  # opcode and length of a record
 FIRST_PRIVATE: Final = 0x80  # opcodes from here on belong to applications and are skipped
-FOOTER_SIZE: Final = HEAD.size + 20
+FOOTER: Final = struct.Struct("<QQI")  # content: start of the summary, of its offsets, checksum
+FOOTER_SIZE: Final = HEAD.size + FOOTER.size
 LARGEST_CHUNK: Final = 2**28  # bytes, decompressed
 LARGEST_ATTACHMENT: Final = 2**28  # bytes
+_CHUNK: Final = struct.Struct("<QQQII")  # first and last log time, decompressed size, checksum, length of what follows
+_CHUNK_INDEX: Final = struct.Struct(
+    "<QQQQI"
+)  # first and last log time, start and length of the chunk, bytes of offsets
+_OFFSETS: Final = np.dtype([("channel", "<u2"), ("offset", "<u8")])
 _CLASSES: Final[dict[int, Any]] = {
-    Opcode.HEADER: records.Header, Opcode.FOOTER: records.Footer, Opcode.SCHEMA: records.Schema,
-    Opcode.CHANNEL: records.Channel, Opcode.CHUNK: records.Chunk, Opcode.CHUNK_INDEX: records.ChunkIndex,
+    Opcode.HEADER: records.Header, Opcode.SCHEMA: records.Schema, Opcode.CHANNEL: records.Channel,
     Opcode.ATTACHMENT: records.Attachment, Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
     Opcode.STATISTICS: records.Statistics, Opcode.METADATA: records.Metadata,
-    Opcode.METADATA_INDEX: records.MetadataIndex, Opcode.DATA_END: records.DataEnd,
+    Opcode.METADATA_INDEX: records.MetadataIndex,
 }  # fmt: skip
 
 
@@ -73,72 +79,108 @@ def serialized(*items: records.McapRecord) -> bytes:
     return builder.end()  # type: ignore[no-untyped-call]
 
 
-def walk(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Opcode, start and end of each record in some bytes."""
-    position, size = 0, len(data)
-    while position < size:
-        if position + HEAD.size > size:
-            raise Damage("a record ends early")
-        opcode, length = HEAD.unpack_from(data, position)
-        end = position + HEAD.size + length
-        if end > size:
-            raise Damage("a record is longer than what contains it")
-        yield opcode, position, end
-        position = end
+class RecordExtent(NamedTuple):
+    """A record among others: its opcode, first byte and end."""
+
+    opcode: int
+    start: int
+    end: int
 
 
-def chunk_of(start: int, end: int, head: bytes) -> ChunkIndex:
-    """Index of a chunk without message indexes, from the place of its record and the first bytes of its content."""
+def walk(data: bytes | mmap, start: int, end: int) -> Iterator[RecordExtent]:
+    """The records between two places of some bytes."""
+    while start < end:
+        if start + HEAD.size > end:
+            raise Damage(f"a record at byte {start} ends early")
+        opcode, length = HEAD.unpack_from(data, start)
+        after = start + HEAD.size + length
+        if after > end:
+            raise Damage(f"the record at byte {start} is longer than what contains it")
+        yield RecordExtent(opcode, start, after)
+        start = after
+
+
+class ChunkPlace(NamedTuple):
+    """A chunk in a file.
+
+    Attributes
+    ----------
+    start, end : of its record, bytes.
+    indexes_end : of the message indexes behind it; as `end` where they are not known.
+    first, last : log times, ns.
+    size : decompressed, bytes.
+    channels : that have messages in it; none where the file does not list them.
+    """
+
+    start: int
+    end: int
+    indexes_end: int
+    first: int
+    last: int
+    size: int
+    channels: frozenset[int]
+
+
+def chunk_of(record: RecordExtent, head: bytes) -> ChunkPlace:
+    """A chunk without message indexes, from the place of its record and the first bytes of its content."""
     first, last, size = struct.unpack_from("<QQQ", head)
-    return _checked(ChunkIndex(end - start, start, "", 0, last, 0, {}, first, size))
+    return _checked(ChunkPlace(record.start, record.end, record.end, first, last, size, frozenset()))
 
 
-def chunk_index(content: bytes) -> ChunkIndex:
-    """A chunk index record."""
-    return _checked(parsed(Opcode.CHUNK_INDEX, content))
+def chunk_index(content: bytes) -> ChunkPlace:
+    """A chunk by its index record."""
+    first, last, start, length, offsets = _CHUNK_INDEX.unpack_from(content)
+    channels = np.frombuffer(content[_CHUNK_INDEX.size :][:offsets], _OFFSETS)["channel"]
+    (indexes,) = struct.unpack_from("<Q", content, _CHUNK_INDEX.size + offsets)
+    (size,) = struct.unpack_from("<Q", content, len(content) - 8)
+    end = start + length
+    return _checked(ChunkPlace(start, end, end + indexes, first, last, size, frozenset(channels.tolist())))
 
 
-def _checked(index: ChunkIndex) -> ChunkIndex:
-    if index.uncompressed_size > LARGEST_CHUNK:
+def _checked(place: ChunkPlace) -> ChunkPlace:
+    if place.size > LARGEST_CHUNK:
         raise TooLargeError(
-            f"the chunk at byte {index.chunk_start_offset} is to hold {index.uncompressed_size} bytes; "
-            f"chunks of at most {LARGEST_CHUNK} are read"
+            f"the chunk at byte {place.start} is to hold {place.size} bytes; chunks of at most {LARGEST_CHUNK} are read"
         )
-    return index
+    return place
 
 
-def decompress(index: ChunkIndex, record: bytes, into: Bytes, zstd: zstandard.ZstdDecompressor) -> None:
+def decompress(place: ChunkPlace, record: bytes, into: Bytes, zstd: zstandard.ZstdDecompressor) -> None:
     """Decompress a chunk and check it.
 
     Parameters
     ----------
-    index : of the chunk.
+    place : of the chunk.
     record : the chunk record on disk.
-    into : ``index.uncompressed_size`` bytes, which are filled.
+    into : ``place.size`` bytes, which are filled.
     zstd : kept by the caller, because it takes long to create.
     """
-    where = f"the chunk at byte {index.chunk_start_offset}"
-    if len(record) != index.chunk_length or HEAD.unpack_from(record) != (Opcode.CHUNK, len(record) - HEAD.size):
+    where = f"the chunk at byte {place.start}"
+    if record[: HEAD.size] != HEAD.pack(Opcode.CHUNK, len(record) - HEAD.size):
         raise Damage(f"{where} is not where its index has it")
-    chunk: Chunk = parsed(Opcode.CHUNK, record[HEAD.size :])
-    expected = index.message_start_time, index.message_end_time, index.uncompressed_size
-    if (chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size) != expected:
+    first, last, size, crc, length = _CHUNK.unpack_from(record, HEAD.size)
+    if (first, last, size) != (place.first, place.last, place.size):
         raise Damage(f"{where} and its index differ")
-    data = _decompressed(chunk, len(into) + 1, zstd)
+    begin = HEAD.size + _CHUNK.size
+    (compressed,) = struct.unpack_from("<Q", record, begin + length)
+    data = record[begin + length + 8 :]
+    if len(data) != compressed:
+        raise Damage(f"{where} ends early")
+    data = _decompressed(record[begin : begin + length], data, len(into) + 1, zstd)
     if len(data) != len(into):
         raise Damage(f"{where} holds {len(data)} bytes, or more, instead of {len(into)}")
-    if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
+    if crc and crc != zlib.crc32(data):
         raise Damage(f"{where} does not match its checksum")
     into.data[:] = data
 
 
-def _decompressed(chunk: Chunk, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
+def _decompressed(compression: bytes, data: bytes, most: int, zstd: zstandard.ZstdDecompressor) -> bytes:
     """So many bytes of a chunk at most; the library's own decompression allocates what the data ask for."""
-    if chunk.compression == "":
-        return chunk.data
-    if chunk.compression == "zstd":
-        with zstd.stream_reader(chunk.data) as stream:
+    if compression == b"":
+        return data
+    if compression == b"zstd":
+        with zstd.stream_reader(data) as stream:
             return stream.read(most)
-    if chunk.compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most)
-    raise Damage(f"a chunk is compressed with '{chunk.compression}'; 'zstd', 'lz4' and none are read")
+    if compression == b"lz4":
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
+    raise Damage(f"a chunk is compressed with {compression!r}; 'zstd', 'lz4' and none are read")

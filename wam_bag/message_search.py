@@ -60,7 +60,7 @@ def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | N
         start = end
     entries: dict[int, Rows] = {}
     try:
-        for opcode, record, end in walk(index):
+        for opcode, record, end in walk(index, 0, len(index)):
             first = record + _INDEX_HEAD
             if opcode != Opcode.MESSAGE_INDEX or end < first or (end - first) % 16:
                 return None
@@ -95,7 +95,7 @@ def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | N
 
 def _by_walking(data: bytes, define: Define) -> dict[int, Found]:
     places: dict[int, list[tuple[int, int]]] = {}
-    for opcode, start, end in walk(data):
+    for opcode, start, end in walk(data, 0, len(data)):
         if opcode == Opcode.MESSAGE:
             if end - start < DATA:
                 raise Damage("a message record ends early")

@@ -16,8 +16,8 @@ from wam_bag.bag_file import files, refuse_compressed
 from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
-from wam_bag.mcap_file import McapFile, MessageCounts, RecordExtent
-from wam_bag.mcap_records import message, parsed
+from wam_bag.mcap_file import McapFile, MessageCounts
+from wam_bag.mcap_records import RecordExtent, message, parsed
 from wam_bag.mcap_writer import McapWriter
 from wam_bag.metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 
@@ -163,12 +163,10 @@ class _Copy:
         """Log times of the messages of a chunk by channel id."""
         found: dict[int, list[int]] = {}
         with contextlib.suppress(*BROKEN):
-            while (record := self._file.record_at(position)).opcode == Opcode.MESSAGE_INDEX:
-                content = self._file.content(record)
+            for content in self._file.indexes_behind(position):
                 channel, _ = _INDEX_HEAD.unpack_from(content)
                 entries = np.frombuffer(content, "<u8", offset=_INDEX_HEAD.size)
                 found[channel] = entries.reshape(-1, 2)[:, 0].tolist()
-                position = record.end
         return found
 
     def _losses(self) -> FileLosses:

@@ -172,13 +172,6 @@ def test_every_number_of_a_section_stands_in_its_tables_within_the_width(moving:
                 assert shown(finding.predicted) in found
 
 
-def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
-    found = moving.finding("motor1: largest ripple")
-    assert found.measured == pytest.approx(RIPPLE, rel=0.05)
-    assert found.predicted == RIPPLE
-    assert found.note.startswith("24 cycles per turn")
-
-
 def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:
     text = " ".join(section_of(moving, "happened").sentences)
     gain = moving.configuration.sections["force_loop"]["force_gain"]
@@ -189,23 +182,21 @@ def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:
     assert all("parameters at the start" in one.note for one in stability.findings if math.isfinite(one.predicted))
 
 
-def test_a_push_is_in_no_friction_and_no_ripple_where_only_gravity_is_known(moving: Recorded) -> None:
-    def seen(*left_out: str) -> tuple[Section, Section]:
+def test_a_push_is_in_no_friction_where_only_gravity_is_known(moving: Recorded) -> None:
+    def seen(*left_out: str) -> Section:
         topics = {name: one for name, one in moving.bag.topics.items() if not name.endswith((*LOADS, *left_out))}
         sections = analyse_bag(moving.bag._replace(topics=topics), lambda doing: None).sections
-        friction, ripple = (section for section in sections if section.key in ("friction", "ripple"))
-        return friction, ripple
+        (friction,) = (section for section in sections if section.key == "friction")
+        return friction
 
     for unknown in ((), ("contact/wrench",)):
-        friction, ripple = seen(*unknown)
+        friction = seen(*unknown)
         said = " ".join(friction.sentences)
         assert "in which something pushed or touched the arm" in said
         assert ("not recorded (contact/wrench)" in said) is bool(unknown)
         (found,) = (one for one in friction.findings if one.name == "motor4: dynamic friction")
         assert found.measured == pytest.approx(found.predicted, rel=0.1)
-        assert not ripple.findings
-        assert "Ripple was not measured" in ripple.sentences[0]
-    said = " ".join(seen("contact/wrench", "sim/disturbance")[0].sentences)
+    said = " ".join(seen("contact/wrench", "sim/disturbance").sentences)
     assert "not recorded (contact/wrench, sim/disturbance)" in said
     assert "gravity alone" not in " ".join(section_of(moving, "friction").sentences)
 

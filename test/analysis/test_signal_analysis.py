@@ -8,12 +8,10 @@ import pytest
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.force_accuracy import force_accuracy
-from wam_analysis.measures.frequency import frequency_response
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.measures.response import step_response
-from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import without_short
 from wam_analysis.measures.stability import stability, swings
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
@@ -320,37 +318,6 @@ def test_impacts_do_not_spoil_the_friction():
 # frequency
 
 
-def resonator(omega: float, zeta: float, rate: float, put: np.ndarray) -> np.ndarray:
-    """omega^2/(s^2 + 2 zeta omega s + omega^2), its input held for a sample, exactly."""
-    damped = omega * math.sqrt(1.0 - zeta**2)
-    dt, decay = 1.0 / rate, math.exp(-zeta * omega / rate)
-    c, s = math.cos(damped * dt), math.sin(damped * dt)
-    a = decay * np.array(
-        [[c + zeta * omega / damped * s, s / damped], [-(omega**2) / damped * s, c - zeta * omega / damped * s]]
-    )
-    b = np.array([1.0 - a[0, 0], -a[1, 0]])
-    state, out = np.zeros(2), np.empty(len(put))
-    for i, u in enumerate(put):
-        out[i] = state[0]
-        state = a @ state + b * u
-    return out
-
-
-def test_a_planted_response_and_its_coherence_are_recovered_from_noise():
-    omega, zeta, rate = 2.0 * math.pi * 13.2, 0.1, 1000.0
-    put = draws(10, 60_000, 1.0)
-    clean = resonator(omega, zeta, rate, put)
-    got = clean + draws(11, len(put), 0.1 * float(np.std(clean)))
-    found = frequency_response(rate, put, got, 4096)
-    low = found.frequency < 60.0
-    held = np.exp(-1j * np.pi * found.frequency / rate)  # half a sample of delay by the hold
-    s = 2j * np.pi * found.frequency
-    planted = omega**2 / (s**2 + 2.0 * zeta * omega * s + omega**2) * held
-    assert found.response[low] == pytest.approx(planted[low], abs=0.03 * float(np.abs(planted).max()))
-    assert found.coherence[(found.frequency > 5.0) & (found.frequency < 15.0)].min() > 0.9
-    assert found.coherence[found.frequency > 300.0].mean() < 0.3
-
-
 # stability
 
 
@@ -392,21 +359,6 @@ def test_efficiency_is_work_out_over_work_in_both_ways():
     assert found.forward == near(0.93)
     assert found.back == near(0.8)
     assert found.forward_put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
-
-
-# ripple
-
-
-def test_ripple_of_each_order_is_recovered_at_any_speed():
-    time = np.arange(20_000) / 1000.0
-    angle = 9.0 * np.sin(0.7 * time) + 0.4 * time**2 / 10.0
-    torque = 0.03 * np.sin(24.0 * angle + 0.5) + 0.05 * np.sin(angle - 1.0) + 0.2 + draws(17, len(time), 0.02)
-    found = ripple_spectrum(angle, torque, 30)
-    by_order = dict(zip(found.order.tolist(), found.amplitude.tolist(), strict=True))
-    assert by_order[24] == PRECISE(0.03, rel=0.02)
-    assert by_order[1] == PRECISE(0.05, rel=0.02)
-    assert max(amplitude for order, amplitude in by_order.items() if order not in {1, 24}) < 0.002
-    assert found.turns > 2.0
 
 
 # timing

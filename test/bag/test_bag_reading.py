@@ -385,8 +385,8 @@ def test_files_outside_the_bag_are_not_read(tmp_path: Path, name: str) -> None:
     assert_columns(read(tmp_path / "bag").topics["/js"], samples)
 
 
-@pytest.mark.parametrize("length", [0, 8])
-def test_an_index_that_names_a_record_without_a_head_is_refused(tmp_path: Path, length: int) -> None:
+def test_a_record_that_is_longer_than_the_data_is_refused(tmp_path: Path) -> None:
+    length = 8
     path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 3, seed=1), Way(crcs=False))
     data = bytearray(path.read_bytes())
     index = data.rindex(struct.pack("<BQ", Opcode.METADATA_INDEX, 8 + 8 + 4 + len("note")))
@@ -394,7 +394,7 @@ def test_an_index_that_names_a_record_without_a_head_is_refused(tmp_path: Path, 
     struct.pack_into("<QQ", data, index + 9, start, length)
     struct.pack_into("<BQ", data, start + length, 0x80, whole - length - 9)  # the rest is a record to be skipped
     path.write_bytes(data)
-    with pytest.raises(BagError, match=r"is damaged \(a record at byte \d+ is shorter than its head\); copy it again"):
+    with pytest.raises(BagError, match=r"is damaged \(the record at byte \d+ is longer than what contains it\); copy"):
         read(path)
 
 

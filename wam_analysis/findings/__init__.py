@@ -14,11 +14,10 @@ swinging               cycles of motors and joints where no force was recorded
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press
-transmission           friction and ripple of motors and joints
+transmission           friction of motors and joints
 transmission_signals   motors, cables and joints on one time base
-motion                 sections about friction and ripple
+motion                 section about friction
 power                  section about efficiency and backdrivability
-frequency              section about the velocity loops
 timing                 section about the loop, and provenance
 tabulated              tables of subjects and quantities
 charts, plots          the charts, as numbers, and the picture of the arm

@@ -11,8 +11,7 @@ from wam_analysis.findings.effort import effort_section
 from wam_analysis.findings.finding import Section, counted, shown, stated
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.force_steps import step_section
-from wam_analysis.findings.frequency import frequency_section
-from wam_analysis.findings.motion import friction_section, ripple_section
+from wam_analysis.findings.motion import friction_section
 from wam_analysis.findings.power import power_section
 from wam_analysis.findings.repetition import repetition_section, spectrum_section
 from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
@@ -37,7 +36,7 @@ Maker = Callable[[AnalysedRecording], Section | None]
 
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
-    *OF_STEPS, "motor_states", "motor_current_command", "motor_velocity_command", "joint_sensors", "gravity_effort",
+    *OF_STEPS, "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
     "contact/tracked_friction",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
@@ -258,8 +257,8 @@ def _of_the_start(make: Maker, recording: AnalysedRecording) -> Section | None:
 _force, _cycles = (partial(_of_the_start, make) for make in (force_section, cycle_section))
 SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, _force, contact_section)
 SECTIONS: tuple[Maker, ...] = (
-    happened_section, steps_section, _force, _cycles, contact_section, stick_section, friction_section, ripple_section,
-    power_section, frequency_section, timing_section,
+    happened_section, steps_section, _force, _cycles, contact_section, stick_section, friction_section,
+    power_section, timing_section,
 )  # fmt: skip
 FOREIGN_SECTIONS: tuple[Maker, ...] = (
     topics_section, step_section, repetition_section, stick_section, effort_section, spectrum_section, timing_section,

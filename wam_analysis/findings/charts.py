@@ -62,11 +62,6 @@ def charts(analysis: Analysis) -> Iterator[Chart]:
     yield from map(_thinned, _positions(analysis))
     for one in _shown(analysis.recording):
         yield from _of_motion(one)
-    ripples = {name: found for name, found in analysis.recording.motion.ripple.items() if len(found.order)}
-    for i, (name, found) in enumerate(ripples.items()):
-        line = ChartLine(name, SHAFTS[i % len(SHAFTS)], 1e3 * found.amplitude)
-        order = found.order.astype(np.float64)
-        yield Chart("ripple", f"Torque ripple of {name}.", "cycles per turn", "amplitude [mN m]", order, (line,))
 
 
 def _over_time(analysis: Analysis) -> Iterator[Chart]:

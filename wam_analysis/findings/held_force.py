@@ -22,7 +22,6 @@ from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_analysis.traces import ForceSignal, Traces
 from wam_bag.arrays import Mask, Numbers
-from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
@@ -236,15 +235,10 @@ class Theory(NamedTuple):
     moved: float = math.nan
 
 
-def theory_of(
-    run: RecordedRun,
-    parameters: PredictionParameters,
-    one: HeldForce,
-    arm: Arm | None = None,
-) -> Theory:
-    """What is predicted for a held force, for the recorded arm or another one, in its pose in the middle."""
+def theory_of(run: RecordedRun, parameters: PredictionParameters, one: HeldForce) -> Theory:
+    """What is predicted for a held force, in its pose in the middle."""
     hold, cover, position = one.hold, one.cover, one.position
-    arm = arm or parameters.arm
+    arm = parameters.arm
     poses = None if arm is None else joint_angles(run, arm)
     if arm is None or poses is None or cover not in arm.covers.names:
         return Theory()

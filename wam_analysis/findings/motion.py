@@ -1,17 +1,13 @@
-"""Sections about the transmission: friction, ripple."""
+"""Section about the transmission: friction."""
 
-import cmath
 import math
 
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
-from wam_analysis.findings.transmission import turning
-from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals
-from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber
-from wam_analysis.recorded import PredictionParameters
+from wam_analysis.findings.transmission_signals import CABLE
+from wam_analysis.measures.friction import UNKNOWN, Friction
 from wam_analysis.recording import AnalysedRecording
-from wam_analysis.thresholds import SHAFT
 from wam_description.arm import Arm
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
@@ -19,15 +15,12 @@ ONE_WAY = "of one direction, with any offset"
 MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
 
 
-# friction
-
-
 def friction_section(recording: AnalysedRecording) -> Section:
     """Friction of motors and joints, next to what is configured."""
-    arm, signals, joints, friction, _, drowned = recording.motion
+    arm, signals, joints, friction, drowned = recording.motion
     if arm is None or signals is None:
         why = "no parameters of the arm" if arm is None else "no motor_states with a load"
-        sentence = f"Friction, ripple and power cannot be evaluated: {why} in this bag."
+        sentence = f"Friction and power cannot be evaluated: {why} in this bag."
         missing = recording.run.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
         return Section("friction", "Friction", (sentence,), (), missing)
     alone = signals.load_from == CABLE
@@ -49,12 +42,6 @@ def friction_section(recording: AnalysedRecording) -> Section:
     flagged = deviations(findings)
     stated = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)
     return Section("friction", "Friction", stated, findings, lacking, (), flagged)
-
-
-def identified(found: Friction, kind: str) -> float:
-    """Friction of a shaft, NaN where it is not identifiable."""
-    known: FrictionNumber = getattr(found, kind)
-    return math.nan if known.is_vague else known.value
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
@@ -90,62 +77,3 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         text = "; ".join(filter(None, (about.get(kind), doubt, note)))
         findings.append(Finding(_named(name, kind), unit, known.value, predicted, text, known.error))
     return findings
-
-
-# ripple
-
-
-def ripple_section(recording: AnalysedRecording) -> Section | None:
-    """The largest ripple of each motor over its own angle, next to what is configured."""
-    _, signals, _, friction, ripple, drowned = recording.motion
-    if signals is None or drowned:
-        return None
-    parameters = recording.parameters
-    sentences, findings = [], []
-    for name, found in ripple.items():
-        if not len(found.order):
-            why = "too few" if found.turns < SHAFT.enough_turns else "with too large gaps"
-            sentences.append(f"{name} made {found.turns:.2f} turns, {why} to identify its ripple.")
-            continue
-        top = int(np.argmax(found.amplitude))
-        order, amplitude = int(found.order[top]), float(found.amplitude[top])
-        configured = _configured_ripple(parameters, signals, name, order)
-        findings.append(
-            Finding(
-                f"{name}: largest ripple",
-                "N m",
-                amplitude,
-                configured,
-                f"{order} cycles per turn, {found.turns:.1f} turns",
-            )
-        )
-        clear = (
-            amplitude > SHAFT.faint_ripple * float(np.median(found.amplitude))
-            and amplitude > SHAFT.slight_ripple * friction[name].dynamic.value
-        )
-        sentences.append(
-            f"{name}: {shown(amplitude, 'N m')} at {order} cycles per turn."
-            if clear
-            else f"{name}: no significant ripple; the largest order has {shown(amplitude, 'N m')}."
-        )
-    if signals.load_from == GRAVITY:
-        sentences.append("Ripple was not measured: of the motors' load only that of gravity is known in this bag.")
-    elif not ripple:
-        sentences.append("No motor turned enough to identify its ripple.")
-    return Section("ripple", "Torque ripple by pulley angle", sentences, findings)
-
-
-def _configured_ripple(parameters: PredictionParameters, signals: TransmissionSignals, shaft: str, order: int) -> float:
-    """Amplitude of this order on a motor, N m: ripple of its shaft, and of its amplifier at the mean torque."""
-    if parameters.arm is None or parameters.effects is None:
-        return math.nan
-    ripples, motor = parameters.effects.ripples, parameters.arm.motors.names.index(shaft)
-    torque = float(np.mean(signals.torque[turning(signals, motor), motor]))
-    rows = zip(ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, ripples.phase, strict=True)
-    waves = [
-        ratio * amplitude * cmath.exp(1j * phase)
-        for name, ratio, amplitude, cycles, phase in rows
-        if name == shaft and round(cycles * ratio) == order
-    ]
-    waves += [fraction * torque for fraction, cycles in parameters.commutation[motor : motor + 1] if cycles == order]
-    return abs(sum(waves))

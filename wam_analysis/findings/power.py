@@ -17,7 +17,7 @@ from wam_description.arm import Arm
 
 def power_section(recording: AnalysedRecording) -> Section | None:
     """Efficiency of the transmission, where its losses are larger than the work that it stores."""
-    arm, signals, joints, friction, _, drowned = recording.motion
+    arm, signals, joints, friction, drowned = recording.motion
     if arm is None or signals is None or drowned:
         return None
     inertia, speed = np.array(arm.motors.inertia), signals.velocity

@@ -1,4 +1,4 @@
-"""Friction and ripple of motors and joints, as far as a recording has their torques."""
+"""Friction of motors and joints, as far as a recording has their torques."""
 
 import math
 from collections.abc import Mapping
@@ -9,24 +9,23 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import shown
-from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
+from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
 from wam_analysis.measures.friction import UNKNOWN, Friction, identify_friction
-from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import SHAFT
-from wam_bag.arrays import Mask, Numbers
+from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_sim.recording import RecordedRun
 
 
 class TransmissionFindings(NamedTuple):
-    """Friction of each joint and motor and ripple of each motor, by name.
+    """Friction of each joint and motor, by name.
 
     Attributes
     ----------
-    arm : of the recording, its motors without cogging, which is a ripple; None if the bag has none.
-    signals : None where friction, ripple and power cannot be evaluated.
-    joints, friction, ripple : none of the motors where `drowned` states why.
+    arm : of the recording, its motors without cogging; None if the bag has none.
+    signals : None where friction and power cannot be evaluated.
+    joints, friction : none of the motors where `drowned` states why.
     drowned : why the motors' torque shows nothing about losses, '' if it does.
     """
 
@@ -34,7 +33,6 @@ class TransmissionFindings(NamedTuple):
     signals: TransmissionSignals | None = None
     joints: Mapping[str, Friction] = MappingProxyType({})
     friction: Mapping[str, Friction] = MappingProxyType({})
-    ripple: Mapping[str, Ripple] = MappingProxyType({})
     drowned: str = ""
 
 
@@ -49,8 +47,7 @@ def transmission_findings(run: RecordedRun, parameters: PredictionParameters) ->
     joints = _friction_of_joints(signals, arm)
     if drowned := _drowned(signals, arm):
         return TransmissionFindings(arm, signals, joints, drowned=drowned)
-    friction = _friction_of_motors(signals, arm, parameters)
-    return TransmissionFindings(arm, signals, joints, friction, _ripples(signals, arm, friction))
+    return TransmissionFindings(arm, signals, joints, _friction_of_motors(signals, arm, parameters))
 
 
 def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
@@ -142,30 +139,3 @@ def _possible(found: Friction) -> Friction:
     if not (found.dynamic.is_negative or found.viscous.is_negative):
         return found
     return found._replace(static=UNKNOWN, dynamic=UNKNOWN, viscous=UNKNOWN, inertia=UNKNOWN)
-
-
-def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Friction]) -> dict[str, Ripple]:
-    """Ripple of each motor over its own angle, without friction and inertia; none where the load is only computed.
-
-    The cables take most of a fast ripple, and what accelerates the links, as a push does, would be a slow one.
-    """
-    if signals.load_from == GRAVITY:
-        return {}
-    found = {}
-    for i, name in enumerate(arm.motors.names):
-        known = friction[name]
-        velocity = signals.velocity[:, i]
-        rows = turning(signals, i)
-        if not math.isfinite(known.dynamic.value) or not np.any(rows):
-            continue
-        rest = signals.torque[:, i] - signals.load[:, i] - known.dynamic.value * np.sign(velocity)
-        rest = rest - np.nan_to_num(known.viscous.value) * velocity
-        rest = rest - arm.motors.inertia[i] * np.gradient(velocity, signals.time)
-        rows &= np.abs(rest) < 10.0 * float(np.median(np.abs(rest[rows]))) + 1e-12
-        found[name] = ripple_spectrum(signals.angle[rows, i], rest[rows], SHAFT.orders)
-    return found
-
-
-def turning(signals: TransmissionSignals, motor: int) -> Mask:
-    """The samples in which a motor turns."""
-    return (np.abs(signals.velocity[:, motor]) > SHAFT.motor_rest) & signals.use & signals.sampled

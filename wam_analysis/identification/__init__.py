@@ -7,7 +7,6 @@ fit         estimate, covariance by jackknife, cross-validation
 tracked_errors  covariance of parameters, and in the errors of the model that the contact estimator tracks
 stribeck    the Stribeck velocity of each motor
 contradictions  mistakes of a recording that would give a wrong model
-recorded_loop  friction node and force loop of chapter 5, as far as a recording of any arm shows them
 overlay     the estimate as a configuration for --config
 report      the table, and the warnings
 """

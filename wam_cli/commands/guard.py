@@ -2,18 +2,8 @@
 
 import argparse
 import math
-from pathlib import Path
 
-from wam_analysis.findings.finding import shown
-from wam_analysis.identification.recorded_loop import LoopNumber, RecordedLoop, recorded_loop
-from wam_cli.options import (
-    BASE_CONFIGURATION,
-    PICTURE,
-    configuration_of,
-    take_configuration,
-    take_topic_map,
-    topic_map_of,
-)
+from wam_cli.options import BASE_CONFIGURATION, PICTURE, configuration_of, take_configuration
 from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
@@ -36,7 +26,6 @@ LOOP = {  # option: default, what it is
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
 WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered")  # facts of a running arm
-NUMBERS = (*PLANT, "stiction", *LOOP)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,11 +37,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
     for name, (_, text) in LOOP.items():
         own.add_argument(f"--{name}", type=float, help=text)
-    own.add_argument("--bag", type=Path, help="recording from which missing numbers are taken")
     own.add_argument(
         "--picture", type=PICTURE, help="draw the loop and the bound of stability into this PNG, PDF or SVG"
     )
-    take_topic_map(parser)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -63,9 +50,9 @@ def run(given: argparse.Namespace) -> int:
     ValueError
         for options of a loop of your own and of a configuration together, and a picture without a loop.
     """
-    is_own = given.bag or any(getattr(given, name) is not None for name in PLANT)
+    is_own = any(getattr(given, name) is not None for name in PLANT)
     if is_own and (given.config or given.values):
-        raise ValueError(f"--bag and --{', --'.join(PLANT)} give a loop of your own; leave out --config and --set")
+        raise ValueError(f"--{', --'.join(PLANT)} give a loop of your own; leave out --config and --set")
     if given.config or given.values:
         given.config = given.config or BASE_CONFIGURATION
         return _assess_configuration(configuration_of(given))
@@ -86,27 +73,20 @@ def _assess_configuration(configuration: Configuration) -> int:
 
 
 def _assess(given: argparse.Namespace) -> int:
-    recorded = recorded_loop(given.bag, topic_map_of(given)) if given.bag else RecordedLoop({}, "")
-    known = recorded.numbers | {
-        name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None
-    }
-    if missing := [name for name in PLANT if name not in known]:
+    if missing := [name for name in PLANT if getattr(given, name) is None]:
         raise ValueError(
-            f"--{missing[0]} is missing, {PLANT[missing[0]]}; "
-            + (f"{given.bag} does not show it" if given.bag else f"give all of --{', --'.join(PLANT)}")
+            f"--{missing[0]} is missing, {PLANT[missing[0]]}; give all of --{', --'.join(PLANT)}. Of a recorded joint "
+            "'wam analyse' gives inertia, damping and friction"
         )
-    if given.bag:
-        for name, one in known.items():
-            print(f"{name:<13}{shown(one.value):>10}  {one.origin}")
-        print()
-    value = {name: default for name, (default, _) in LOOP.items()} | {name: one.value for name, one in known.items()}
-    stiction = max(value.get("stiction", 0.0), value["friction"]) if given.stiction is None else given.stiction
+    value = {name: getattr(given, name) for name in PLANT}
+    value |= {
+        name: default if getattr(given, name) is None else getattr(given, name) for name, (default, _) in LOOP.items()
+    }
+    stiction = value["friction"] if given.stiction is None else given.stiction
     loop = IntegralLoop(value["gain"], error_limit=value["limit"], deadband=value["deadband"])
     plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
     design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
     print(design.text())
-    if recorded.guard:
-        print(f"\nAs it was recorded, with its velocity loops, which is what counts on that arm:\n{recorded.guard}")
     if given.picture:
         draw(design, given.picture)
     return int(not design.is_safe)

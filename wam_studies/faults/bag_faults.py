@@ -116,13 +116,13 @@ def limits(memory: int = MEMORY) -> Iterator[None]:
     def late(number: int, frame: object) -> None:
         raise TimeoutError(f"a bag took more than {PATIENCE} s")
 
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (used + memory, before[1]))
+    before = resource.getrlimit(resource.RLIMIT_DATA)  # files that are only mapped do not count
+    used = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_DATA, (used + memory, before[1]))
     handler = signal.signal(signal.SIGALRM, late)
     try:
         yield
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, handler)
-        resource.setrlimit(resource.RLIMIT_AS, before)
+        resource.setrlimit(resource.RLIMIT_DATA, before)
