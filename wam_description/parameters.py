@@ -106,6 +106,7 @@ def like(cls: type, name: str, doc: str = "") -> Any:
 
 
 _FIELDS: dict[type, tuple[Field, ...]] = {}
+_HINTS: dict[type, dict[str, Any]] = {}
 
 
 def fields(cls: type) -> tuple[Field, ...]:
@@ -115,8 +116,14 @@ def fields(cls: type) -> tuple[Field, ...]:
     return _FIELDS[cls]
 
 
+def _hints(cls: type) -> dict[str, Any]:
+    if cls not in _HINTS:
+        _HINTS[cls] = get_type_hints(cls)
+    return _HINTS[cls]
+
+
 def _declared(cls: type) -> Iterator[Field]:
-    hints = get_type_hints(cls)
+    hints = _hints(cls)
     for item in dataclasses.fields(cls):
         hint = hints[item.name]
         if dataclasses.is_dataclass(hint):
@@ -244,7 +251,7 @@ def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
 
 
 def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
-    hints = get_type_hints(cls)
+    hints = _hints(cls)
     arguments: dict[str, Any] = {}
     for item in dataclasses.fields(cls):  # type: ignore[arg-type]
         hint = hints[item.name]

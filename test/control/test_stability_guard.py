@@ -171,6 +171,13 @@ def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str
 
 
 @pytest.mark.slow
+def test_what_was_assessed_is_not_computed_again_and_other_gains_are() -> None:
+    first, again, other = (Loop(replace(OWN, force_gain=(gain,))).assessment for gain in (0.001, 0.001, 0.002))
+    assert first is again
+    assert other != first
+
+
+@pytest.mark.slow
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
     with pytest.raises(ParameterError, match=r"torque_gain .* times the largest linearly stable one"):
         Loop(replace(OWN, mode="joint_torque", torque_gain=(0.1,)))

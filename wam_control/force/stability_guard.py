@@ -10,6 +10,7 @@ never above the saturation found stable.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -158,7 +159,7 @@ class GuardAssessment(NamedTuple):
 
 
 class StabilityGuard:
-    """Assesses parameters of the force loop on one arm.
+    """Assesses parameters of the force loop on one arm; guards with the same parameters are equal.
 
     Parameters
     ----------
@@ -183,6 +184,13 @@ class StabilityGuard:
         self._arm, self._timing = arm, timing
         self._loop = SampledLoop(arm, timing, servo)
         self._force_axes = ForceAxes(arm, self._loop.body, sensing)
+        self._whole = arm, servo, timing, parameters, sensing
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, StabilityGuard) and self._whole == other._whole
+
+    def __hash__(self) -> int:
+        return hash(self._whole)
 
     def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
         """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
@@ -226,13 +234,17 @@ class StabilityGuard:
                     yield self._loop.margin(each.q, axes, part * stiffness, feedback, tried)
 
     def assess(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
-        """Assess a task at its worst contact.
+        """Assess a task at its worst contact; what a process has assessed lately is not computed again.
 
         Parameters
         ----------
         task : what is controlled.
         contacts : contacts to consider; none counts as a task that controls nothing.
         """
+        return _assessed(self, task, tuple(contacts))
+
+    def compute(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
+        """The assessment itself; parameters as for `assess`."""
         law = task.law
         if not contacts or not any((*law.gain, *law.proportional_gain)):
             return GuardAssessment(
@@ -359,6 +371,11 @@ class StabilityGuard:
     def _stiffness(self, contact: GuardedContact) -> Array:
         lever = self.axis(contact).lever
         return self.parameters.contact_stiffness * np.outer(lever, lever)
+
+
+@lru_cache(maxsize=64)
+def _assessed(guard: StabilityGuard, task: GuardedTask, contacts: tuple[GuardedContact, ...]) -> GuardAssessment:
+    return guard.compute(task, contacts)
 
 
 def _lags(feedback: Feedback) -> list[Feedback]:
