@@ -7,7 +7,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
+from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
@@ -15,6 +17,7 @@ import yaml
 from conftest import LONG
 
 from wam_cli.commands.call import _wrench, arguments
+from wam_cli.main import main
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.wiring import Call
@@ -26,8 +29,8 @@ WAM = [sys.executable, "-P", "-m", "wam_cli.program"]
 
 @pytest.fixture(scope="module")
 def stack(domain_of_module: int) -> Iterator[None]:
-    """A stack in lockstep, as fast as it can."""
-    up = subprocess.Popen([*WAM, "up", "--real-time-factor", "0"], stdout=subprocess.PIPE, text=True, env=os.environ)
+    """A stack in lockstep."""
+    up = subprocess.Popen([*WAM, "up"], stdout=subprocess.PIPE, text=True, env=os.environ)
     assert up.stdout is not None
     assert "nodes started" in up.stdout.readline()
     yield
@@ -35,10 +38,21 @@ def stack(domain_of_module: int) -> Iterator[None]:
     up.wait(LONG)
 
 
+@pytest.fixture(autouse=True)
+def is_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system would end the process of the tests as that of a command that does not leave the network."""
+    monkeypatch.setattr("wam_cli.commands.call.bound_leaving", lambda *given: None)
+
+
 def called(*words: str) -> tuple[int, str, str]:
-    """Exit code, output and errors of a request."""
-    done = subprocess.run([*WAM, "call", *words], capture_output=True, text=True, timeout=LONG, check=False)
-    return done.returncode, done.stdout, done.stderr
+    """Exit code, output and errors of a request, made in this process."""
+    with TemporaryFile("w+") as out, TemporaryFile("w+") as err:
+        with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
+            main(["call", *words])
+        assert isinstance(ended.value.code, int)
+        for file in (out, err):
+            file.seek(0)
+        return ended.value.code, out.read(), err.read()
 
 
 def wait_for_push() -> None:
@@ -51,7 +65,7 @@ def wait_for_push() -> None:
 
 
 def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
-    assert called("set", "force_loop:posture_gain=1.25")[0] == 0
+    assert called("set", "force_loop:posture_gain=1.25") == (0, "force_loop:posture_gain=1.25\n", "")
     assert called("get", "force_loop:posture_gain") == (0, "1.25\n", "")
     code, out, err = called("set", "force_loop:posture_gain=-1")
     assert (code, out) == (1, "")
@@ -103,7 +117,7 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
         assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
         assert "wam_call" not in there
     with StackClient("wam") as here:
-        refused = here.request(Call("nosuch", "tare")).message
+        refused = here.request(Call("nosuch", "tare"), 3.0).message
     assert refused.startswith("no service /wam/nosuch/tare within ")
     assert {"driver", "force_loop"} <= set(refused.partition("; there are ")[2].split(", "))
 
