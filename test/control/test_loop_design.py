@@ -12,6 +12,7 @@ import pytest
 
 from wam_control.force.friction_verdict import Domain
 from wam_control.force.loop_design import loop_design
+from wam_control.force.thresholds import GUARD
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 SOFTER = np.geomspace(0.03, 1.0, 12)
@@ -93,6 +94,12 @@ def of_margin(part: float, node: FrictionNode = NODE, limit: float = np.inf) -> 
     return IntegralLoop(part * margin, error_limit=limit)
 
 
+@pytest.fixture
+def with_this_contact_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Softer contacts, which the test of the margin has, are left out: each takes seconds."""
+    monkeypatch.setattr("wam_control.force.friction_verdict.GUARD", replace(GUARD, softer=(1.0,)))
+
+
 @pytest.mark.slow
 def test_in_domain_ii_the_safe_error_creeps_to_its_end_in_a_direct_simulation_and_far_more_does_not() -> None:
     found = loop_design(NODE, of_margin(1.2), RATE, DELAY)
@@ -106,30 +113,32 @@ def test_in_domain_ii_the_safe_error_creeps_to_its_end_in_a_direct_simulation_an
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("with_this_contact_alone")
 def test_in_domain_iii_no_error_is_safe_and_a_direct_simulation_never_rests() -> None:
     found = loop_design(NODE, of_margin(20.0), RATE, DELAY)
-    assert (found.verdict.domain, found.verdict.stable_error) == (Domain.III, 0.0)
+    assert found.verdict.domain is Domain.III
+    assert (found.verdict.stable_error, found.verdict.undecided_error) == (0.0, 0.0)
     assert "limit cycle of stiction" not in found.text()
+    assert "undecided" not in found.text()
     loop = replace(found.loop, error_limit=5.0)
     assert largest_late_motion(NODE, loop, 5.0, 1.0) > 0.01
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("with_this_contact_alone")
 def test_a_loop_that_is_sampled_fast_has_the_domain_of_the_continuous_one() -> None:
     node, loop = FrictionNode(0.1, 0.1, 1000.0, 1000.0, 1.0, 1.0), IntegralLoop(0.01)
-    found = [loop_design(node, loop, rate).verdict for rate in (0.0, 1e3, 2e3, 1e7, 1e10)]
+    found = [loop_design(node, loop, rate).verdict for rate in (0.0, 1e3, 1e10)]
     assert {one.domain for one in found} == {Domain.II}
-    assert [one.stable_error for one in found] == pytest.approx([found[0].stable_error] * 5)
-    assert [one.margin for one in found] == pytest.approx([2e-3] * 5, rel=1e-2)
+    assert [one.stable_error for one in found] == pytest.approx([found[0].stable_error] * 3)
+    assert [one.margin for one in found] == pytest.approx([2e-3] * 3, rel=1e-2)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("with_this_contact_alone")
 def test_a_response_that_is_not_followed_to_its_end_is_undecided_and_its_loop_neither_safe_nor_called_unstable(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    decided = loop_design(NODE, of_margin(20.0), RATE, DELAY)
-    assert decided.verdict.undecided_error == 0.0
-    assert "undecided" not in decided.text()
     monkeypatch.setattr("wam_control.force.loop_design.EVENTS", 400)  # 20 ms of these samples
     margin = loop_design(NODE, IntegralLoop(1e-3), 2e4, 5e-4).verdict.margin
     found = loop_design(NODE, IntegralLoop(1.05 * margin, error_limit=1.0), 2e4, 5e-4)
@@ -189,11 +198,12 @@ def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("with_this_contact_alone")
 def test_the_saturation_that_is_advised_is_safe() -> None:
     margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
-    text = loop_design(PLANT, IntegralLoop(1.3 * margin), 500.0, 2e-3).text()
-    error = float(re.findall(r"saturate the error at ([\d.e-]+)", text)[0])
-    assert loop_design(PLANT, IntegralLoop(1.3 * margin, error_limit=error), 500.0, 2e-3).is_safe
+    found = loop_design(PLANT, IntegralLoop(1.3 * margin), 500.0, 2e-3)
+    error = float(re.findall(r"saturate the error at ([\d.e-]+)", found.text())[0])
+    assert found._replace(loop=replace(found.loop, error_limit=error)).is_safe
 
 
 @pytest.mark.slow
