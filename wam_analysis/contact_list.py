@@ -16,14 +16,14 @@ from wam_description.event_text import REASONS
 from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"
-NOT_CERTAIN = "Without contact/hypotheses it is not known how certain contacts are."
-NOT_PLACED = "not recorded (contact/point), so it is not known whether a force is only the least one"
+NOT_CERTAIN = "The uncertainty of contacts is not known: contact/hypotheses was not recorded."
+NOT_PLACED = "not recorded (contact/point), so it is not known whether a force is a lower bound"
 NOT_ESTIMATED = "the estimated contact was not recorded"
 
 
 CUT = (  # off by the recording, or where the signal is missing and comes again
     ("it began before the recording", "the estimate is missing before it"),
-    ("it goes past the end of the recording", "the estimate is missing after it"),
+    ("it lasts beyond the end of the recording", "the estimate is missing after it"),
 )
 
 

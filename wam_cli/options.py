@@ -192,8 +192,8 @@ def require_effect(option: str, names: Iterable[str]) -> None:
     for name in names:
         if name in WITHOUT_EFFECT:
             raise ValueError(
-                f"{option} {name} has no effect: the runs are in Python without ROS, in lockstep and as fast as they "
-                "can; leave it out, and play 'wam demo' with each of its values"
+                f"{option} {name} has no effect in runs without ROS, which are in lockstep and as fast as possible; "
+                "leave it out, or play 'wam demo' with each of its values"
             )
 
 

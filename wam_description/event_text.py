@@ -14,86 +14,85 @@ REASONS: Final = {
     "lower bound",
     Reason.BENT: "elbow at 90 deg and force in plane: contact position and force cannot be separated",
     Reason.STRAIGHT: "elbow straight and force out of plane: contact position and force cannot be separated",
-    Reason.SHOULDER: "the axes of the shoulder leave one of its moments unmeasured in this pose",
+    Reason.SHOULDER: "in this pose, one moment at the shoulder is not measured",
     Reason.WEAK: "the torques are too small, compared with their uncertainty, to identify the contact position",
-    Reason.ELBOW: "torque of the elbow near 0: a contact there and one on the inner link cannot be distinguished",
+    Reason.ELBOW: "torque of the elbow near 0: contacts near the elbow and on the inner link cannot be distinguished",
     Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
     Reason.LINKS: "the torques do not identify the link",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the force may act along the link: then its torques are the same at every position, and on the link "
-    "before",
-    Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is what those of the links "
-    "lack to 1",
-    Reason.TOO_EARLY: "too few samples yet",
+    Reason.ALONG: "the force may act along the link: every position and the link before it then give the same torques",
+    Reason.PAYLOAD: "the torques may come from a picked-up payload; its probability is 1 minus those of the links",
+    Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "brakes hold the motors",
 }
 
-PINNED: Final = "pin the force where it acts (the torque of a command across a link, or contact_source)"
-RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm goes on and is late"
+PINNED: Final = "give the contact position (by the torque of the command, or with contact_source pinned)"
+RAISE: Final = "{axis}: {speed:.3g} {unit}/s are commanded; allowed: {allowed:g} {unit}/s; the arm moves more slowly"
 PARTS: Final = {  # of the predicted error of a force, and what makes each smaller
     "torques": ("the measured torques", "use joint sensors, tare in free space, or command more force"),
-    "friction": ("friction of the surface", "lower sensing.friction if the surface has less, or bend the arm"),
+    "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
-    "resting": ("what the arm carries", "declare it (arm.payload), or end the command and tare in free space"),
-    "moving_surface": ("a surface that moves", "let it move more slowly, or raise force_gain"),
-    "slow_arm": ("an arm that gets there too slowly", "declare guard.contact_stiffness, or raise limits.settling_time"),
-    "shaking_arm": ("the arm's own shaking", "use joint sensors, or declare guard.contact_stiffness"),
+    "resting": ("the load of the arm", "declare it (arm.payload), or end the command and tare in free space"),
+    "moving_surface": ("the motion of the surface", "let it move more slowly, or raise force_gain"),
+    "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
+    "shaking_arm": ("the vibration of the arm", "use joint sensors, or declare guard.contact_stiffness"),
 }
 UNCERTAIN: Final = (
-    "{desired:.3g} {unit} at {where} may be off by {error:b} {unit}, most of it by {part_text}; allowed: {allowed:b} "
-    "{unit} (limits.tolerance)"
+    "{desired:.3g} {unit} at {where} may be wrong by {error:b} {unit}, mostly because of {part_text}; allowed: "
+    "{allowed:b} {unit} (limits.tolerance)"
 )
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + ": {help}",
-    "moved_fast": "the arm moved faster than {speed:g} rad/s as the force began, and it is not known what it carries: "
+    "moved_fast": "the arm moved faster than {speed:g} rad/s when the force began, so its load is not known: "
     "it comes to rest first",
     "task": "{reason}",
-    "other_link": "{touched} is touched, and the force is commanded on {cover}: command it on {touched}, or free the "
-    "arm; it goes back to where it was free until the command ends",
+    "other_link": "{touched} is touched, but the force is commanded on {cover}: command it on {touched}, or free the "
+    "arm; until the command ends, it goes back to where it was free",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
-    "(limits.free_travel): command no force, then again",
+    "(limits.free_travel): end the command, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + ": {part_help}",
-    "force_off": "{axis}: {measured:.3g} {unit} are measured and {desired:.3g} {unit} commanded, for {time:b} s: "
-    "command what can be reached, another direction, or bend the arm",
-    "force_strays": "{axis}: the force was reached, and is off by more than {allowed:b} {unit} again: {measured:.3g} "
-    "{unit} of {desired:.3g} {unit}; the surface moves, something else pushes, or friction turns",
-    "motion_off": "{axis}: {desired:.4g} {unit} is commanded, and it is at {measured:.4g} {unit}; allowed: "
-    "{allowed:.2g} {unit}, for {time:b} s: something is in the way, a joint is at its end, or the arm has no lever "
-    "for it here",
+    "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
+    "measured: command a force that the arm can reach, or bend the arm",
+    "force_strays": "{axis}: the force was reached, but is wrong by more than {allowed:b} {unit} again: "
+    "{measured:.3g} {unit} of {desired:.3g} {unit}; the surface moves, something else pushes, or the friction of the "
+    "surface has changed its direction",
+    "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but for {time:b} s it has been at {measured:.4g} {unit}; "
+    "allowed error: {allowed:.2g} {unit}: something is in the way, a joint is at its end, or the arm cannot move in "
+    "this direction here",
     "speed": RAISE,
     "torques_differ": "the torques are not those of a force at {position:.3g} m of {cover} (chi^2 {chi2:.3g}, allowed: "
-    "{allowed:g}): it acts elsewhere, or is not the only one; pin it where it acts, or free the arm",
-    "torques_changed": "the torques are no longer those with which the force has settled (chi^2 {chi2:.3g}, allowed: "
-    "{allowed:g}): something else acts on the arm, or the friction of the surface has turned; command the force again",
-    "pushed": "the world pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force, whole_force): "
-    "the arm gives way, by limits.free_travel at most",
-    "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad from its end, {end:.4g} rad, and does not move on: "
+    "{allowed:g}): it acts elsewhere, or a second force acts; correct the contact position, or free the arm",
+    "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}): a "
+    "second force acts, or the friction of the surface has changed its direction; command the force again",
+    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force, whole_force): "
+    "the arm moves away, by at most limits.free_travel",
+    "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there: "
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
-    "{allowed:g} of the commanded (limits.cycle_force): lower force_gain, or use joint sensors",
+    "{allowed:g} times the commanded force (limits.cycle_force): lower force_gain, or use joint sensors",
     "model_off": "the model is off: {part}; see /diagnostics, run 'wam identify'",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
     "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {cure}",
-    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {step}: let its steps "
-    "compute less, or run it in a process of its own",
+    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {step}: make its "
+    "steps faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state of {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
     "timing.period",
     "limit": "{excess}; {cure}",
-    "broken": "{excess} under the brakes; check the cable",
+    "broken": "{excess} while the brakes hold; check the cable",
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
-    "claimed": "{nodes} publish {topic}, which one node alone may; stop all others, then reset_fault",
+    "claimed": "{nodes} publish {topic}, but only one node may; stop the others, then reset_fault",
     "stopped": "{nodes} has stopped: {topics} too old; start {nodes} again, then reset_fault",
-    "long_step": "{step}: {topics} too old; let its steps compute less, then reset_fault",
+    "long_step": "{step}: {topics} too old; make its steps faster, then reset_fault",
     "ended": "{node} has ended; start it again, then reset_fault",
 }
 HOLDING: Final = "; the arm holds its position"
-SINCE: Final = ("and nothing was touched", "since the force last was right, or rose")
+SINCE: Final = ("without a contact", "since the force was last right, or rising")
 
 
 class _Sentence(string.Formatter):
@@ -148,5 +147,5 @@ def _help(values: Mapping[str, Any], helps: str) -> str:
     if "pin" in values and helps is not PINNED:
         found.append(PINNED)
     if "searched" in values and not found:
-        return f"no other force up to 5 times and no turn of one joint was found that helps; {helps}"
+        return f"no force up to 5 times as large and no turn of a single joint helps; {helps}"
     return ", or ".join([*found, helps])

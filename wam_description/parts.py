@@ -75,7 +75,7 @@ class Joints:
             if not low <= angle <= high:
                 return (
                     f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad; "
-                    "the last good posture remains in force"
+                    "the last good posture remains in use"
                 )
         return ""
 

@@ -94,7 +94,7 @@ def require_name(node: Any, name: str) -> None:
     """
     if node.get_name() != name:
         raise ParameterError(
-            f"node '{name}' was renamed '{node.get_name()}'; its peers and its parameters know it as '{name}': "
+            f"node '{name}' was renamed '{node.get_name()}'; other nodes and its parameters use the name '{name}': "
             f"leave out -r __node:={node.get_name()}, and give the nodes of a second arm a namespace instead: "
             "-r __ns:=/other"
         )

@@ -216,7 +216,7 @@ class AdaptedNode(StackNode):
         self.get_logger().warning(
             f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
             "brakes if they wait too long: "
-            f"{'let its steps compute less' if is_own else 'the machine is busy, end what else runs on it'}",
+            f"{'make its steps faster' if is_own else 'the machine is busy, end other programs'}",
             throttle_duration_sec=NODE_LIMITS.slow_step_reports,
         )
 

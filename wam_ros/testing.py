@@ -64,7 +64,7 @@ def locked_domain() -> Iterator[int]:
                 break
             place.close()
         if time.monotonic() > end:
-            raise TimeoutError(f"ROS domains {domains[0]} to {domains[-1]} are all in use; end what is there")
+            raise TimeoutError(f"ROS domains {domains[0]} to {domains[-1]} are all in use; end the programs there")
         time.sleep(TEST_LIMITS.domain_retry)
     try:
         yield number

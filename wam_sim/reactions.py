@@ -215,7 +215,7 @@ def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> li
     for kind in dict.fromkeys(one.name for one in reactions):
         first, *others = [one for one in reactions if one.name is kind]
         verb = REFUSAL if kind is Code.REFUSED else f"{REFUSAL if first.holds else 'reported'} ({kind})"
-        again = f" and {len(others)} times more" if others else ""
+        again = f" and {len(others)} more time{'s' * (len(others) > 1)}" if others else ""
         begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
         lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
     return lines

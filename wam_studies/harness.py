@@ -6,6 +6,7 @@ runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
 
 import hashlib
 import importlib
+import shlex
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -78,7 +79,7 @@ class Study(ABC, Generic[Case, Record]):
                 raise ValueError(f"--{name} is {value:g}; it must be at least {least:g}")
             choices = one.metadata.get("choices")
             if choices and (wrong := [each for each in value if each not in choices]):
-                raise ValueError(f"--{name} is '{wrong[0]}'; choose from {', '.join(choices)}")
+                raise ValueError(f"--{name} is '{wrong[0]}'; choose from {', '.join(map(shlex.quote, choices))}")
 
     @abstractmethod
     def cases(self, seed: int) -> Iterable[Case]:

@@ -126,7 +126,7 @@ def coarse() -> list[Case]:
     ]
     return [
         Case(name, write, stamped(one("/joint_states", rate, 0.7, 0.5), change),
-             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "times of reception are used")
+             sine(0.7, 0.5) | FRICTION | {"/joint_states: period": 1e3 / rate}, "reception times are used")
         for name, write, rate, change in made
     ]  # fmt: skip
 

@@ -296,7 +296,7 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     section = section_of(recording.bag(), "contact")
     assert f"Positions of contacts: {NOT_PLACED}." in section.sentences
     errors = [one for one in section.findings if one.quantity == "error of the size of the force"]
-    assert {one.note for one in errors} == {"not known: the force may be only the least one"}
+    assert {one.note for one in errors} == {"not known: the force may be a lower bound"}
     recording.without = ("contact/hypotheses",)  # with contact/point it is known
     outer, inner, *_ = recording.summary().contacts
     assert (outer.force_error, inner.estimate.is_lower_bound) == (pytest.approx(-1.0), True)
@@ -539,7 +539,7 @@ def test_good_run_has_a_good_verdict():
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
         "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
-        f"false detections within 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
+        f"false detections for at most 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
     )
 
 
@@ -674,7 +674,7 @@ def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observ
 def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
     recording = Played()
     recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
-    assert f"false detections within 10 % of the time without contact: {answer}" in verdict(recording.summary())
+    assert f"false detections for at most 10 % of the time without contact: {answer}" in verdict(recording.summary())
 
 
 def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detection():
@@ -735,7 +735,7 @@ def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
     recording.recording = {"mode": "lockstep"}
     facts = [("0.000", "0.0", "0"), ("1.000", "4.0", "0"), ("0.500", "20.4", "7"), ("1.000", "1.0", "7")]
     recording.timing = [{"real-time factor": f, "behind [ms]": b, "slips": n} for f, b, n in facts]
-    assert "real-time factor 0.75, at most 20 ms behind, 7 periods too late to be made up for" in told(recording.bag())
+    assert "real-time factor 0.75, at most 20 ms behind, 7 delays too long to catch up" in told(recording.bag())
 
 
 def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():

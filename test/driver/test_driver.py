@@ -638,7 +638,7 @@ def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
     hardware = stopped_at_speed([0.0, -0.6, 0.0, 0.5], [0.0, 3.5, 0.0, 0.0], stop, brake_torque=1000.0)
     fault = hardware.safety.fault
     assert fault.startswith(before + "cable tension of motor2 ")
-    assert fault.endswith(" N is above its limit 756.198 under the brakes; check the cable")
+    assert fault.endswith(" N is above its limit 756.198 while the brakes hold; check the cable")
     hardware.reset_fault()
     for _ in range(20):
         hardware.advance(0.0)

@@ -374,7 +374,7 @@ def test_a_renamed_node_is_refused_with_what_to_do_instead(
     text = said(process)
     assert process.returncode == 1
     assert text.startswith(
-        f"error: node '{name}' was renamed 'other'; its peers and its parameters know it as '{name}'"
+        f"error: node '{name}' was renamed 'other'; other nodes and its parameters use the name '{name}'"
     )
     assert "give the nodes of a second arm a namespace instead: -r __ns:=/other" in text
 

@@ -268,13 +268,11 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
     second = other.create_publisher(JointState, "motor_current_command", qos(BY_NAME["motor_current_command"]))
     live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="a fault")
     assert live.driver.currents == [0.0] * 4
-    text = (
-        "/wam/intruder and /wam/velocity_loop publish motor_current_command, which one node alone may; stop all others"
-    )
+    text = "/wam/intruder and /wam/velocity_loop publish motor_current_command, but only one node may; stop the others"
     live.ros.wait(lambda: any(text in m.message and m.level == DiagnosticStatus.ERROR for m in heard.seen["status"]))
     assert live.node.health.counts["refused on motor_current_command"] > 0
     live.ask("reset_fault")
-    assert "which one node alone may" in live.ask("enable", True).message
+    assert "only one node may" in live.ask("enable", True).message
     other.destroy_publisher(second)
     live.ros.wait(lambda: live.node.inlets.subscriptions["motor_current_command"].get_publisher_count() == 1)
     live.ros.wait(lambda: not live.node.health.problem)

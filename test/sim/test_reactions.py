@@ -41,9 +41,9 @@ STEPS = """
 - {name: brake, seconds: 0.2, request: disable}
 """
 REFUSED = {
-    "too small": ("refused", "may be off by"),
+    "too small": ("refused", "may be wrong by"),
     "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
-    "one place twice": ("refused", "may be off by"),
+    "one place twice": ("refused", "may be wrong by"),
 }
 
 
@@ -162,4 +162,4 @@ def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
     assert within([late], 1_000_000_000, 2_000_000_000) == ()
     assert len(within([late], 0, 1_000_000_000)) == 1
     again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]
-    assert sentences("press", again, 0) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 times more: why"]
+    assert sentences("press", again, 0) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 more time: why"]

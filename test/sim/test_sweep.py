@@ -149,7 +149,7 @@ def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) ->
         assert not run.play()
         found.append(run.unmet)
     assert not found[0]
-    assert found[1].startswith("press refused: 20 N at 0.914 m of link may be off by inf N")
+    assert found[1].startswith("press refused: 20 N at 0.914 m of link may be wrong by inf N")
     assert [one.step.name for one in run.played] == ["release", "press"]
 
 
@@ -199,8 +199,8 @@ def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_
     [
         ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
         (("scenario:script=a,b",), "the scenario is that of --scenario"),
-        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect: the runs are in Python"),
-        (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect: .* play 'wam demo' with each"),
+        (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect in runs without ROS"),
+        (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect .* play 'wam demo' with each"),
         ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),
         (("arm.payload=0", "--set=arm.payload=3"), "--set arm.payload has no effect here: --vary sets it"),
         (("seed=1:2:1000", "arm.payload=0.1:0.2:1000"), "1000000 sets in all, seed: 1000, arm.payload: 1000; at most"),

@@ -46,7 +46,7 @@ def test_a_degradation_is_drawn_from_its_seed_and_changes_the_arm_or_its_signals
 
 
 def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> None:
-    with pytest.raises(ValueError, match=r"--degradations is 'wind'; choose from all, as stated, friction 0\.8"):
+    with pytest.raises(ValueError, match=r"--degradations is 'wind'; choose from all, 'as stated', 'friction 0\.8"):
         ContactStudy(CONFIGURATION, degradations=("wind",))
 
 

@@ -249,7 +249,7 @@ def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_don
     blind = Task(straight, Surface("outer_link", WAM.covers.length[1], (x, y, z), 4000.0, 0.3, is_plane=True), 5.0)
     refusal = perform(CONFIGURATION, blind, 1.5)
     assert refusal.outcome is TaskEnd.REFUSED
-    assert "may be off by" in refusal.reason
+    assert "may be wrong by" in refusal.reason
     wrong = perform(CONFIGURATION, good, 1.5, {"force_loop:contact_position": 0.1})
     assert wrong.outcome is not TaskEnd.DONE
     assert abs(wrong.mean - 10.0) > 1.0

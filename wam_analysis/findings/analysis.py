@@ -30,7 +30,7 @@ from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
 from wam_sim.recording import RecordedRun
 
-OF_THE_START = "predicted for the parameters at the start, which were changed"
+OF_THE_START = "predicted for the parameters at the start; they were changed later"
 Progress = Callable[[str], None]
 Maker = Callable[[AnalysedRecording], Section | None]
 
@@ -109,7 +109,9 @@ def analyse(
     if not given.is_given and _is_own(path):
         return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
     if namespace:
-        raise ValueError(f"--namespace chooses an arm of this stack, and {path} is analysed as of another robot")
+        raise ValueError(
+            f"--namespace chooses an arm of this stack, but {path} is analysed as a recording of another robot"
+        )
     progress("it is of another robot")
     return analyse_bag(foreign_bag(path, given), progress, given=given)
 

@@ -12,7 +12,7 @@ from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import TOUCH
 from wam_description.topics import FRICTION_COLUMNS
 
-BLIND = "Contacts under the brakes are not compared: the motors, which alone are observed, sense none then."
+BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
 
 
 def contact_section(recording: AnalysedRecording) -> Section:
@@ -25,7 +25,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
     wrong = [*(one.sentence for one in recording.missed), *recording.unplanned.sentences]
     shows: list[str] = []
     named = [f"{number} {one.step}" for number, one in enumerate(recording.contacts, 1) if one.step]
-    sentences += [f"In the steps: {', '.join(named)}."] if named else []
+    sentences += [f"Contacts by number and step: {', '.join(named)}."] if named else []
     sentences += contact_doubts(recording)
     sentences += [BLIND] * bool(np.any(recording.blind & traces.true.acts))
     findings += contact_numbers(recording)
@@ -49,7 +49,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
                 "size of the force error, median",
                 "N",
                 off,
-                note="of the vector: the norm of its three components; where the force is not the least one",
+                note="norm of the error vector; without forces that are lower bounds",
             ),
         ]
         shows.append(f"Contacts: right link for {right:.0f} % of the time{_errors(away, off)}.")
@@ -94,12 +94,12 @@ def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Findi
     one = contact.estimate
     yield Finding(f"{name}: probability of the link", "%", 100.0 * one.probability)
     yield Finding(f"{name}: position along the link", "cm", cm * one.position, error=cm * one.position_sd)
-    least = "the least force that explains the torques" * one.is_lower_bound
+    least = "lower bound: the least force that explains the torques" * one.is_lower_bound
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
-    unknown = "not known: the force may be only the least one" * (not one.is_placed)
+    unknown = "not known: the force may be a lower bound" * (not one.is_placed)
     yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
-    note = f"to its detection, known to {1e3 * period:.0f} ms"
+    note = f"time until its detection, to within {1e3 * period:.0f} ms"
     yield Finding(f"{name}: latency", "ms", 1e3 * (contact.latency + period), note=note)
 
 

@@ -30,8 +30,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         factor = velocity_factor(one)
         if math.isfinite(factor):
             wrong.append(
-                f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
-                f"of another unit or sign, so that neither friction nor inertia is given."
+                f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the "
+                "two has another unit or sign, so friction and inertia are not computed."
             )
         whole = friction(one) if one.is_joint else None
         if whole is None:
@@ -67,8 +67,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
         return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
     assumed = (
-        "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
-        "that it may also hold are taken off where they are found, and otherwise count in the errors:"
+        "Computed from the effort, which is taken as friction, inertia and the joint's own weight. Drag and delays are "
+        "removed if they are found; otherwise they increase the errors:"
     )
     if alone:
         doubts.append(

@@ -113,14 +113,14 @@ def _press_sentence(one: HeldForce) -> str:
         f"{hold.name}: {shown(hold.commanded, 'N')} commanded {'in the base frame' if where == BASE else f'on {where}'}"
     )
     if hold.is_refused:
-        return f"{text}, and not controlled, so nothing of it is measured."
+        return f"{text}, but not controlled, so it is not evaluated."
     if hold.is_short:
         return f"{text} for less than {STEADY:g} s, so it has no steady state."
     if math.isnan(_accuracy(one).bias):
         return f"{text}; the resulting force was not recorded."
     remarks = [text]
     if response is not None and math.isfinite(response.rise):
-        remarks += [f"it {why}, which is why rise and overshoot are left out" for why in [_impact(one)] if why]
+        remarks += [f"it {why}, so rise and overshoot are not evaluated" for why in [_impact(one)] if why]
         remarks += ["it did not settle to 5 %"] * math.isinf(response.settling)
     return "; ".join([*remarks, *["the arm was pushed meanwhile"] * hold.disturbed]) + "."
 
@@ -160,7 +160,7 @@ def press_findings(one: HeldForce, theory: Theory) -> list[Finding]:
         ]
     if theory.predicted is not None:
         rise = math.log(9.0) * theory.predicted.time_constant
-        note = "predicted for the loop alone (5.2): no friction, inertia, feed-forward, limits of the approach"
+        note = "predicted by (5.2) for the loop alone: without friction, inertia, feed-forward, limits of the approach"
     else:
         rise, note = math.nan, ""
     if response is not None:

@@ -12,7 +12,7 @@ from wam_description.arm import Arm
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
 ONE_WAY = "of one direction, with any offset"
-MORE = "record motions that do not repeat each other, slow and fast, both ways, over a turn or more of the motors"
+MORE = "record different motions, slow and fast, in both directions, over a turn or more of the motors"
 
 
 def friction_section(recording: AnalysedRecording) -> Section:
@@ -37,7 +37,7 @@ def friction_section(recording: AnalysedRecording) -> Section:
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
     if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
-        sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
+        sentences.append(f"No friction of {', '.join(still)}: too little motion, or the torque has more than friction.")
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
     stated = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)

@@ -35,8 +35,7 @@ def power_section(recording: AnalysedRecording) -> Section | None:
         is_measured = not (found.forward > 1.0 or found.back > 1.0 or stored > lost)
         if not is_measured:
             sentences.append(
-                "The efficiency was not measured: the work that rotors and cables store and return is larger here than "
-                "what is lost."
+                "The efficiency was not measured: rotors and cables store and return more work here than is lost."
             )
         elif found.forward_put > SHAFT.least_work:
             rows = known & (motor > 0.0) & (joint > 0.0)
@@ -47,7 +46,7 @@ def power_section(recording: AnalysedRecording) -> Section | None:
             sentences.append(f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission.")
         if is_measured and found.back_put > SHAFT.least_work:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
-            sentences.append(f"The links put {shown(found.back_put, 'J')} into it while they were backdriven.")
+            sentences.append(f"While backdriven, the links put {shown(found.back_put, 'J')} into it.")
     findings += _backdrive(arm, friction, joints)
     if not sentences:
         sentences.append("Too little work was done to measure the efficiency.")

@@ -75,7 +75,7 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
         COMMANDED_CYCLE: ", as it was commanded",
         HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion that is not "
         "followed linearly",
-        UNKNOWN: "; no command of it is known, --command names one",
+        UNKNOWN: "; its command is not known, name it with --command",
     }
     return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."
 

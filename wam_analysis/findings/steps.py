@@ -146,7 +146,7 @@ def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     if not free:
         return []
     false = np.count_nonzero(traces.is_false)
-    question = f"false detections within {TOUCH.false_tolerance:g} % of the time without contact"
+    question = f"false detections for at most {TOUCH.false_tolerance:g} % of the time without contact"
     part, seconds = 100.0 * false / free, false * traces.period
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"{1e3 * seconds:.0f} ms, as a contact that ends may take"

@@ -18,7 +18,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
     what = (
-        "Analysed as that of another robot, as the options request."
+        "Analysed as a recording of another robot, as the options request."
         if given.is_given
         else "This is not a recording of this stack."
     )
@@ -26,7 +26,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
     wrong = [*_treated(found), *clocks]
     wrong += [
-        f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
+        f"{topic}: values jump back and forth from message to message, as if two publishers took turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]
@@ -61,12 +61,12 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
 
 
 DONE_TO = {
-    Treatment.COARSE: "{number} of {of} stamps repeat the one before; times of reception are used",
-    Treatment.ROUNDED: "the stamps are rounded to {size}; times of reception are used",
+    Treatment.COARSE: "{number} of {of} stamps repeat the one before; reception times are used",
+    Treatment.ROUNDED: "the stamps are rounded to {size}; reception times are used",
     Treatment.SPREAD: "{number} of {of} stamps repeat the one before; the messages are placed evenly between them",
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
     Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
-    Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}, which is taken off",
+    Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
     Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
 }
 
@@ -113,7 +113,7 @@ def _alike(found: Sequence[Source]) -> list[str]:
     if any(one.is_command for one in found):
         return []
     return [
-        f"{joint} is in {' and '.join(some)}; if one of them is what was commanded, give --command {some[-1]}."
+        f"{joint} is in {' and '.join(some)}; if one of them is the command, give --command {some[-1]}."
         for some, joint in shared.items()
     ]
 
@@ -128,4 +128,4 @@ def _unread(bag: Bag) -> list[str]:
     most = sorted(others, key=lambda name: -others[name])[: READING_LIMITS.named]
     listed = ", ".join(f"{name} ({bag.types.get(name, '')})" for name in most) + ", ..." * (len(others) > len(most))
     number = f"{sum(others.values())} messages of other topics"
-    return [f"{number} were not analysed: {listed}; --topic {most[0]} --map QUANTITY=FIELD names what they hold."]
+    return [f"{number} were not analysed: {listed}; --topic {most[0]} --map QUANTITY=FIELD analyses them."]

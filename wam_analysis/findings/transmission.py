@@ -60,9 +60,9 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
     if rotors <= SHAFT.drowned * cables:
         return ""
     return (
-        "Friction, ripple and efficiency of the motors were not measured: to accelerate the rotors takes up to "
-        f"{shown(rotors, 'N m')}, the cables carry {shown(cables, 'N m')}. The motors of this recording are velocity "
-        "sources, whose torque does not show what is lost."
+        "Friction, ripple and efficiency of the motors were not measured: the rotors need up to "
+        f"{shown(rotors, 'N m')} to accelerate, but the cables carry only {shown(cables, 'N m')}. So the motors "
+        "of this recording are velocity sources, and their torque does not show the losses."
     )
 
 

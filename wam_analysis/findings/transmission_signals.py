@@ -129,14 +129,14 @@ def _touched(run: RecordedRun, stamps: Times) -> Mask:
 
 def _caveats(run: RecordedRun, left_out: float) -> Iterator[str]:
     """About a load from gravity alone; `left_out` is the fraction of the time in which something touched the arm."""
-    yield "The motors' load is that of gravity alone: what accelerates the links is in their friction, too."
+    yield "The only known load of the motors is gravity: their friction includes what accelerates the links."
     if left_out > 0.0:
-        yield f"Left out is {100.0 * left_out:.0f} % of the time, in which something pushed or touched the arm."
+        yield f"{100.0 * left_out:.0f} % of the time is left out, because something pushed or touched the arm."
     unknown = run.lacking(*TOUCHES[: 1 + run.is_simulated])
     if unknown:
         yield (
-            f"Whether something pushed or touched the arm is not known: not recorded ({', '.join(unknown)}). "
-            "If so, it is in their friction."
+            f"It was not recorded whether something pushed or touched the arm ({', '.join(unknown)}). "
+            "If so, their friction includes it."
         )
 
 

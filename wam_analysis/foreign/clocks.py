@@ -10,7 +10,7 @@ from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Times
 from wam_bag.bag import JointColumns, WrenchColumns
 
-CLOCK_SET = "stamps of a clock that was set or never set; times of reception are used"
+CLOCK_SET = "stamps of a clock that was set or never set; reception times are used"
 
 
 class Clock(NamedTuple):
@@ -62,8 +62,8 @@ def _compared(clock: Clock, received: Times, times: Times, arrivals: Times, name
     side = "behind" if shift > 0 else "ahead of"
     note = clock.note or f"stamps {abs(shift) / 1e9:.6g} s {side} those of {name}, as of another clock"
     if float(np.quantile(apart, 0.95) - np.quantile(apart, 0.05)) > STREAM.reset:
-        return Clock(clock.times + apart, clock.note or f"{note}; times of reception are used")
-    return Clock(clock.times + shift, clock.note or f"{note}; shifted by that")
+        return Clock(clock.times + apart, clock.note or f"{note}; reception times are used")
+    return Clock(clock.times + shift, clock.note or f"{note}; they are shifted by this")
 
 
 def rising(stamps: Times, received: Times) -> Times:

@@ -119,7 +119,7 @@ def series_of_csv(path: Path) -> dict[str, Numbers]:
     with path.open(newline="", encoding="utf-8-sig") as stream:
         head, *rows = csv.reader(stream)
     if not rows:
-        raise BagError(f"{path} has no row below its titles")
+        raise BagError(f"{path} has no row below the names of its columns")
     table = np.genfromtxt([",".join(row) for row in rows], delimiter=",", dtype=np.float64, ndmin=2)
     return {name.strip(): table[:, i] for i, name in enumerate(head)}
 
@@ -140,7 +140,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     found = {str(name): np.asarray(series[name], np.float64) for name in series}
     clock = given.fields.get("stamp", "time")
     if clock not in found:
-        raise ValueError(f"{path} has no column '{clock}'; name that of the time by --map stamp=COLUMN")
+        raise ValueError(f"{path} has no column '{clock}'; name the column of the time with --map stamp=COLUMN")
     seconds = given.scaled("stamp")[0] * found[clock]
     times = np.rint(BILLION * seconds).astype(np.int64)
     parts: dict[str, dict[str, Numbers]] = {}
@@ -159,7 +159,9 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         vectors = [np.column_stack([parts[q].get(axis, 0.0 * times) for axis in "xyz"]) for q in ("force", "torque")]
         topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
     if not topics:
-        raise ValueError(f"{path} has the columns {', '.join(found)}; name them as position.JOINT, or by --map")
+        raise ValueError(
+            f"{path} has the columns {', '.join(found)}; rename them, for example position.JOINT, or use --map"
+        )
     counts = dict.fromkeys(topics, len(times))
     return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts)
 
@@ -172,7 +174,7 @@ def _by_rosbags(path: Path, given: TopicMap) -> Bag:
         highlevel: Any = importlib.import_module("rosbags.highlevel")
         typesys: Any = importlib.import_module("rosbags.typesys")
     except ImportError:
-        raise BagError(f"{path} is no MCAP; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
+        raise BagError(f"{path} is not an MCAP file; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
     try:
         with highlevel.AnyReader([path], default_typestore=store) as reader:
@@ -332,7 +334,7 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
         factor = BILLION * given.scaled("stamp")[0]
         found = np.array([one if is_ns else round(float(one) * factor) for one in stamps], np.int64)
     except (TypeError, ValueError, OverflowError):
-        unit = "" if has_unit else "; of a number in other than s, --unit stamp=UNIT names it: ms, us, ns or a factor"
+        unit = "" if has_unit else "; if it is a number not in s, give --unit stamp=UNIT: ms, us, ns or a factor"
         raise ValueError(f"{topic}: the field '{path}' has no times{unit}") from None
     if not (has_unit or is_ns):
         _refuse_other_pace(topic, path, found, columns.log_time_ns)
@@ -349,7 +351,7 @@ def _refuse_other_pace(topic: str, path: str, stamps: Times, received: Times) ->
     if took > 0.0 and numbers > STREAM.faster * took:
         nearest = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * numbers / took)))
         raise ValueError(
-            f"{topic}: the field '{path}' goes on by {shown(numbers)} while {shown(took, 's')} were recorded, so it is "
+            f"{topic}: the field '{path}' increases by {shown(numbers)} within {shown(took, 's')}, so it is "
             f"not in s; give --unit stamp={nearest}, or another one of s, ms, us, ns or a factor"
         )
 

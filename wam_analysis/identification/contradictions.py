@@ -43,10 +43,10 @@ SENTENCES: Mapping[Mistake, str] = {
     Mistake.SCALED: "all torques are {size:.2g} times those of the configuration: amperes, the other sign, or a load?",
     Mistake.SCALED_MOTOR: "the torques of {about} are {size:.2g} times those of the configuration: sign, unit or "
     "torque constant?",
-    Mistake.SWAPPED: "the torques are those of an arm whose motors {about} have each other's name",
+    Mistake.SWAPPED: "the torques fit if the names of the motors {about} are exchanged",
     Mistake.UNEXPLAINED: "{size:.0%} of the friction of {about} remains unexplained: did something touch the arm?",
     Mistake.WEIGHT: "the links weigh {size:.2g} times as much as configured: a payload that is not in arm.payload, or "
-    "a contact that lasts?",
+    "a long contact?",
     Mistake.NO_FRICTION: "no friction is left at {about}: did something push the arm along its motion?",
 }
 

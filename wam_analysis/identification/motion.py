@@ -82,7 +82,7 @@ def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
         )
     position, effort = (by_names(columns, field, names) for field in ("position", "effort"))
     if position is None or effort is None:
-        raise BagError(f"{where}: motor_states lack position or effort; both are needed")
+        raise BagError(f"{where}: motor_states have no position or no effort; both are needed")
     try:
         return motion(evenly(columns.stamp_ns / 1e9, position, effort))
     except ValueError as error:

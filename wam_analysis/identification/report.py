@@ -80,13 +80,12 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
         if found.both_directions[i] < IDENTIFY.few_parts:
             yield (
                 f"{name} turns in both directions in only {found.both_directions[i]} of the {IDENTIFY.parts} equal "
-                "sections of "
-                "the recording from which standard errors are computed: its own are uncertain; let it reverse more"
+                "sections of the recording, so its standard errors are uncertain; let it reverse more"
             )
         if found.held_out[i] > IDENTIFY.unexplained * found.residual[i] + 1e-4:
             yield (
                 f"{name}: motion that was held out is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
-                f"{1e3 * found.residual[i]:.3g}: too little motion for so many parameters"
+                f"{1e3 * found.residual[i]:.3g}: too little motion for all parameters"
             )
         share = found.residual[i] / max(level[:, i].mean(), 1e-9)
         if share > IDENTIFY.remaining:

@@ -68,7 +68,7 @@ def run(given: argparse.Namespace) -> int:
 def _steps(given: argparse.Namespace) -> int:
     """Print the report of the demonstration again."""
     if given.html or given.json:
-        raise ValueError("--steps prints text alone; leave out --html and --json")
+        raise ValueError("--steps prints only text; leave out --html and --json")
     found = analyse_steps(given.bag, given.namespace or "")
     print(text(found))
     return exit_code_of(found.unmet)

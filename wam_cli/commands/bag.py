@@ -52,7 +52,7 @@ def _record(given: argparse.Namespace) -> None:
         if not name.startswith(f"{RECORDER}:"):
             raise ValueError(
                 f"--set {name} has no effect here: the running stack has its own; "
-                f"give parameters of the recorder alone, as --set {RECORDER}:split_time=60.0"
+                f"set only parameters of the recorder, for example --set {RECORDER}:split_time=60.0"
             )
     own = {f"{RECORDER}:name": given.name}
     if given.directory:

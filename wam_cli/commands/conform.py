@@ -132,7 +132,9 @@ def _serve(configuration: Configuration, version: int) -> None:
 def _listen(configuration: Configuration, seconds: float) -> int:
     """Print what is on the bus, and what the driver would send."""
     if "interface" not in configuration.sections.get("driver", {}):
-        raise ValueError("--dry-run is for a driver on a bus; give its configuration, as --config barrett-wam4-bus")
+        raise ValueError(
+            "--dry-run is for a driver on a bus; give its configuration, for example --config barrett-wam4-bus"
+        )
     own = configuration.node("driver", BusParameters)
     line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
     print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
@@ -150,7 +152,9 @@ def driver_alone(configuration: Configuration) -> Configuration:
     """A configuration with its driver and a velocity loop only, in realtime on any computer: the driver is tested."""
     drivers = [entry for entry in configuration.shared.nodes if declared(entry).name == "driver"]
     if not drivers:
-        raise ValueError("no entry of the parameter 'nodes' is a driver; list one, as 'driver' or 'my_module:MyDriver'")
+        raise ValueError(
+            "no entry of the parameter 'nodes' is a driver; list one, for example 'driver' or 'my_module:MyDriver'"
+        )
     bold = {"driver:late_periods": 1.0} if "late_periods" in configuration.sections.get("driver", {}) else {}
     return configuration.with_values({"nodes": [drivers[0], "velocity_loop"], "timing.mode": "realtime", **bold})
 

@@ -32,7 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name in STUDIES:
         kind = load(name)
         study_arguments(parts.add_parser(name, help=kind.title), name, kind)
-    figures.arguments(parts.add_parser("figures", help="draw the figures of chapters 3 to 6 with the simulated plant"))
+    figures.arguments(parts.add_parser("figures", help="draw the figures of chapters 1 to 6 with the simulated plant"))
 
 
 def run(given: argparse.Namespace) -> int:
@@ -72,7 +72,7 @@ def _add(parser: argparse.ArgumentParser, one: Field[Any]) -> None:
         parser.add_argument(name, action="store_true", help=text)
     elif isinstance(default, tuple):
         choices = one.metadata["choices"]
-        given = ", ".join(choices).replace("%", "%%")
+        given = ", ".join(shlex.quote(choice) for choice in choices).replace("%", "%%")
         chosen = "all of them" if default == choices else " ".join(default) or "none"
         text = f"{text}: {given}; default: {chosen}"
         parser.add_argument(name, nargs="+", choices=choices, default=default, metavar="NAME", help=text)

@@ -52,7 +52,7 @@ def run(given: argparse.Namespace) -> int:
     """
     is_own = any(getattr(given, name) is not None for name in PLANT)
     if is_own and (given.config or given.values):
-        raise ValueError(f"--{', --'.join(PLANT)} give a loop of your own; leave out --config and --set")
+        raise ValueError(f"--{', --'.join(PLANT)} describe a loop of your own; leave out --config and --set")
     if given.config or given.values:
         given.config = given.config or BASE_CONFIGURATION
         return _assess_configuration(configuration_of(given))

@@ -75,7 +75,7 @@ def run(given: argparse.Namespace) -> int:
     require_option(given, "--excite", "--seconds", "--seed", "--only-write", "--directory")
     configuration = configuration_of(given)
     if given.write and given.write.resolve() in [one.resolve() for one in files_of(configuration_file(given))]:
-        raise ValueError(f"{given.write} would be written over, and this command reads it; give another file")
+        raise ValueError(f"{given.write} would be overwritten, but this command reads it; give another file")
     bag = given.bag
     if given.excite is not None:
         bag = _excite(configuration, given)
@@ -100,7 +100,7 @@ def run(given: argparse.Namespace) -> int:
     if against and not given.force:
         raise ValueError(
             f"{bag} contradicts the configuration, so no model is written: {against[0]} Correct the recording or the "
-            "configuration; --force writes the model all the same"
+            "configuration; --force writes the model anyway"
         )
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])

@@ -110,7 +110,7 @@ def of_installation(package: str) -> Iterator[None]:
         if error.name != package:
             raise
         install = f"apt install ros-jazzy-{package.replace('_', '-')}"
-        raise ValueError(f"it needs {package}, of a ROS installation: {install}") from None
+        raise ValueError(f"this needs {package} of a ROS installation: {install}") from None
 
 
 def _recording(given: argparse.Namespace) -> int:

@@ -66,7 +66,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "a constant ratio; may be repeated",
     )
     kind = parser.add_mutually_exclusive_group()
-    kind.add_argument("--list", action="store_true", help="no grid: run k has the value k of each --vary")
+    kind.add_argument("--list", action="store_true", help="no grid: run k takes the k-th value of each --vary")
     kind.add_argument(
         "--random",
         type=bounded(int, 1, MOST_SETS),
@@ -109,7 +109,7 @@ def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
         if names.count(name) > 1:
             raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
         if name.partition(":")[0] in ("scenario", "recorder"):
-            raise ValueError(f"--vary {name}: a run of a sweep has no such node; the scenario is that of --scenario")
+            raise ValueError(f"--vary {name}: runs of a sweep have no such node; give the scenario as --scenario")
 
 
 def _scenario_file(given: argparse.Namespace) -> Path:
@@ -133,7 +133,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> t
     """Why each set failed, '' where it did not, and no report; a row of the table for each quantity, or the failure."""
     if given.config != BASE_CONFIGURATION or given.values:
         raise ValueError(
-            "an experiment has its own configuration; leave out --config and --set, and --vary its numbers"
+            "an experiment has its own configuration; leave out --config and --set, and change its numbers with --vary"
         )
     runs = sweeping.points(definition.load(given.experiment), axes, sets)
     with batch_of(given, len(runs)) as batch:

@@ -262,7 +262,7 @@ class MomentumObserver:
             mass = self._parameters.payload[0] + error.value
             return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
         if not self.is_ready:
-            return "too few samples yet"
+            return "too few samples so far"
         if self._last.speed > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()

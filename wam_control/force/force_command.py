@@ -83,7 +83,7 @@ class CommandAdmission:
 
     def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
         self._joints, self._covers = joints, covers
-        self._remains = f"; the last good command remains in force for {command_age:g} s"
+        self._remains = f"; the last good command remains in use for {command_age:g} s"
         self._force, self._torque = LastGood(_size, command_age), LastGood(_largest, command_age)
         self.restart([])
 

@@ -77,7 +77,7 @@ class ForceLoop:
     ----------
     parameters : those in force; with guard.mode `limit` they may be lower than given.
     refused : number of refused commands.
-    refusals : why a present command is refused, by topic; the last good one remains in force.
+    refusals : why a present command is refused, by topic; the last good one remains in use.
     events : what the loop does instead of what is commanded, the most serious first; none where it obeys.
     """
 

@@ -7,24 +7,28 @@ class BusFault(Enum):
     """What is wrong on the bus; the text has fields for the node and a detail."""
 
     # at the start
-    NO_SAFETY_MODULE = "motor controllers answer, the safety module, node 10, does not; check the cable to the pendant"
+    NO_SAFETY_MODULE = (
+        "motor controllers answer, but the safety module (node 10) does not; check the cable to the pendant"
+    )
     MISSING = "motor controller {node} does not answer; check its cable"
-    UNKNOWN_NODE = "node {node} is none of this arm; is the configuration that of your arm?"
+    UNKNOWN_NODE = "node {node} does not belong to this arm; take the configuration of your arm"
     NOT_MOTOR = "node {node} has the role {detail}, which is not that of a motor controller"
     FIRMWARE = "node {node}: {detail}"
-    MIXED_FIRMWARE = "motor controller {node}: its firmware numbers {detail} differently from controller 1"
+    MIXED_FIRMWARE = "motor controller {node} has another firmware than controller 1: the number of {detail} differs"
     NOT_AWAKE = "motor controller {node} does not wake up; its status is {detail}"
-    WRIST = "motor 7 has {detail} poles, 6 are those of the wrist; gimbals have other ratios"
+    WRIST = "motor 7 has {detail} poles, the wrist has 6; a gimbal has other ratios"
     COUNTS = "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960"
-    GAIN = "motor controller {node} has {detail} counts per N m, too far from those of the maker"
-    LIMIT = "motor controller {node} has the largest torque {detail}, which is none"
-    INDEX = "motor controller {node} has index or group {detail}, with which it takes the torque of another motor"
-    NOT_ZEROED = "motor controller {node} is at {detail} counts, not those of home; it did not take its zero"
+    GAIN = "motor controller {node} has {detail} counts per N m, far from the maker's value"
+    LIMIT = "motor controller {node} has the largest torque (MT) {detail}; it must be above 0"
+    INDEX = "motor controller {node} would take the torque of another motor: its index or group is {detail}"
+    NOT_ZEROED = (
+        "motor controller {node} did not take its zero: it is at {detail} counts, not at those of the home pose"
+    )
     # later
     NO_REPLY = "motor controller {node} sends no position"
     JUMP = "the position of motor {node} jumps"
     RESET = "motor controller {node} was reset; its zero is lost"
-    ALL_SILENT = "no motor controller answers, the safety module does; check the cable of the bus"
+    ALL_SILENT = "the safety module answers, but no motor controller does; check the cable of the bus"
     NO_POWER = "nothing answers on the bus; check power, cable and adapter"
     ESTOP = "E-stop; release it and press Shift-Idle{detail}"
     SAFETY_IDLE = "the safety module went to idle{detail}; press Shift-Activate when the arm may move"
