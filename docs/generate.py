@@ -36,7 +36,8 @@ from wam_studies import design_choices
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
-from wam_studies.figures.panels import Panels, distances, draw_panels
+from wam_studies.figures.panels import Panels, distances
+from wam_studies.figures.style import draw_panels
 from wam_studies.force_benchmark.straight_arm import elbow_table
 from wam_studies.plant import table as plant_table
 from wam_studies.scorecard import measures

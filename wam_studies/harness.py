@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 from wam_description.configuration import Configuration
 from wam_sim.batch import Report, results
 from wam_sim.pieces import code_of
+from wam_studies.figures.panels import Panel
 from wam_studies.scores import Scores
 
 Case = TypeVar("Case")
@@ -94,8 +95,8 @@ class Study(ABC, Generic[Case, Record]):
     def score(self, records: Sequence[Record]) -> Scores:
         """What follows from the records of all seeds, or of one."""
 
-    def panels(self, records: Sequence[Record]) -> Sequence[Any]:
-        """What is drawn of the records, as `wam_studies.figures.panels.Panel`; none where the study has no picture."""
+    def panels(self, records: Sequence[Record]) -> Sequence[Panel]:
+        """What is drawn of the records; none where the study has no picture."""
         return ()
 
     def failure(self, record: Record) -> str:

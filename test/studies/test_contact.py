@@ -20,7 +20,7 @@ from wam_studies.contact.outcomes import ContactOutcome, ContactScore, Estimated
 from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
 from wam_studies.contact.simulation import Played, play, score, spans, torques_of
 from wam_studies.contact.study import ContactCase, ContactStudy
-from wam_studies.figures.panels import draw_panels
+from wam_studies.figures.style import draw_panels
 from wam_studies.scores import Interval, events, quantile, rms, share
 
 CONFIGURATION = Configuration.load(packaged("wam"))

@@ -482,7 +482,7 @@ def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, capfd) -> None:
     whole = yaml.safe_load(packaged("experiments/testbed-5.6").read_text())
     whole["runs"] = [run for run in whole["runs"] if run["name"] == "large_step"]
     file = tmp_path / "large.yaml"
-    file.write_text(yaml.safe_dump({**whole, "evaluation": "testbed.large_step"}))
+    file.write_text(yaml.safe_dump(whole))
     assert run_command(str(file), "--directory", str(tmp_path), "--name", "bags") == 0
     said = capfd.readouterr().out
     assert "large step, press 10 lb       diverged       diverged" in said
@@ -544,7 +544,7 @@ def test_cycle_of_the_motor_under_a_force_in_steps_has_the_period_of_both_errors
         "force_command": forces(time, (0.0, -11.6, 0.0)),
     }
     run = recorded(load("quantised-force"), 1, topics, PRESS, tmp_path)
-    travel, period, force = quantised.sampled({"friction": run}).rows
+    travel, period, force = quantised.quantised({"friction": run}).rows
     assert travel.agrees
     assert force.agrees
     assert period.agrees == agrees

@@ -15,7 +15,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
 from wam_ros.messages import joint_state
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken
-from wam_studies.faults.parameter_faults import UNKNOWN_CODES, parameter_set
+from wam_studies.faults.parameter_sets import UNKNOWN_CODES, parameter_set
 from wam_studies.faults.soak import SoakStudy
 from wam_studies.faults.study import KINDS, FaultStudy, run_fault
 from wam_studies.faults.trials import KEPT, FaultCase, FaultTrial

@@ -14,7 +14,8 @@ from wam_cli.main import main
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, table
-from wam_studies.figures.panels import Panels, Series, distances, draw_panels
+from wam_studies.figures.panels import Panels, Series, distances
+from wam_studies.figures.style import draw_panels
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -148,7 +148,7 @@ def _write(given: argparse.Namespace, measured: Measurement) -> None:
     """Write the section, and the picture into a folder of the page's name."""
     page, study, shown = Path(given.write), measured.study, ""
     if panels := study.panels(measured.total):
-        from wam_studies.figures.panels import draw_panels  # matplotlib is slow to import
+        from wam_studies.figures.style import draw_panels  # matplotlib is slow to import
 
         picture = page.with_suffix("") / f"{given.part}.png"
         picture.parent.mkdir(parents=True, exist_ok=True)

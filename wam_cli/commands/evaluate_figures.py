@@ -4,7 +4,7 @@ import argparse
 
 from wam_cli.options import batch_of, take_batch, writable_directory
 from wam_studies.figures.catalogue import FIGURES, file_of, known, numbers, table
-from wam_studies.figures.panels import draw_panels
+from wam_studies.figures.style import draw_panels
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from wam_cli.options import PAGE, bounded, writable_directory
 from wam_ros.bring_up import Composition
 from wam_sim.batch import processes, results
 from wam_sim.progress import Progress
-from wam_studies.figures.panels import draw_panels
+from wam_studies.figures.style import draw_panels
 from wam_studies.thesis.definition import Experiment, configured, load, names, tasks
 from wam_studies.thesis.evaluation import evaluate, text
 from wam_studies.thesis.page import write

@@ -8,5 +8,5 @@ touches        contacts drawn wider than the estimator's prior, as exact forces;
 recording      one degraded arm, its signals kept; replay: what the estimator reports on them
 outcomes       what is reported of true contacts, between them, and of torques, for both
 rows           what is required of contacts, and of the arm as stated; degraded_rows: of the others
-study          all cases in the harness; picture draws them
+study          all cases in the harness, and what is drawn of them
 """

@@ -1,22 +1,28 @@
 """Contact estimation on simulated arms: as the estimator's model states them, and on others."""
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
+
+import numpy as np
 
 from wam_description.configuration import Configuration
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
 from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
-from wam_studies.contact.outcomes import ContactScore
+from wam_studies.contact.outcomes import ContactOutcome, ContactScore
 from wam_studies.contact.recording import CONTACTS, Drive, record
 from wam_studies.contact.replay import replay
-from wam_studies.contact.rows import IDENTIFIED_ARM, stated_rows
-from wam_studies.contact.scenarios import BenchmarkScenario, ScenarioGenerator
+from wam_studies.contact.rows import IDENTIFIED_ARM, STATED, error_of, near, on_outer_link, stated_rows
+from wam_studies.contact.scenarios import KINDS, RANGES, BenchmarkScenario, ScenarioGenerator
 from wam_studies.contact.simulation import play, score
+from wam_studies.figures.panels import Panel, Panels, line_only, measured
 from wam_studies.harness import Study, option
 from wam_studies.scores import Row, Scores, ScoreTable
 
 ALL = "all"
+BINS = 6  # of the picture
+CENTIMETRES = 100.0
 
 
 class DriveExtent(NamedTuple):
@@ -105,11 +111,10 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         """Why a case ended early."""
         return record.failure
 
-    def panels(self, records: Sequence[ContactScore]) -> Sequence[Any]:
+    def panels(self, records: Sequence[ContactScore]) -> Panels:
         """Position errors and calibration on the arm as stated."""
-        from wam_studies.contact.picture import panels_of  # matplotlib is slow to import
-
-        return panels_of(_of_both(records)[0], self.configuration.shared.arm)
+        found = on_outer_link(_of_both(records)[0], self.configuration.shared.arm)
+        return _errors(found), _deviations(found)
 
 
 def _of_both(records: Sequence[ContactScore]) -> tuple[list[ContactScore], list[ContactScore]]:
@@ -128,3 +133,32 @@ def _extent(scenarios: Sequence[ContactScore]) -> ScoreTable:
         "free motion, s": round(sum(one.free_seconds for one in scenarios if one.group == "free")),
     }
     return ScoreTable("Extent", list(counts), [list(map(str, counts.values()))])
+
+
+def _errors(found: Sequence[ContactOutcome]) -> Panel:
+    lines = []
+    for kind in KINDS:
+        own = [one for one in found if one.kind == kind]
+        medians = {force: error_of(near(own, force)).value for force in RANGES.levels}
+        known = {force: CENTIMETRES * value for force, value in medians.items() if math.isfinite(value)}
+        lines.append((kind, measured(list(known), list(known.values()))))
+    required = [CENTIMETRES * allowed[0][1] for allowed in STATED.median.values()]
+    lines.append(("required", line_only(list(STATED.median), required)))
+    return Panel("position in motion, median error", "force [N]", "error [cm]", lines)
+
+
+def _deviations(found: Sequence[ContactOutcome]) -> Panel:
+    given = [one for one in found if one.right_link and math.isfinite(one.error) and one.position_sd > 0.0]
+    sd = CENTIMETRES * np.array([one.position_sd for one in given])
+    error = CENTIMETRES * np.array([one.error for one in given])
+    groups = _bins(sd)
+    middle = np.array([np.median(sd[group]) for group in groups])
+    inner = np.array([np.quantile(error[group], 0.683) for group in groups])
+    ends = np.array([0.3, 15.0])
+    lines = [("68 % quantile of the error", measured(middle, inner)), ("one reported sd", line_only(ends, ends))]
+    return Panel("reported standard deviation", "reported sd of the position [cm]", "error [cm]", lines, "xy")
+
+
+def _bins(values: np.ndarray) -> list[np.ndarray]:
+    """Places of the values in groups of equal number, from small to large; none of too few."""
+    return np.array_split(np.argsort(values), BINS) if len(values) >= BINS else []

@@ -3,9 +3,8 @@
 study              every kind of fault, its trials in the harness
 trials             what a trial is, the limits of motion, force and delay, the nodes that trials share
 message_faults     messages broken field by field, stamp by stamp, byte by byte
-parameter_faults   sets of live parameters, in part good and in part not
 bag_faults         bags broken at random, and what a reader makes of them
-messages, parameter_sets, second_publishers, disks, bags   trials on the nodes in one process
+messages, parameter_sets, disks, bags   trials on the nodes in one process
 losses             trials on nodes in processes of their own
 interruptions      Ctrl-C at random moments of the demonstration
 soak               a long run, its memory and its losses

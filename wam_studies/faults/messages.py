@@ -1,4 +1,7 @@
-"""Broken messages on every topic that a node takes, from the topic's own publisher and from a second one."""
+"""Broken messages on every topic that a node takes, from the topic's own publisher and from a second one; false ones.
+
+A second publisher of another type cannot be tried here: the middleware allows one type for a name in a process.
+"""
 
 from functools import partial
 from random import Random
@@ -6,11 +9,20 @@ from typing import Final, NamedTuple
 
 from rclpy.serialization import serialize_message
 
-from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
+from wam_studies.faults.message_faults import (
+    EFFECTIVE,
+    MESSAGE_FAULTS,
+    SECOND,
+    MessageFault,
+    broken,
+    made_effective,
+    set_stamp,
+)
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 PUSH: Final = "sim/disturbance"
+GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != PUSH)  # a second publisher is a fault
 
 
 class MessagePlan(NamedTuple):
@@ -49,7 +61,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     sent = 0
     stack.allowed_motion = FAULTS.motion if todo.is_foreign else FAULTS.held_motion
     if publisher is None:
-        return 1
+        return 0
     if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
         stack.allowed_force = stack.shared.disturbance_force_limit
     for _ in range(FAULTS.messages):
@@ -64,4 +76,30 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     if todo.is_foreign:
         stack.node.destroy_publisher(publisher)
     stack.run(FAULTS.after)
-    return max(sent, 1)
+    return sent
+
+
+def play_second(case: FaultCase) -> FaultTrial:
+    """A trial with a second publisher of false commands or feedback with right stamps; topics in turn."""
+    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    topic = topics[case.number % len(topics)]
+    return watched_trial(case, f"{topic}, second publisher", partial(_stream, topic))
+
+
+def _stream(topic: str, stack: WatchedStack) -> int:
+    """Answer every period with a false message that has the right stamp."""
+    publisher = stack.foreign_publisher(topic)
+    try:
+        end = stack.stamp() + int(FAULTS.streamed * SECOND)
+        while stack.stamp() < end and not stack.driver.safety.fault:
+            message = stack.newest(topic)
+            made_effective(topic, message, stack.cover)
+            set_stamp(message, stack.stamp())
+            stack.inject(publisher, serialize_message(message))
+            stack.run(0.001)
+        stack.run(FAULTS.after_publishers)
+        if topic in GUARDED and not any(event.values.get("topic") == topic for event in stack.driver.safety.events):
+            stack.escapes.append(f"no fault names {topic}: '{stack.driver.safety.fault}'")
+    finally:
+        stack.node.destroy_publisher(publisher)
+    return 1

@@ -1,8 +1,13 @@
-"""Parameter sets for every node: refused ones change nothing, accepted ones leave an arm that is stable."""
+"""Parameter sets for every node: refused ones change nothing, accepted ones leave an arm that is stable.
 
+A set is in and out of range, of wrong types, of unknown types, in part good and in part not.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
 from functools import partial
 from random import Random
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -11,17 +16,134 @@ from rcl_interfaces.srv import SetParametersAtomically
 from wam_description.arm import Shared
 from wam_description.interface import declared
 from wam_description.parameters import Field, fields
-from wam_studies.faults.parameter_faults import (
-    BOOL,
-    DOUBLE,
-    INTEGER,
-    STRING,
-    Assignment,
-    ParameterSet,
-    parameter_set,
-)
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
+
+# type codes of rcl_interfaces/ParameterType
+BOOL, INTEGER, DOUBLE, STRING = 1, 2, 3, 4
+ARRAYS: Final = {BOOL: 6, INTEGER: 7, DOUBLE: 8, STRING: 9}
+CODES: Final = {bool: BOOL, int: INTEGER, float: DOUBLE, str: STRING}
+UNKNOWN_CODES: Final = (10, 11, 77, 200, 255)
+EXTREMES: Final = {
+    BOOL: (True, False),
+    INTEGER: (-(2**63), 2**63 - 1, 0, -1),
+    DOUBLE: (math.nan, math.inf, -math.inf, 1.7e308, -1.7e308, 5e-324, -1.0, 1e9),
+    STRING: ("", "x" * 5000, "\x1b[2J", "\U0001f9be", "nan"),
+}
+
+
+class Assignment(NamedTuple):
+    """A parameter, the type code and the value that are sent; the code need not fit the value."""
+
+    name: str
+    code: int
+    value: Any
+
+
+class ParameterSet(NamedTuple):
+    """A set to be taken or refused as a whole.
+
+    Attributes
+    ----------
+    name : what is wrong with it, in words.
+    assignments : of the set.
+    is_wrong : whether it has to be refused; else it may be.
+    """
+
+    name: str
+    assignments: tuple[Assignment, ...]
+    is_wrong: bool
+
+
+def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: Random) -> ParameterSet:
+    """A set for a node, drawn at random.
+
+    Parameters
+    ----------
+    fields : parameters of the node; at least one.
+    present : their values.
+    chance : seeded.
+    """
+    live = [field for field in fields if field.live]
+    field = chance.choice(live if live and chance.random() < 0.8 else fields)
+    good = [_scaled(one, present[one.name], chance) for one in chance.sample(live, min(len(live), chance.randrange(4)))]
+    way = chance.randrange(8)
+    if way == 0 and live:
+        many = chance.sample(live, chance.randrange(1, len(live) + 1))
+        return ParameterSet(
+            "values near the present ones", tuple(_scaled(f, present[f.name], chance) for f in many), False
+        )
+    if way == 1:
+        return ParameterSet("no parameter", (), False)
+    if way == 2:
+        bad = Assignment(field.name, chance.choice(UNKNOWN_CODES), present[field.name])
+        return ParameterSet("an unknown type code", _mixed(good, bad, chance), True)
+    if way == 3:
+        kind = chance.choice([kind for kind in CODES.values() if kind != CODES[field.kind]])
+        code = ARRAYS[kind] if chance.random() < 0.5 else kind
+        value = chance.choice(EXTREMES[kind])
+        bad = Assignment(field.name, code, [value] if code != kind else value)
+        return ParameterSet("another type", _mixed(good, bad, chance), True)
+    if way == 4:
+        bad = Assignment(chance.choice(["x", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"]), DOUBLE, 1.0)
+        return ParameterSet("an unknown name", _mixed(good, bad, chance), True)
+    if way == 5 and field.is_array:
+        values = list(present[field.name])
+        values = chance.choice([[], values[:-1], [*values, *values[:1]], values * 1000])
+        code = ARRAYS[CODES[field.kind]]
+        return ParameterSet(
+            "an array of another length", _mixed(good, Assignment(field.name, code, values), chance), False
+        )
+    if way == 6:
+        return ParameterSet(
+            "one name twice", tuple(_scaled(field, present[field.name], chance) for _ in range(2)), False
+        )
+    bad = _extreme(field, present[field.name], chance)
+    is_wrong = not field.live or _is_outside(field, bad.value)
+    return ParameterSet("an extreme value", _mixed(good, bad, chance), is_wrong)
+
+
+def _code(field: Field) -> int:
+    return ARRAYS[CODES[field.kind]] if field.is_array else CODES[field.kind]
+
+
+def _scaled(field: Field, value: Any, chance: Random) -> Assignment:
+    """A value between a fifth and five times the present one."""
+
+    def scaled(one: Any) -> Any:
+        if field.kind is float:
+            return one * 5.0 ** chance.uniform(-1.0, 1.0)
+        if field.kind is int and not isinstance(one, bool):
+            return max(0, one + chance.choice([-1, 0, 1, 5]))
+        return not one if field.kind is bool else one
+
+    return Assignment(field.name, _code(field), [scaled(one) for one in value] if field.is_array else scaled(value))
+
+
+def _extreme(field: Field, value: Any, chance: Random) -> Assignment:
+    extreme = chance.choice(EXTREMES[CODES[field.kind]])
+    if not field.is_array:
+        return Assignment(field.name, _code(field), extreme)
+    values = list(value) or [extreme]
+    values[chance.randrange(len(values))] = extreme
+    return Assignment(field.name, _code(field), values)
+
+
+def _is_outside(field: Field, value: Any) -> bool:
+    values = value if isinstance(value, list) else [value]
+    if field.choices:
+        return any(one not in field.choices for one in values)
+    return field.kind in (int, float) and any(not field.low <= one <= field.high or math.isinf(one) for one in values)
+
+
+def _mixed(good: Sequence[Assignment], bad: Assignment, chance: Random) -> tuple[Assignment, ...]:
+    """Good assignments around a bad one."""
+    others = [one for one in good if one.name != bad.name]
+    others.insert(chance.randrange(len(others) + 1), bad)
+    return tuple(others)
+
+
+# tried on the nodes
 
 FIELDS: Final = {
     BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, NamedTuple
 
-from wam_studies.faults import bags, disks, interruptions, losses, messages, parameter_sets, second_publishers
+from wam_studies.faults import bags, disks, interruptions, losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
 from wam_studies.harness import Study, option
 from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact
@@ -39,8 +39,8 @@ KINDS: Final = {
     "parameters": FaultKind("sets", 2000, 10, parameter_sets.play, LOCKSTEP),
     "losses": FaultKind("losses", 108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
     "losses-realtime": FaultKind("losses", 108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
-    "publishers": FaultKind("publishers", 90, 3, second_publishers.play, LOCKSTEP),
-    "publishers-realtime": FaultKind("publishers", 90, 3, second_publishers.play, REALTIME),
+    "publishers": FaultKind("publishers", 60, 3, messages.play_second, LOCKSTEP),
+    "publishers-realtime": FaultKind("publishers", 60, 3, messages.play_second, REALTIME),
     "disks": FaultKind("disks", 12, 1, disks.play, LOCKSTEP),
     "bags": FaultKind("bags", 3000, 30, bags.play, LOCKSTEP),
     "interruptions": FaultKind("interruptions", 100, 0, interruptions.play, {}),

@@ -23,6 +23,7 @@ from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     against_spring,
     frequencies,
+    ideal,
     limiting_efficiency,
     link_inertia,
     power_ratio,
@@ -61,26 +62,10 @@ class Driven(NamedTuple):
         dry : whether rotor and joint have their static friction, also in motion; that by load is there in any case.
         play : whether there is backlash.
         """
-        motors, joints, none = self.arm.motors, self.arm.joints, (0.0,)
-        at_motor, at_joint = (part.static_friction if dry else none for part in (motors, joints))
-        inertia = (rotor or motors.inertia[0],)
-        arm = replace(
-            self.arm,
-            motors=replace(
-                motors, inertia=inertia, viscous_friction=none, static_friction=at_motor, dynamic_friction=at_motor
-            ),
-            joints=replace(
-                joints,
-                lower=(-1e3,),
-                upper=(1e3,),
-                viscous_friction=none,
-                static_friction=at_joint,
-                dynamic_friction=at_joint,
-            ),
-            cables=replace(self.arm.cables, damping=none),
-            gravity=(0.0, 0.0, 0.0),
-        )
-        backlash = self.effects.backlash if play else none
+        motors, joints = self.arm.motors, self.arm.joints
+        at_motor, at_joint = (part.static_friction[0] if dry else 0.0 for part in (motors, joints))
+        arm = ideal(self.arm, rotor, friction=(at_joint, at_joint), at_motor=at_motor)
+        backlash = self.effects.backlash if play else (0.0,)
         effects = replace(no_effects(arm), creep=self.effects.creep, backlash=backlash)
         plant = Plant(arm, world, effects, self.step, self.friction)
         plant.brake(False)

@@ -6,6 +6,6 @@ trial          one task in simulation: true force, motion, impact (3.1), and wha
 controllers    what a user would write in place of the force loop
 outcome        done, refused, ended with a reason, or silent; cycles and overshoot
 groupings      the classes into which tasks are divided
-study          many tasks in the harness; picture draws them
+study          many tasks in the harness, and what is drawn of them
 straight_arm   a nearly straight arm that presses ahead and aside (docs/force.md)
 """

@@ -4,8 +4,11 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any, ClassVar
+from typing import ClassVar
 
+import numpy as np
+
+from wam_studies.figures.panels import FEW, Panel, Panels, measured
 from wam_studies.force_benchmark.groupings import (
     FEEDBACK,
     GROUPINGS,
@@ -26,6 +29,7 @@ from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, shar
 
 ACCEPTED = {SENSORS: (0.93, 0.97), MOTORS: (0.9, 0.95)}  # share of accepted tasks that is right: required, aim
 OF_FEASIBLE = {SENSORS: (0.6, 0.85), MOTORS: (0.4, 0.7)}  # share of the feasible ones: the same
+LEAST, MOST = 0.1, 10.0  # of the commanded force, drawn
 KNOWN = 0.05  # error of a force, per force, up to which it can be known
 
 
@@ -68,11 +72,15 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
         kinds = " and ".join(_kinds(record))
         return f"{kinds}: {', '.join(what)}, {_numbers(record)}" if kinds else ""
 
-    def panels(self, records: Sequence[ForceTrial]) -> Sequence[Any]:
-        """True force over the commanded one by outcome, and peaks over stiffness."""
-        from wam_studies.force_benchmark.picture import panels_of  # matplotlib is slow to import
-
-        return panels_of(records)
+    def panels(self, records: Sequence[ForceTrial]) -> Panels:
+        """True force over the commanded one, up to `FEW` of each outcome, and peaks over stiffness."""
+        peaks = [one for one in records if one.result.peak > 0.0][:FEW]
+        stiffness = [one.task.surface.stiffness for one in peaks]
+        over = [("", measured(stiffness, [one.result.peak / one.result.limit for one in peaks]))]
+        return (
+            *(_ratios(name, FEEDBACK.trials(records, name)) for name in FEEDBACK.classes),
+            Panel("peaks", "stiffness of the surface [N/m]", "peak / (1.5 commanded + impact) [-]", over, "x"),
+        )
 
     def details(self, record: ForceTrial) -> str:
         """A task and its result in full."""
@@ -217,3 +225,12 @@ def _numbers(trial: ForceTrial) -> str:
         f"{trial.task.force:.3g} N commanded, {result.mean:.3g} N true (sd {result.sd:.2g}, peak {result.peak:.3g}, "
         f"limit {result.limit:.3g}, cycle {result.cycle:.2g})"
     )
+
+
+def _ratios(name: str, trials: Sequence[ForceTrial]) -> Panel:
+    lines = []
+    for end in TaskEnd:
+        own = [one for one in trials if one.result.outcome is end][:FEW]
+        ratio = np.clip([one.result.mean / one.task.force for one in own], LEAST, MOST)
+        lines.append((end.value.partition(":")[0], measured([one.task.force for one in own], ratio)))
+    return Panel(name, "commanded force [N]", "true force at the end / commanded [-]", lines, "xy")

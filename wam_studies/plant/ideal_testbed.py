@@ -22,25 +22,29 @@ LEVER = 0.9144  # m, from the joint to the tip
 RATIO = 14.0
 
 
-def ideal_testbed(
-    ratio: float = 14.0, rotor: float | None = None, damping: float = 0.0, friction: tuple[float, float] = (0.0, 0.0)
+def ideal(
+    arm: Arm,
+    rotor: float | None = None,
+    damping: float = 0.0,
+    friction: tuple[float, float] = (0.0, 0.0),
+    at_motor: float = 0.0,
 ) -> Arm:
-    """The testbed without gravity and with the requested effects only.
+    """An arm with one motor without gravity and ends, and with the requested effects only.
 
     Parameters
     ----------
-    ratio : N.
+    arm : with one joint.
     rotor : inertia of the rotor, kg m^2; None for that of the motor.
     damping : of the cable circuit, N m s/rad.
     friction : static and dynamic, at the joint, N m.
+    at_motor : friction of the motor, N m.
     """
-    arm = Configuration.load(packaged("testbed")).shared.arm
     none = (0.0,)
     motors = replace(
         arm.motors,
         inertia=(rotor or arm.motors.inertia[0],),
-        static_friction=none,
-        dynamic_friction=none,
+        static_friction=(at_motor,),
+        dynamic_friction=(at_motor,),
         viscous_friction=none,
     )
     joints = replace(
@@ -52,9 +56,15 @@ def ideal_testbed(
         upper=(1e3,),
     )
     cables = replace(arm.cables, damping=(damping,))
-    return replace(
-        arm, motors=motors, joints=joints, cables=cables, joint_from_motor=(1.0 / ratio,), gravity=(0.0, 0.0, 0.0)
-    )
+    return replace(arm, motors=motors, joints=joints, cables=cables, gravity=(0.0, 0.0, 0.0))
+
+
+def ideal_testbed(
+    ratio: float = RATIO, rotor: float | None = None, damping: float = 0.0, friction: tuple[float, float] = (0.0, 0.0)
+) -> Arm:
+    """The testbed as an ideal arm with a ratio N; the other arguments are those of `ideal`."""
+    arm = Configuration.load(packaged("testbed")).shared.arm
+    return replace(ideal(arm, rotor, damping, friction), joint_from_motor=(1.0 / ratio,))
 
 
 def released_plant(arm: Arm, world: World = EMPTY, step: float = STEP, **effects: Any) -> Plant:

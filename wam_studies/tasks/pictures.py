@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from wam_analysis import arm_picture
-from wam_studies.figures.panels import draw_panel
-from wam_studies.figures.style import panels
+from wam_studies.figures.style import draw_panel, panels
 from wam_studies.tasks.object_traces import object_states, world_of
 from wam_studies.thesis.definition import Experiment
 from wam_studies.thesis.recording import Recording, recording

@@ -2,7 +2,7 @@
 
 `config/experiments/NAME.yaml`, of a whole-arm task `config/tasks/NAME.yaml`, holds title, section, configuration,
 evaluation, `include` (sets of values in `config/experiments/sets/`), values, runs with a name, values and the steps of
-a scenario, and a sample: the part of a run that is kept in `bags/sample/NAME`, and its evaluation.
+a scenario, and a sample: the part of a run that is kept in `bags/sample/NAME`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -46,7 +46,6 @@ class SampleDefinition(NamedTuple):
     seconds : begin and end, of the arm's time.
     topics : kept of those recorded; None for all.
     thinned : of a topic, that the first of so many messages is kept.
-    evaluation : of the sample, from a mapping with this run only; that of the experiment where it has none.
     """
 
     run: str
@@ -54,7 +53,6 @@ class SampleDefinition(NamedTuple):
     seconds: tuple[float, float]
     topics: tuple[str, ...] | None = None
     thinned: Mapping[str, int] = {}
-    evaluation: str = ""
 
 
 class Experiment(NamedTuple):
@@ -116,8 +114,6 @@ def load(name: str) -> Experiment:
     doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
     require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
     sample = None if experiment.sample is None else _sample(f"{path}, sample", experiment.sample, runs)
-    if sample is not None and not sample.evaluation:
-        sample = sample._replace(evaluation=experiment.evaluation)
     return experiment._replace(name=path.stem, section=str(experiment.section), runs=runs, sample=sample)
 
 

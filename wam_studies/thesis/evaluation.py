@@ -39,7 +39,7 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
     recordings = {name: recording(bag) for name, bag in bags.items()}
     for run in experiment.runs:
         _require_whole(experiment, run, recordings[run.name])
-    return _evaluate(experiment, experiment.evaluation, recordings)
+    return _evaluate(experiment, recordings)
 
 
 def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> None:
@@ -73,11 +73,11 @@ def evaluate_sample(experiment: Experiment, recorded: Recording) -> Result:
     """
     if experiment.sample is None:
         raise BagError(f"experiment {experiment.name} declares no sample; give the bags of its runs")
-    return _evaluate(experiment, experiment.sample.evaluation, {experiment.sample.run: recorded})
+    return _evaluate(experiment, {experiment.sample.run: recorded})
 
 
-def _evaluate(experiment: Experiment, evaluation: str, recordings: Mapping[str, Recording]) -> Result:
-    result = function_of(evaluation)(recordings)
+def _evaluate(experiment: Experiment, recordings: Mapping[str, Recording]) -> Result:
+    result = function_of(experiment.evaluation)(recordings)
     runs = [run for run in experiment.runs if run.name in recordings]
     stops = [_stop(run, recordings[run.name]) for run in runs if run.stops or recordings[run.name].fault]
     remarks = [

@@ -19,17 +19,27 @@ Runs = Mapping[str, Recording]
 
 
 def compared(runs: Runs) -> Result:
-    """The experiment `inner-loops`."""
+    """The experiment `inner-loops`, or one run of the torque loop: growth or decay by its largest gain."""
+    if len(runs) == 1:
+        ((name, run),) = runs.items()
+        fraction, words = _gain(run) / _expected(run), ("decays", "grows")
+        label = f"torque loop at {fraction:.2f} of its largest gain"
+        row = Comparison(label, words[fraction > 1.0], words[_growth(run) > 0.0], equation="sampled loop")
+        return Result([row], [_speeds("torque loop", {name: run})])
     left = friction_left({name: runs[name] for name in FRICTION})
-    rows, speeds = list(left.rows), []
+    rows, shown = list(left.rows), {}
     for below in runs:
         loop, found, cable = below.partition("_below")
         if found:
             above = f"{loop}_above{cable}"
             rows.append(_largest(f"{loop} loop{cable.replace('_', ' ')}, largest gain", runs[below], runs[above]))
-            motors = runs[above].joints("motor_states")
-            speeds.append((above.replace("_", " "), measured(motors.time, motors.velocity[:, 0])))
-    return Result(rows, [*left.panels, Panel("above the largest gain", "time [s]", "motor [rad/s]", speeds)])
+            shown[above] = runs[above]
+    return Result(rows, [*left.panels, _speeds("above the largest gain", shown)])
+
+
+def _speeds(title: str, runs: Runs) -> Panel:
+    each = [(name.replace("_", " "), run.joints("motor_states")) for name, run in runs.items()]
+    return Panel(title, "time [s]", "motor [rad/s]", [(name, measured(m.time, m.velocity[:, 0])) for name, m in each])
 
 
 def friction_left(runs: Runs) -> Result:
@@ -50,17 +60,6 @@ def friction_left(runs: Runs) -> Result:
         curves.append((label, measured(command[::20], shown.force[::20])))
     panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
     return Result(rows, [panel])
-
-
-def torque_sample(runs: Runs) -> Result:
-    """One run of the torque loop: growth or decay by its largest gain."""
-    ((name, run),) = runs.items()
-    fraction, words = _gain(run) / _expected(run), ("decays", "grows")
-    label = f"torque loop at {fraction:.2f} of its largest gain"
-    row = Comparison(label, words[fraction > 1.0], words[_growth(run) > 0.0], equation="sampled loop")
-    motors = run.joints("motor_states")
-    curve = (name.replace("_", " "), measured(motors.time, motors.velocity[:, 0]))
-    return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
 
 
 def _command(shown: TestbedStep) -> Numbers:

@@ -17,29 +17,23 @@ from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, sti
 
 
 def stiction(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `stiction-limit-cycle`."""
-    shown, quiet, smaller = (played(run, run.steps[-1]) for run in runs.values())
+    """The experiment `stiction-limit-cycle`; of a sample, without the start, (5.8) and (5.9)."""
+    shown, *others = (played(run, run.steps[-1] if run.steps else None) for run in runs.values())
     found = last_cycle(shown.time, shown.force)
     rows, remark = _closed_form(shown.link, found)
-    force = float(rows[0].predicted)
-    curve = shown.exact_line(is_sampled=False)
-    exact = last_cycle(shown.time, curve[1].y)
-    rows += [
-        near("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", "integrator"),
-        near("period, exact", exact.period, found.period, "s", "integrator"),
-        *_with_deadband(quiet, force),
-        _with_smaller_deadband(smaller, force),
-    ]
-    whole = played(quiet.run).line
-    curves = [("without deadband", shown.line), curve, ("with deadband", whole)]
-    return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
-
-
-def stiction_sample(runs: Mapping[str, Recording]) -> Result:
-    """Some cycles of `stiction-limit-cycle`, without the start that the exact motion needs."""
-    shown = played(runs["without_deadband"])
-    rows, remark = _closed_form(shown.link, last_cycle(shown.time, shown.force))
     curves = [("without deadband", shown.line)]
+    if others:
+        quiet, smaller = others
+        force = float(rows[0].predicted)
+        curve = shown.exact_line(is_sampled=False)
+        exact = last_cycle(shown.time, curve[1].y)
+        rows += [
+            near("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", "integrator"),
+            near("period, exact", exact.period, found.period, "s", "integrator"),
+            *_with_deadband(quiet, force),
+            _with_smaller_deadband(smaller, force),
+        ]
+        curves += [curve, ("with deadband", played(quiet.run).line)]
     return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
 
 

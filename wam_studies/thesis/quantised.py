@@ -18,7 +18,10 @@ Runs = Mapping[str, Recording]
 
 
 def quantised(runs: Runs) -> Result:
-    """The experiment `quantised-force`."""
+    """The experiment `quantised-force`, or its run with friction alone."""
+    if len(runs) == 1:
+        (shown,) = map(_true, runs.values())
+        return Result(_with_friction(shown), [_motors([("", shown)])])
     shown, friction, quiet = map(_true, runs.values())
     level, node, desired = _level(shown), shown.link.node, shown.desired
     late = shown.time > shown.time[-1] - BOUNDS.frictionless_end
@@ -42,12 +45,6 @@ def quantised(runs: Runs) -> Result:
         rows,
         [Panel(f"true force, read in steps of {level:.2f} N", "time [s]", "force [N]", forces), _motors(labelled)],
     )
-
-
-def sampled(runs: Runs) -> Result:
-    """The run with friction, or some cycles of it."""
-    (shown,) = map(_true, runs.values())
-    return Result(_with_friction(shown), [_motors([("", shown)])])
 
 
 def _with_friction(shown: TestbedStep) -> list[Comparison]:

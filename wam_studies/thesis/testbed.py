@@ -24,7 +24,9 @@ SAMPLED = "wam_control.force.sampled_loop"
 
 
 def section_5_6(runs: Runs) -> Result:
-    """Every run of the experiment `testbed-5.6`."""
+    """Every run of the experiment `testbed-5.6`, or one of them."""
+    if len(runs) == 1:
+        return Result(_verdicts(runs, runs), [_panel(runs, runs, "large step")])
     rows = margin(runs["below_the_margin"], runs["above_the_margin"], "without delay")
     rows += _verdicts(runs, ("rod", "large_step", "large_step_saturated"))
     rows += margin(runs["delayed_below_the_margin"], runs["delayed_above_the_margin"], "one sample of delay")
@@ -39,15 +41,16 @@ def section_5_6(runs: Runs) -> Result:
 
 
 def as_described(runs: Runs) -> Result:
-    """The experiment `testbed-5.6-as-described`: verdict on every step and push, and the margin with the rod."""
-    (link, low), (other, high) = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
-    gain = link.loop.gain + (other.loop.gain - link.loop.gain) * (1.0 - low) / (high - low)
-    expected = friction_margin(link, BOUNDS.small_step)
-    rows = [
-        *_verdicts(runs, runs),
-        near("marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", "integrator"),
-        near("over that without", expected / link.margin.gain, gain / link.margin.gain, "", "5.6"),
-    ]
+    """The experiment `testbed-5.6-as-described`: verdict on every step and push, and of all runs the margin."""
+    rows = _verdicts(runs, runs)
+    if len(runs) > 1:
+        (link, low), (other, high) = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
+        gain = link.loop.gain + (other.loop.gain - link.loop.gain) * (1.0 - low) / (high - low)
+        expected = friction_margin(link, BOUNDS.small_step)
+        rows += [
+            near("marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", "integrator"),
+            near("over that without", expected / link.margin.gain, gain / link.margin.gain, "", "5.6"),
+        ]
     return Result(rows, [_panel(runs, (name,), name.replace("_", " ")) for name in runs])
 
 
@@ -68,29 +71,24 @@ def friction_margin(link: OneLink, step: float) -> float:
     return low
 
 
-def large_step(runs: Runs) -> Result:
-    """The run with a large step only: its verdict."""
-    return Result(_verdicts(runs, runs), [_panel(runs, runs, "large step")])
-
-
 def own_servo(runs: Runs) -> Result:
-    """The experiment `testbed-own-servo`: the margin with the testbed's velocity loop instead of an ideal source."""
-    below, above = runs.values()
-    ideal, with_servo = margin(below, above, "")[0], margin_with_servo(below)
-    rows = [
-        ideal._replace(quantity="marginal gain, compared with that of an ideal velocity source", bound=math.nan),
-        ideal._replace(quantity="marginal gain, with the velocity loop", predicted=with_servo, equation=SAMPLED),
-    ]
-    return Result(rows, [_last_steps("either side of the margin", runs)])
+    """The experiment `testbed-own-servo`: the margin with the testbed's velocity loop instead of an ideal source.
 
-
-def own_servo_sample(runs: Runs) -> Result:
-    """One run of `testbed-own-servo`: growth or decay by the margin with the velocity loop."""
-    (run,) = runs.values()
-    link, oscillation = _oscillation(run)
-    fraction = link.tip_gain(link.loop.gain) / margin_with_servo(run)
-    row = _growth_row(fraction, oscillation, "with the velocity loop", SAMPLED)
-    return Result([row], [_last_steps("above the margin", runs)])
+    Of one run growth or decay by that margin.
+    """
+    below, *others = runs.values()
+    with_servo = margin_with_servo(below)
+    if others:
+        ideal = margin(below, others[0], "")[0]
+        rows = [
+            ideal._replace(quantity="marginal gain, compared with that of an ideal velocity source", bound=math.nan),
+            ideal._replace(quantity="marginal gain, with the velocity loop", predicted=with_servo, equation=SAMPLED),
+        ]
+    else:
+        link, oscillation = _oscillation(below)
+        fraction = link.tip_gain(link.loop.gain) / with_servo
+        rows = [_growth_row(fraction, oscillation, "with the velocity loop", SAMPLED)]
+    return Result(rows, [_last_steps("either side of the margin" if others else "above the margin", runs)])
 
 
 def _growth_row(fraction: float, oscillation: Growth, how: str, law: str) -> Comparison:

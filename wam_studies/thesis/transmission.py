@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_bag.losses import CUT
 from wam_description.arm import Arm
 from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
@@ -28,15 +29,19 @@ class Transfer(NamedTuple):
 
 
 def frequency_response(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `frequency-response`."""
-    run = runs["chirp"]
-    found, low, high = transfer(run), *swept(run)
+    """The experiment `frequency-response`; of a sample, which has motor and joint only, the resonances."""
+    (run,) = runs.values()
+    found = transfer(run)
+    rows = [_resonance(run, found, which) for which in Resonances._fields]
+    if CUT in run.bag.metadata:
+        low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
+        return Result(rows, [_gains([_gain("measured", found, low, high)])])
+    low, high = swept(run)
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
     predicted, gain = np.abs(response_of(run, found.frequency[lowest])), 1.0 / np.abs(found.inverse[lowest])
     label = f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz"
-    rows = [
-        *(_resonance(run, found, which) for which in Resonances._fields),
+    rows += [
         near(label, np.median(predicted), np.median(gain), "rad/(N m)", "(4.3)"),
         Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
     ]
@@ -46,15 +51,6 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     count = BOUNDS.averaged_frequencies
     remark = f"low coherence: the response changes within the {count} averaged neighbouring frequencies"
     return Result(rows, panels, (remark,))
-
-
-def resonances_sample(runs: Mapping[str, Recording]) -> Result:
-    """The sweep of `frequency-response` from motor and joint only."""
-    (run,) = runs.values()
-    found = transfer(run)
-    rows = [_resonance(run, found, which) for which in Resonances._fields]
-    low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
-    return Result(rows, [_gains([_gain("measured", found, low, high)])])
 
 
 def allocation(runs: Mapping[str, Recording]) -> Result:
