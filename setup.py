@@ -6,11 +6,13 @@ import sys
 import sysconfig
 from glob import glob
 from importlib.util import find_spec
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from runpy import run_path
 from xml.etree import ElementTree
 
 from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
 
 HERE = Path(__file__).resolve().parent
 NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
@@ -93,6 +95,22 @@ def extensions():
     for extension in found:
         extension.extra_compile_args.append("-ffp-contract=off")  # no fused operations: the bits of Python
     return found
+
+
+class BuildOnAllProcessors(build_ext):
+    """Compiles several files at a time; setuptools does so for whole extensions only, and there is one large one."""
+
+    def build_extensions(self):
+        """As that of setuptools."""
+        compile_them = self.compiler.compile
+
+        def compile_in_parallel(sources, **options):
+            with ThreadPool(len(os.sched_getaffinity(0))) as pool:
+                objects = pool.map(lambda source: compile_them([source], **options), sources)
+            return [one for several in objects for one in several]
+
+        self.compiler.compile = compile_in_parallel
+        super().build_extensions()
 
 
 package = ElementTree.parse(HERE / "package.xml").getroot()
@@ -181,5 +199,6 @@ setup(
         "pytest11": ["wam_ros.pytest_plugin = wam_ros.pytest_plugin"],  # the test kit; named like its module
     },
     ext_modules=extensions(),
+    cmdclass={"build_ext": BuildOnAllProcessors},
     zip_safe=False,
 )

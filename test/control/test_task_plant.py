@@ -55,6 +55,18 @@ def test_a_force_of_a_task_on_a_stiff_surface_does_not_jump_at_the_touch() -> No
     assert played.forces[-200:].mean() == pytest.approx(16.0, rel=0.05)
 
 
+@pytest.mark.parametrize("q", [(0.0, -0.8, 0.0, 0.3), (0.0, -1.5, 0.0, 1.2)])
+def test_an_arm_that_is_free_along_all_axes_stays_where_the_brakes_held_it(q: tuple[float, ...]) -> None:
+    """First the cables sag under the braked arm, by up to 3 mm at the tool: a run begins with slack ones."""
+    free = TaskCommand("base", tuple(TaskAxis(AxisKind.IMPEDANCE, i, value=None, damping=5.0) for i in range(4)))
+    steps = [ScenarioStep("sag", 0.5), ScenarioStep("release", 1.0, request="enable", task=free)]
+    run, tools = Simulation(CONFIGURATION.with_values({"arm.joints.start": q}), steps), []
+    while not run.step():
+        tools.append(BODY.point(run.driver.plant.q, OUTER, (0.4, 0.0, 0.0)))
+    braked = round(0.5 / CONFIGURATION.shared.timing.period)
+    assert np.abs(np.array(tools[braked:]) - tools[braked - 10]).max() < 1e-4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.03])
 def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_it(speed: float) -> None:
