@@ -13,7 +13,7 @@ from wam_cli.commands.conform import driver_alone, on_bus
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.frames import BusGroup, BusNode, Frame
+from wam_driver.bus.frames import SAFETY, BusGroup, Frame
 from wam_driver.bus.line import CanLine
 from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.safety_module import SafetyMode
@@ -45,9 +45,9 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
     host, arm = (can.Bus(interface=interface, channel=channel) for _ in range(2))
     numbers = properties.numbers(FIRMWARE)
     positions = [message(frames.position(node, 1000 * node)) for node in range(1, 5)]
-    modes = [message(frames.reply(BusNode.SAFETY_MODULE, numbers["MODE"], SafetyMode.ACTIVE))]
+    modes = [message(frames.reply(SAFETY, numbers["MODE"], SafetyMode.ACTIVE))]
     modes += [message(frames.reply(node, numbers["MODE"], 2)) for node in range(1, 5)]
-    modes.append(message(frames.reply(BusNode.SAFETY_MODULE, properties.numbers(FIRMWARE, True)["PEN"], 3 << 26)))
+    modes.append(message(frames.reply(SAFETY, properties.numbers(FIRMWARE, True)["PEN"], 3 << 26)))
     request = frames.get(BusGroup.MOTORS, numbers["P"])
     torques = frames.torques(BusGroup.ARM, numbers["T"], [100, -100, 100, -100])
     questions = [frames.get(node, numbers["MODE"]) for node in range(3)]
@@ -68,9 +68,9 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
         driver.exchange()
     clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
-    line = CanLine(host, lambda: at[0], time.sleep, 0.1 * (interface == "udp_multicast"))
+    line = CanLine(host, 0.1 * (interface == "udp_multicast"))
     own = driver._host
-    own.line, own.receive, own.now = line, line.receive, line.now
+    own.line, own.now = line, lambda: at[0]
 
     def driven(tick: int) -> None:
         driver.exchange()
@@ -78,7 +78,7 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
 
     loops = driven, bare
     spent: tuple[list[int], list[int]] = ([], [])
-    driver.release()
+    driver.brake(False)
     for _ in range(chunks):
         for loop, times in zip(loops, spent, strict=True):
             times.append(0)
@@ -91,8 +91,8 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
                 times[-1] += time.thread_time_ns() - begin
                 drain(arm)
             drain(host if loop is bare else arm)  # of the echo of the last torques
-    if driver.fault:
-        raise SystemExit(driver.fault)
+    if driver.trouble:
+        raise SystemExit(driver.trouble)
     host.shutdown()
     arm.shutdown()
     return median(spent[0]) / POLL / 1e3, median(spent[1]) / POLL / 1e3

@@ -14,12 +14,12 @@ class FakeBus:
     position, velocity, current : of the motors, rad, rad/s, A, as measured.
     is_running : whether they are known; until then `exchange` starts the motors.
     advice : what a person has to do before the motors may be released, '' where nothing.
-    fault : why they were braked, '' where there is no reason.
+    trouble : why they were braked, as an exception; None where there is no reason.
     counts : of errors that are no fault, for the diagnostics.
     """
 
     INERTIA, DAMPING = 2e-3, 0.02  # kg m^2, N m s/rad
-    is_running, advice, fault = True, "", ""
+    is_running, advice, trouble = True, "", None
 
     def __init__(self, torque_constant: tuple[float, ...], peak: list[float], period: float) -> None:
         self._torque_constant, self._peak, self._period = torque_constant, peak, period
@@ -45,16 +45,14 @@ class FakeBus:
         if self._is_released:
             self.current = [min(max(i, -most), most) for i, most in zip(currents, self._peak, strict=True)]
 
-    def release(self) -> None:
-        """Release the brakes."""
-        self._is_released = True
-
-    def brake(self) -> None:
-        """Put on the brakes, without a current."""
-        self._is_released = False
+    def brake(self, on: bool) -> None:
+        """Put on the brakes, without a current, or release them."""
+        self._is_released = not on
         self.current = [0.0] * len(self.position)
 
-    stop = brake
+    def stop(self) -> None:
+        """Stop as safely as the motors can."""
+        self.brake(True)
 
     def clear(self) -> None:
         """Forget a fault."""

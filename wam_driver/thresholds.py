@@ -58,7 +58,7 @@ class BusThresholds:
     attempts: int = 3  # at a reply at the start, since a frame may be lost
     between_writes: float = 0.01  # s, between two writes to the safety module, and between two wake-ups
     silence: float = 1.0  # s after the wake-up, in which a frame would drive the controllers off the bus
-    look: float = 0.05  # s, between two looks at what a person has to do
+    look: float = 0.01  # s, between two looks at what a person has to do
     silent: float = 0.01  # s without a position of a motor, above which there is a fault
     unguarded: float = 0.045  # s without the mode of the safety module, above which there is a fault
     described_firmware: int = 200  # whose names of properties a dry run shows

@@ -59,7 +59,7 @@ class PlantOnBus:
         if on != self._is_braked:
             self._is_braked = on
             self._plant.brake(on)
-            (self._arm.brake if on else self._arm.release)()
+            self._arm.brake(on)
 
     def step(self, torque: Sequence[float], substeps: int) -> None:
         self._arm.command([each / k for each, k in zip(torque, self._constant, strict=True)])
@@ -67,7 +67,7 @@ class PlantOnBus:
 
     def _exchange(self) -> None:
         self._arm.exchange()
-        assert self._arm.trouble is None, self._arm.fault
+        assert self._arm.trouble is None, self._arm.trouble
 
 
 class DriverOnBus(Driver):

@@ -12,7 +12,7 @@ from wam_driver.bus.line import CanLine
 def lines(channel: str) -> tuple[CanLine, CanLine]:
     """Two ends of a virtual bus; nothing here waits."""
     both = [can.Bus(interface="virtual", channel=channel) for _ in range(2)]
-    return CanLine(both[0], lambda: 0.0, lambda _: None), CanLine(both[1], lambda: 0.0, lambda _: None)
+    return CanLine(both[0]), CanLine(both[1])
 
 
 def test_frames_arrive_as_they_were_sent() -> None:

@@ -1,7 +1,6 @@
 """A dry run of the driver on a bus: nothing is sent, and what would be sent is what is sent."""
 
 import re
-import time
 
 import can
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames
 from wam_driver.bus.dry_run import heard, in_words, sent
-from wam_driver.bus.frames import BusGroup, BusNode, Frame
+from wam_driver.bus.frames import SAFETY, BusGroup, Frame
 from wam_driver.bus.line import line_of
 from wam_driver.bus.parameters import BusParameters
 
@@ -22,7 +21,7 @@ def virtual(name: str) -> BusParameters:
 
 def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
     with can.Bus(interface="virtual", channel="dry") as other:
-        line = line_of(BUS4.shared, virtual("dry"), time.perf_counter, time.sleep)
+        line = line_of(BUS4.shared, virtual("dry"))
         for count in (100, 200, 300):
             position = frames.position(2, count)
             other.send(can.Message(arbitration_id=position.identifier, data=position.data, is_extended_id=False))
@@ -33,7 +32,7 @@ def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
 
 
 def test_a_silent_bus_is_no_fault() -> None:
-    line = line_of(BUS4.shared, virtual("silent"), time.perf_counter, time.sleep)
+    line = line_of(BUS4.shared, virtual("silent"))
     (text,) = heard(line, 0.05)
     line.close()
     assert "the bus is silent while no driver asks" in text
@@ -57,7 +56,7 @@ def test_what_would_be_sent_has_every_step_of_the_start_and_no_torque(version: i
     ("frame", "text"),
     [
         (frames.get(3, 48), "host to controller 3: get P"),
-        (frames.put(BusNode.SAFETY_MODULE, 8, 1), "host to safety module: set MODE to 1"),
+        (frames.put(SAFETY, 8, 1), "host to safety module: set MODE to 1"),
         (frames.reply(1, 5, 2), "controller 1 has STAT = 2"),
         (frames.torques(BusGroup.ARM, 42, [1, -2, 3, -4]), "host to group 1: torques [1, -2, 3, -4] counts"),
         (Frame(BusGroup.MOTORS, b""), "host: no data"),

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -11,7 +10,7 @@ from wam_cli.options import COUNT, bounded, configuration_of, take_configuration
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
 from wam_driver.bus.dry_run import heard, sent
-from wam_driver.bus.line import ServedArm, line_of
+from wam_driver.bus.line import answer, line_of
 from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
@@ -124,9 +123,9 @@ def _serve(configuration: Configuration, version: int) -> None:
     """Be the arm on the bus of a configuration, as prompt as the driver."""
     shared, own = configuration.shared, configuration.node("driver", BusParameters)
     set_priority(shared.timing.fifo_priority, shared.timing.niceness)
-    arm = ServedArm(line_of(shared, own, time.perf_counter, time.sleep), SimulatedBus(shared, own, version))
+    line, arm = line_of(shared, own), SimulatedBus(shared, own, version)
     while True:
-        arm.answer(shared.timing.period)
+        answer(line, arm, shared.timing.period)
 
 
 def _listen(configuration: Configuration, seconds: float) -> int:
@@ -136,7 +135,7 @@ def _listen(configuration: Configuration, seconds: float) -> int:
             "--dry-run is for a driver on a bus; give its configuration, for example --config barrett-wam4-bus"
         )
     own = configuration.node("driver", BusParameters)
-    line = line_of(configuration.shared, own, time.perf_counter, time.sleep)
+    line = line_of(configuration.shared, own)
     print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
     try:
         print(*heard(line, seconds), sep="\n")

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 
 from wam_description.arm import Arm
 from wam_description.signals import State
-from wam_description.transmission_map import TransmissionMap
 from wam_driver.bus.bus_fault import BusFault, Trouble
 from wam_driver.bus.cycle import Cycle
-from wam_driver.bus.host import Host
 from wam_driver.bus.line import Line
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.start_up import StartUp, Wait
+from wam_driver.thresholds import BUS
 
 
 class ArmBus:
@@ -29,16 +28,14 @@ class ArmBus:
     """
 
     def __init__(self, line: Line, arm: Arm, period: float) -> None:
-        self._host, self._constant, self._period = Host(line), arm.motors.torque_constant, period
-        self._home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
-        self.counts = self._host.counts
+        self._line, self._arm, self._period = line, arm, period
+        self.counts = line.counts
         self.begin()
 
     def begin(self) -> None:
         """Begin the start-up, also once more."""
-        self._host.trouble = None
-        self._start = StartUp(self._host, self._home, self._constant)
-        self._steps = self._start.steps()
+        self._host = StartUp(self._line, self._arm)
+        self._steps = self._host.steps()
         self._cycle: Cycle | None = None
         self.wait = Wait.POWER
 
@@ -50,8 +47,8 @@ class ArmBus:
 
     def confirm_home(self) -> bool:
         """A person states that the arm is at its home pose; whether that was requested."""
-        self._start.is_at_home = self.wait is Wait.HOME
-        return self._start.is_at_home
+        self._host.is_at_home = self.wait is Wait.HOME
+        return self._host.is_at_home
 
     @property
     def is_running(self) -> bool:
@@ -74,26 +71,16 @@ class ArmBus:
         return self._host.trouble
 
     @property
-    def fault(self) -> str:
-        """The trouble, in words; '' where there is none."""
-        return str(self.trouble or "")
-
-    @property
     def advice(self) -> str:
         """What a person has to do, in words; '' where nothing."""
-        woken = ", ".join(map(str, self._start.woken))
+        woken = ", ".join(map(str, self._host.woken))
         reason = f"; controllers that have lost their counts: {woken}" if woken and self.wait is Wait.HOME else ""
         return self.wait.value + reason
 
-    def release(self) -> None:
-        """Let the motors follow their torques."""
+    def brake(self, on: bool) -> None:
+        """Command zero torque and let the windings brake, or not; this arm has no brakes, it sinks."""
         if self._cycle:
-            self._cycle.set_released(True)
-
-    def brake(self) -> None:
-        """Command zero torque and let the windings brake; this arm has no brakes, it sinks."""
-        if self._cycle:
-            self._cycle.set_released(False)
+            self._cycle.brake(on)
 
     def stop(self) -> None:
         """Brake, and let the safety module go to idle where its firmware takes that from the host."""
@@ -108,7 +95,7 @@ class ArmBus:
     def close(self) -> None:
         """Stop, as an active arm without a driver would end in E-stop and lose its zero, and end the connection."""
         self.stop()
-        self._host.line.close()
+        self._line.close()
 
     def exchange(self, periods: int = 1) -> None:
         """Take the positions, some periods after the last time.
@@ -116,14 +103,13 @@ class ArmBus:
         Before `is_running` a step of the start-up, which may last some hundredths of a second.
         """
         if self._cycle:
-            self._host.line.let_pass(periods * self._period)
+            self._line.let_pass(periods * self._period)
             self._cycle.exchange()
             self.wait = Wait.NOTHING if self._cycle.safety_mode == SafetyMode.ACTIVE else Wait.ACTIVATE
-        elif self.trouble is None:
-            self._go_on()
-
-    def _go_on(self) -> None:
-        """Take a step of the start-up."""
+            return
+        if self.trouble:
+            return
+        self._line.sleep(BUS.look)
         try:
             self.wait = next(self._steps)
         except StopIteration as end:

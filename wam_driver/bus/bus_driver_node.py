@@ -31,13 +31,13 @@ class BusDriver(ArmDriver):
         super().__init__(declared(self.entry), **ros)
         if self.shared.timing.mode != "realtime":
             raise ParameterError("timing.mode is lockstep, which is for simulated arms; set it to realtime")
-        self._watchdog, self._constant = self.own.watchdog, self.shared.arm.motors.torque_constant
+        self._watchdog = self.own.watchdog
         self.hardware: ArmBus = self.make_hardware(self.shared, self.own)
         self.safety = Safety()
         self._take_advice()
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
-        self.serve("confirm_home", Trigger, lambda _: self._confirm_home())
+        self.serve("confirm_home", Trigger, self._confirm_home)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(self.shared.timing.period, self._run, clock=steady)
         self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
@@ -46,7 +46,7 @@ class BusDriver(ArmDriver):
         """The motors: those of the production WAM on its bus."""
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
-        return ArmBus(line_of(shared, own, time.perf_counter, time.sleep), shared.arm, shared.timing.period)
+        return ArmBus(line_of(shared, own), shared.arm, shared.timing.period)
 
     @property
     def stamp(self) -> int:
@@ -71,8 +71,8 @@ class BusDriver(ArmDriver):
         hardware.exchange(due)
         if hardware.is_running:
             self._publish(due)
-        if hardware.fault:
-            self.trip(fault("hardware", reason=hardware.fault))
+        if hardware.trouble:
+            self.trip(fault("hardware", reason=str(hardware.trouble)))
         self._take_advice()
         self.announce()
 
@@ -86,7 +86,7 @@ class BusDriver(ArmDriver):
         """The state; where periods were left out, also the outer ones among them."""
         hardware, timing, publish = self.hardware, self.shared.timing, self.outlets.publish
         position, velocity, current = hardware.state
-        torque = [i * k for i, k in zip(current, self._constant, strict=True)]
+        torque = [i * k for i, k in zip(current, self.shared.arm.motors.torque_constant, strict=True)]
         for stamp in range(self.stamp - (due - 1) * timing.period_ns, self.stamp + 1, timing.period_ns):
             is_outer = timing.is_outer(stamp)
             if stamp == self.stamp or is_outer:
@@ -115,12 +115,12 @@ class BusDriver(ArmDriver):
         answer = self.safety.enable(obstacle)
         if answer.success:
             self._command_stamp = self.stamp
-            self.hardware.release()
+            self.hardware.brake(False)
         return answer
 
     def brake(self) -> Answer:
         """Brake now, not in the next period."""
-        self.hardware.brake()
+        self.hardware.brake(True)
         return self.safety.disable()
 
     def clear(self) -> Answer:
@@ -131,7 +131,7 @@ class BusDriver(ArmDriver):
     def trip(self, event: Event) -> None:
         """Brake and latch a fault."""
         self.safety.trip(event)
-        self.hardware.brake()
+        self.hardware.brake(True)
         self.announce()
 
     def estop(self) -> Answer:
@@ -139,7 +139,7 @@ class BusDriver(ArmDriver):
         self.hardware.stop()
         return super().estop()
 
-    def _confirm_home(self) -> Answer:
+    def _confirm_home(self, _: Any) -> Answer:
         is_taken = self.hardware.confirm_home()
         return Answer(
             is_taken, "the zero is set" if is_taken else "refused: the driver does not wait for the home pose"

@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 from wam_driver.bus import frames
 from wam_driver.bus.bus_fault import BusFault, Trouble
-from wam_driver.bus.frames import BusGroup, BusNode, Frame, Value
+from wam_driver.bus.frames import HOST, SAFETY, BusGroup, Frame
 from wam_driver.bus.host import Host
 from wam_driver.bus.motor import Motor
 from wam_driver.bus.safety_module import SafetyMode, faults
@@ -33,26 +33,22 @@ class Cycle:
         self._patience = BUS.collect * period + host.line.slack
         self._poll_at, self._is_answered, self._pendant = host.now(), True, 0
         self._torque, self._mode = host.number(BusGroup.MOTORS, "T"), host.number(BusGroup.MOTORS, "MODE")
-        self._requests = [  # the pendant first: it states why the mode changes
-            frames.get(BusNode.SAFETY_MODULE, host.number(BusNode.SAFETY_MODULE, "PEN")),
-            frames.get(BusNode.SAFETY_MODULE, self._mode),
-            frames.get(BusGroup.MOTORS, self._mode),
-            frames.get(BusGroup.MOTORS, host.number(BusGroup.MOTORS, "P")),
-        ]
-        self.set_released(False)
+        # the pendant first: it states why the mode changes
+        requested = (SAFETY, "PEN"), (SAFETY, "MODE"), (BusGroup.MOTORS, "MODE"), (BusGroup.MOTORS, "P")
+        self._requests = [frames.get(to, host.number(to, name)) for to, name in requested]
+        self.brake(True)
 
-    def set_released(self, is_released: bool) -> None:
-        """Let the controllers follow their torques, which are zero first, or idle."""
-        self.is_released = is_released
+    def brake(self, on: bool) -> None:
+        """Let the controllers idle, or follow their torques, which are zero first."""
+        self.is_released = not on
         self.command([0.0] * len(self.motors))
-        self._host.write(BusGroup.MOTORS, "MODE", BUS.torque_mode if is_released else BUS.idle_mode)
+        self._host.write(BusGroup.MOTORS, "MODE", BUS.idle_mode if on else BUS.torque_mode)
 
     def stop(self) -> None:
         """Brake, and let the safety module go to idle where its firmware takes that from the host."""
-        self.set_released(False)
-        is_settable = self._host.versions[BusNode.SAFETY_MODULE] >= BUS.settable_version
-        if is_settable and self.safety_mode == SafetyMode.ACTIVE:
-            self._host.write(BusNode.SAFETY_MODULE, "MODE", SafetyMode.IDLE)
+        self.brake(True)
+        if self.safety_mode == SafetyMode.ACTIVE and self._host.versions[SAFETY] >= BUS.settable_version:
+            self._host.write(SAFETY, "MODE", SafetyMode.IDLE)
 
     def command(self, currents: Sequence[float]) -> None:
         """Send torques by currents, A, (n,), clipped."""
@@ -65,13 +61,13 @@ class Cycle:
         """Ask for positions and, from time to time, modes; take what comes."""
         host = self._host
         if host.trouble:
-            self.set_released(False)  # in every period, as one may not have arrived
+            self.brake(True)  # in every period, as one may not have arrived
         if host.now() >= self._poll_at:
             self._poll()
         host.send(self._requests[-1])
         requested, awaited = host.now(), self._by_answer.copy()
         for _ in range(BUS.most_frames):
-            if not awaited or (frame := host.receive(self._patience)) is None:
+            if not awaited or (frame := host.line.receive(self._patience)) is None:
                 break
             identifier, data = frame
             motor = awaited.pop(identifier, None)
@@ -94,32 +90,27 @@ class Cycle:
     def _take(self, frame: Frame) -> None:
         """Take a frame that is no awaited position."""
         found = frames.read(frame)
-        if frame.sender == BusNode.HOST:
+        if frame.sender == HOST:
             if not self._host.line.slack:  # no echo
                 self._stray(BusFault.FOREIGN)
         elif found is None or found.node not in self._host.versions:
             self._host.counts["other frames"] += 1
-        elif found.node == BusNode.SAFETY_MODULE:
-            self._take_safety(found)
         elif found.number is None:
             self._stray(BusFault.DOUBLED, found.node)
         elif found.number == self._mode:
             self._take_mode(found.node, found.value)
-
-    def _take_safety(self, found: Value) -> None:
-        self._is_answered = True
-        if found.number != self._mode:
-            self._pendant = found.value
-            return
-        self.safety_mode = found.value
-        if self.is_released and self.safety_mode != SafetyMode.ACTIVE:
-            self._fault(BusFault.SAFETY_IDLE if self.safety_mode == SafetyMode.IDLE else BusFault.ESTOP)
+        elif found.node == SAFETY:
+            self._pendant, self._is_answered = found.value, True
 
     def _take_mode(self, node: int, mode: int) -> None:
-        if self.is_released and mode != BUS.torque_mode:
+        if node == SAFETY:
+            self._is_answered, self.safety_mode = True, mode
+            if self.is_released and mode != SafetyMode.ACTIVE:
+                self._fault(BusFault.SAFETY_IDLE if mode == SafetyMode.IDLE else BusFault.ESTOP)
+        elif self.is_released and mode != BUS.torque_mode:
             self._fault(BusFault.CONTROLLER_IDLE, node, mode)
         elif not self.is_released and mode != BUS.idle_mode:  # as after Shift-Activate
-            self.set_released(False)
+            self.brake(True)
 
     def _judge(self, awaited: Collection[Motor]) -> None:
         """Look for motors whose positions have not come for too long."""
@@ -133,14 +124,13 @@ class Cycle:
         if self._host.refused:
             self._fault(BusFault.NOT_SENT, 0, self._host.refused)
         elif len(silent) == len(self.motors):  # E-stop, power or cable, by what the safety module answers
-            mode = self._host.ask(BusNode.SAFETY_MODULE, "MODE", 1)
+            mode = self._host.ask(SAFETY, "MODE", 1)
             named: dict[int | None, BusFault] = {None: BusFault.NO_POWER, SafetyMode.ESTOP: BusFault.ESTOP}
             self._fault(named.get(mode, BusFault.ALL_SILENT))
         elif silent[0].has_jumped:
             self._fault(BusFault.JUMP, node)
         else:
-            is_reset = self._host.ask(node, "STAT", 1) == 0
-            self._fault(BusFault.RESET if is_reset else BusFault.NO_REPLY, node)
+            self._fault(BusFault.RESET if self._host.ask(node, "STAT", 1) == 0 else BusFault.NO_REPLY, node)
 
     def _stray(self, fault: BusFault, node: int = 0) -> None:
         """Count a frame that nobody may send; more than some are a fault."""

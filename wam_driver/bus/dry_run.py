@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from wam_description.arm import Shared
 from wam_driver.bus import frames, properties
 from wam_driver.bus.arm_bus import ArmBus
-from wam_driver.bus.frames import BusGroup, BusNode, Frame
-from wam_driver.bus.line import Line
+from wam_driver.bus.frames import HOST, SAFETY, BusGroup, Frame
+from wam_driver.bus.line import Line, incoming
 from wam_driver.bus.parameters import BusParameters
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.bus.simulator import SimulatedBus
@@ -16,10 +16,7 @@ from wam_driver.thresholds import BUS
 
 def heard(line: Line, seconds: float) -> Iterator[str]:
     """What comes on a bus within a time, s; nothing is sent."""
-    end, found = line.now() + seconds, list[Frame | None]()
-    while (left := end - line.now()) > 0.0:
-        found.append(line.receive(left))
-    texts = list(_listed(filter(None, found), BUS.described_firmware))
+    texts = list(_listed(incoming(line, seconds), BUS.described_firmware))
     if errors := line.counts["bus errors"]:
         texts.append(f"{errors:6d}  error frames: check bit rate, termination and ground")
     yield from texts or ["  nothing: the bus is silent while no driver asks; that is as it should be"]
@@ -31,21 +28,21 @@ def sent(shared: Shared, own: BusParameters, version: int) -> Iterator[str]:
     It is played against the simulated arm, whose zero is lost by an E-stop, with a person who obeys.
     """
     bus = SimulatedBus(shared, own, version)
-    bus.press(SafetyMode.ESTOP)
+    bus.switch(SafetyMode.ESTOP)
     arm = ArmBus(bus, shared.arm, shared.timing.period)
     parts = defaultdict[str, list[Frame]](list)
 
     def overhear(frame: Frame) -> list[Frame]:
-        if frame.sender == BusNode.HOST:
+        if frame.sender == HOST:
             parts["each period, torques only where the arm is enabled" if arm.is_running else arm.advice].append(frame)
         return [frame]
 
     bus.on_line = overhear
-    while not arm.is_running and not arm.fault:
+    while not arm.is_running and not arm.trouble:
         arm.exchange()
         arm.confirm_home()
     arm.exchange()
-    arm.release()
+    arm.brake(False)
     arm.command(arm.state.effort)
     arm.close()
     for remark, found in parts.items():
@@ -81,9 +78,8 @@ def in_words(frame: Frame, version: int) -> str:
 
 
 def _node(number: int) -> str:
-    known: dict[int, str] = {BusNode.HOST: "host", BusNode.SAFETY_MODULE: "safety module"}
-    return known.get(number, f"controller {number}")
+    return {HOST: "host", SAFETY: "safety module"}.get(number, f"controller {number}")
 
 
 def _name(number: int, version: int, node: int) -> str:
-    return properties.names(version, node == BusNode.SAFETY_MODULE).get(number, f"property {number}")
+    return properties.names(version, node == SAFETY).get(number, f"property {number}")

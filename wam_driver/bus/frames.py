@@ -9,13 +9,6 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 
-class BusNode(IntEnum):
-    """Nodes other than motor controllers, which have the numbers 1 to 7."""
-
-    HOST = 0
-    SAFETY_MODULE = 10
-
-
 class BusGroup(IntEnum):
     """Groups of nodes that take a frame, with the bit of groups."""
 
@@ -27,6 +20,8 @@ class BusGroup(IntEnum):
     VALUES = 0x406  # replies
 
 
+HOST: Final = 0
+SAFETY: Final = 10  # safety module; controllers of motors have the numbers 1 to 7
 WRITE: Final = 0x80  # bit of the first byte
 
 

@@ -4,8 +4,8 @@ from collections.abc import Container
 
 from wam_driver.bus import frames, properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
-from wam_driver.bus.frames import BusNode, Frame
-from wam_driver.bus.line import Line
+from wam_driver.bus.frames import SAFETY, Frame
+from wam_driver.bus.line import Line, incoming
 from wam_driver.thresholds import BUS
 
 
@@ -21,7 +21,7 @@ class Host:
     """
 
     def __init__(self, line: Line) -> None:
-        self.line, self.now, self.sleep, self.receive = line, line.now, line.sleep, line.receive
+        self.line, self.now = line, line.now
         self.versions: dict[int, int] = {}
         self.refused = 0
         self.trouble: Trouble | None = None
@@ -44,7 +44,7 @@ class Host:
             where its firmware has none.
         """
         version = self.versions.get(node, 0)
-        found = properties.numbers(version, node == BusNode.SAFETY_MODULE).get(name)
+        found = properties.numbers(version, node == SAFETY).get(name)
         if found is None:
             raise Trouble(BusFault.FIRMWARE, node, f"firmware {version} has no property {name}")
         return found
@@ -55,8 +55,7 @@ class Host:
         answer = node, None if name == "P" else number
         for _ in range(attempts):
             self.send(frames.get(node, number))
-            end = self.now() + BUS.reply + self.line.slack
-            while (left := end - self.now()) > 0.0 and (frame := self.receive(left)) is not None:
+            for frame in incoming(self.line, BUS.reply + self.line.slack):
                 found = frames.read(frame)
                 if found and found[:-1] == answer:
                     return found.value
@@ -74,7 +73,7 @@ class Host:
         """
         found = self.ask(node, name)
         if found is None:
-            raise Trouble(BusFault.NO_SAFETY_MODULE if node == BusNode.SAFETY_MODULE else BusFault.MISSING, node)
+            raise Trouble(BusFault.NO_SAFETY_MODULE if node == SAFETY else BusFault.MISSING, node)
         if allowed is not None and found not in allowed:
             raise Trouble(fault, node, found)
         return found

@@ -1,12 +1,13 @@
 """The line to the bus: one of python-can and a clock, or the simulated one."""
 
+import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
-from wam_driver.bus.frames import BusNode, Frame
+from wam_driver.bus.frames import HOST, Frame
 from wam_driver.bus.parameters import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
 from wam_driver.thresholds import BUS
@@ -18,21 +19,23 @@ class CanLine:
     Parameters
     ----------
     bus : `can.Bus` of any interface.
-    now, sleep : the steady clock, s.
     slack : s, by which answers may be late; above 0 for a simulated arm in another process, whose bus gives own frames
         back.
 
     Attributes
     ----------
+    now, sleep : the steady clock, s.
     counts : of errors.
     """
 
-    def __init__(self, bus: Any, now: Callable[[], float], sleep: Callable[[float], None], slack: float = 0.0) -> None:
+    now, sleep = staticmethod(time.perf_counter), staticmethod(time.sleep)
+
+    def __init__(self, bus: Any, slack: float = 0.0) -> None:
         import can
 
         self._bus, self._errors, self.slack = bus, (can.CanError, OSError), slack
         self._message: Any = can.Message(is_extended_id=False)  # to be sent, again and again
-        self.now, self.sleep, self.close = now, sleep, bus.shutdown
+        self.close: Callable[[], None] = bus.shutdown
         self.counts: Counter[str] = Counter()
 
     def let_pass(self, seconds: float) -> None:
@@ -53,22 +56,27 @@ class CanLine:
         """The next frame; None where none comes in time, s, or at an error of the bus."""
         try:
             message = self._bus.recv(timeout)
+            if message is None or not message.is_error_frame:
+                return message and Frame(message.arbitration_id, bytes(message.data))
         except self._errors:
-            self.counts["bus errors"] += 1
-            return None
-        if message is None:
-            return None
-        if message.is_error_frame:
-            self.counts["bus errors"] += 1
-            return None
-        return Frame(message.arbitration_id, bytes(message.data))
+            pass
+        self.counts["bus errors"] += 1
+        return None
 
 
 Line = CanLine | SimulatedBus
 
 
-def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep: Callable[[float], None]) -> Line:
-    """The line to the bus of a driver; a real one uses the clock, s, and waits.
+def incoming(line: Line, seconds: float) -> Iterator[Frame]:
+    """Frames that come within a time, s."""
+    end = line.now() + seconds
+    while (left := end - line.now()) > 0.0:
+        if (frame := line.receive(left)) is not None:
+            yield frame
+
+
+def line_of(shared: Shared, own: BusParameters) -> Line:
+    """The line to the bus of a driver.
 
     Raises
     ------
@@ -85,27 +93,19 @@ def line_of(shared: Shared, own: BusParameters, now: Callable[[], float], sleep:
         raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
     except (can.CanError, OSError, ValueError) as error:
         raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, now, sleep, BUS.slack if own.interface == "udp_multicast" else 0.0)
+    return CanLine(bus, BUS.slack if own.interface == "udp_multicast" else 0.0)
 
 
-class ServedArm:
-    """A simulated arm on a line such as `virtual` or `udp_multicast`, in the line's time.
+def answer(line: Line, arm: SimulatedBus, timeout: float) -> None:
+    """Let a simulated arm answer the next frame on a line, as `virtual` or `udp_multicast`, if one comes in time, s.
 
     Time in which nothing comes from the host is no silence to it, since a computer may hold up the host.
     """
-
-    def __init__(self, line: Line, arm: SimulatedBus) -> None:
-        self._line, self._arm, self._passed = line, arm, line.now()
-
-    def answer(self, timeout: float) -> None:
-        """Answer the next frame, if one comes in time, s."""
-        while (frame := self._line.receive(timeout)) is not None and frame.sender != BusNode.HOST:
-            pass  # an echo
-        if frame is not None:
-            self._arm.send(frame)
-        while (found := self._arm.receive(0.0)) is not None:
-            self._line.send(found)
-        now = self._line.now()
-        late = min(now - self._passed, 2.0 * timeout)  # on a slow computer the arm is slow, not late
-        self._arm.let_pass(late, BUS.silent if frame else 0.0)
-        self._passed = now
+    begin = line.now()
+    frame = next((frame for frame in incoming(line, timeout) if frame.sender == HOST), None)  # others: an echo
+    if frame is not None:
+        arm.send(frame)
+    while (found := arm.receive(0.0)) is not None:
+        line.send(found)
+    late = min(line.now() - begin, 2.0 * timeout)  # on a slow computer the arm is slow, not late
+    arm.let_pass(late, BUS.silent if frame else 0.0)

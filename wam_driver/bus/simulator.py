@@ -10,7 +10,7 @@ from collections.abc import Callable
 from wam_description.arm import Shared
 from wam_description.rigid_body import RigidBody
 from wam_driver.bus import frames, properties
-from wam_driver.bus.frames import BusGroup, BusNode, Frame
+from wam_driver.bus.frames import SAFETY, BusGroup, Frame
 from wam_driver.bus.safety_module import SafetyMode, faults, pendant_of
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
@@ -26,7 +26,7 @@ class SimulatedController:
     ----------
     node : on the bus.
     version : of the firmware.
-    count : of the motor, from the angle zero.
+    plant : that has its motor.
 
     Attributes
     ----------
@@ -34,16 +34,20 @@ class SimulatedController:
     deaf_until : bus time at which it is awake, s.
     """
 
-    def __init__(self, node: int, version: int, count: Callable[[], int] = lambda: 0) -> None:
-        self.node, self._count = node, count
+    def __init__(self, node: int, version: int, plant: Plant | None = None) -> None:
+        self.node, self._plant = node, plant
         self.values = {"VERS": version, **properties.ARM[node]}
         self.deaf_until = 0.0
-        self._names = properties.names(version, node == BusNode.SAFETY_MODULE)
+        self._names = properties.names(version, node == SAFETY)
+
+    def _count(self) -> int:
+        """Of its motor, from the angle zero."""
+        return math.floor(self._plant.theta[self.node - 1] / math.tau * BUS.encoders[0]) if self._plant else 0
 
     def is_addressed(self, frame: Frame) -> bool:
         """Whether it takes a frame."""
-        groups = [BusGroup.ANY | self.values[name] for name in ("GRPA", "GRPB", "GRPC") if name in self.values]
-        return frame.receiver in (self.node, *groups)
+        groups = [self.values.get(name) for name in ("GRPA", "GRPB", "GRPC")]
+        return frame.receiver == self.node or frame.receiver - BusGroup.ANY in groups
 
     def take(self, frame: Frame, time: float) -> Frame | None:
         """Obey a frame at a time, s; what it answers."""
@@ -59,14 +63,11 @@ class SimulatedController:
             return None
         if name == "STAT" and values["STAT"] == 0:
             self.deaf_until = time + BUS.waking
-        if name == "MODE" and self.node == BusNode.SAFETY_MODULE and not self._may_set(frames.written(frame)):
-            return None
-        values[name] = frames.written(frame) - (self._count() if name == "P" else 0)
+        value = frames.written(frame)
+        is_settable = value < values.get(name, 0) and values["VERS"] >= BUS.settable_version
+        if name != "MODE" or self.node != SAFETY or is_settable:  # only a person goes upwards
+            values[name] = value - (self._count() if name == "P" else 0)
         return None
-
-    def _may_set(self, mode: int) -> bool:
-        """Whether the host may set a mode of the safety module; only a person goes upwards."""
-        return mode < self.values["MODE"] and self.values["VERS"] >= BUS.settable_version
 
 
 class SimulatedBus:
@@ -94,20 +95,14 @@ class SimulatedBus:
         self._plant.brake(False)
         self._body, self._step, self._constant = RigidBody(arm), substep, arm.motors.torque_constant
         self.is_attended, self.slack = True, 0.0
-        self._motors = [self._motor(at, version) for at in range(len(self._constant))]
-        safety = SimulatedController(BusNode.SAFETY_MODULE, version)
+        self._motors = [SimulatedController(at + 1, version, self._plant) for at in range(len(self._constant))]
+        safety = SimulatedController(SAFETY, version)
         self.controllers, self._safety = {one.node: one for one in (*self._motors, safety)}, safety.values
-        self._position_request = frames.get(BusGroup.MOTORS, properties.numbers(version)["P"])
         self._mode, self._safety["PEN"] = self._safety["MODE"], pendant_of()
         self.on_line: Callable[[Frame], list[Frame] | None] = lambda frame: [frame]
         self.counts: Counter[str] = Counter()
         self._queue: deque[Frame] = deque()
         self.time = self._reached = self._requested = self._pressed = self._passed = 0.0
-
-    def _motor(self, at: int, version: int) -> SimulatedController:
-        return SimulatedController(
-            at + 1, version, lambda: math.floor(self._plant.theta[at] / math.tau * BUS.encoders[0])
-        )
 
     # the line
 
@@ -116,15 +111,21 @@ class SimulatedBus:
         return self.time
 
     def sleep(self, seconds: float) -> None:
-        """Let bus time pass."""
-        self._advance(self.time + seconds)
+        """Let bus time pass, s, and the plant with it."""
+        until = self.time + seconds
+        while self._reached + self._step <= until + 1e-9:
+            self._plant.step(self.torque, 1)
+            self._reached += self._step
+            self.time = max(self.time, self._reached)
+            self._watch()
+        self.time = until
 
     def let_pass(self, seconds: float, silent: float = BUS.silent) -> None:
         """Time of the host has passed, s, in which there may have been frames; what is later is no silence."""
         if self._mode == SafetyMode.ACTIVE:
             self._requested += max(0.0, seconds - silent)
         self._passed = max(self._passed, self.time - BUS.silent) + seconds
-        self._advance(max(self.time, self._passed))
+        self.sleep(max(0.0, self._passed - self.time))
 
     def close(self) -> None:
         """Nothing: a simulated bus needs no end."""
@@ -145,27 +146,18 @@ class SimulatedBus:
 
     def _deliver(self, frame: Frame) -> None:
         self._spend(frame)
-        if frame == self._position_request:
-            self._requested = self.time
         for one in self.controllers.values():
-            has_power = one.node == BusNode.SAFETY_MODULE or self._safety["MODE"] != SafetyMode.ESTOP
+            has_power = one.node == SAFETY or self._safety["MODE"] != SafetyMode.ESTOP
             is_on = has_power and self.time >= one.deaf_until
             if is_on and one.is_addressed(frame) and (answer := one.take(frame, self.time)):
                 self._spend(answer)
                 self._queue += self.on_line(answer) or ()
+                if frame.receiver == BusGroup.MOTORS and answer.receiver == BusGroup.POSITIONS:
+                    self._requested = self.time
 
     def _spend(self, frame: Frame) -> None:
         """Let the bits of a frame pass, at 1 Mbit/s, one in ten of them stuffed."""
-        self._advance(self.time + (52 + 9 * len(frame.data)) * 1e-6)
-
-    def _advance(self, until: float) -> None:
-        """Step the plant up to a time, s."""
-        while self._reached + self._step <= until + 1e-9:
-            self._plant.step(self.torque, 1)
-            self._reached += self._step
-            self.time = max(self.time, self._reached)
-            self._watch()
-        self.time = until
+        self.sleep((52 + 9 * len(frame.data)) * 1e-6)
 
     @property
     def commanded(self) -> list[int | None]:
@@ -188,39 +180,31 @@ class SimulatedBus:
 
     # safety module and person
 
-    def press(self, mode: SafetyMode) -> None:
-        """A person presses the button of a mode."""
+    def switch(self, mode: SafetyMode, *faulty: str) -> None:
+        """Go to a mode, by the button of a person or for watched quantities."""
         if mode != SafetyMode.ACTIVE or self._safety["MODE"] == SafetyMode.IDLE:
-            self._safety["MODE"] = mode
-        self._safety["PEN"] = pendant_of()
-
-    def _fault(self, quantity: str, mode: SafetyMode) -> None:
-        self._safety |= {"MODE": mode, "PEN": pendant_of(quantity)}
-
-    def _follow(self, mode: int) -> None:
-        """What a new mode of the safety module does to the controllers."""
-        self._mode, self._requested, self._pressed = mode, self.time, self.time
-        for one in self._motors:
-            one.values |= {"MODE": BUS.torque_mode if mode == SafetyMode.ACTIVE else BUS.idle_mode, "T": 0}
-            if mode == SafetyMode.ESTOP:
-                one.values |= {"STAT": 0, "P": 1000 * one.node}  # the zero is lost
-                self._safety["ZERO"] = 0
+            self._safety |= {"MODE": mode, "PEN": pendant_of(*faulty)}
 
     def _watch(self) -> None:
         values = self._safety
         if values["MODE"] != self._mode:
-            self._follow(values["MODE"])
+            self._mode, self._requested, self._pressed = values["MODE"], self.time, self.time
+            for one in self._motors:
+                one.values |= {"MODE": BUS.torque_mode if self._mode == SafetyMode.ACTIVE else BUS.idle_mode, "T": 0}
+                if self._mode == SafetyMode.ESTOP:
+                    one.values |= {"STAT": 0, "P": 1000 * one.node}  # the zero is lost
+                    values["ZERO"] = 0
         is_requested = self.time - self._requested <= BUS.heartbeat
         if values["MODE"] == SafetyMode.ACTIVE:
             speeds = self._body.start_and_tool_speeds(self._plant.q, self._plant.qd)
             if max(abs(one.values["T"]) for one in self._motors) > values["TL2"]:
-                self._fault("torque", SafetyMode.IDLE)
+                self.switch(SafetyMode.IDLE, "torque")
             elif 0 < values["VL2"] < max(speeds) * 4096:
-                self._fault("velocity", SafetyMode.IDLE)
+                self.switch(SafetyMode.IDLE, "velocity")
             elif not is_requested:
-                self._fault("heartbeat", SafetyMode.ESTOP)
+                self.switch(SafetyMode.ESTOP, "heartbeat")
         elif self.is_attended and self.time - self._pressed > BUS.attention:
             if values["MODE"] == SafetyMode.ESTOP or faults(values["PEN"]):
-                self.press(SafetyMode.IDLE)
+                self.switch(SafetyMode.IDLE)
             elif values["ZERO"] and is_requested:
-                self.press(SafetyMode.ACTIVE)
+                self.switch(SafetyMode.ACTIVE)

@@ -6,10 +6,13 @@ The order is that of libbarrett (`product_manager.cpp`, `low_level_wam-inl.h`).
 from collections.abc import Generator, Iterator, Sequence
 from enum import Enum
 
+from wam_description.arm import Arm
+from wam_description.transmission_map import TransmissionMap
 from wam_driver.bus import properties
 from wam_driver.bus.bus_fault import BusFault, Trouble
-from wam_driver.bus.frames import BusGroup, BusNode
+from wam_driver.bus.frames import SAFETY, BusGroup
 from wam_driver.bus.host import Host
+from wam_driver.bus.line import Line
 from wam_driver.bus.motor import Motor
 from wam_driver.bus.safety_module import SafetyMode
 from wam_driver.thresholds import BUS
@@ -26,14 +29,13 @@ class Wait(Enum):
     NOTHING = ""
 
 
-class StartUp:
-    """One start of the arm.
+class StartUp(Host):
+    """The computer on the bus as it starts the arm once.
 
     Parameters
     ----------
-    host : on the bus.
-    home : angles of the motors at the home pose, rad, (n,).
-    torque_constant : N m/A, (n,).
+    line : to the bus.
+    arm : whose torque constants only define what an ampere is, and whose start is the home pose.
 
     Attributes
     ----------
@@ -41,13 +43,15 @@ class StartUp:
     woken : controllers that this start has woken.
     """
 
-    def __init__(self, host: Host, home: Sequence[float], torque_constant: Sequence[float]) -> None:
-        self._host, self._home, self._constant = host, home, torque_constant
-        self._motors = range(1, len(home) + 1)
+    def __init__(self, line: Line, arm: Arm) -> None:
+        super().__init__(line)
+        self._home = TransmissionMap.of(arm).motor_positions(arm.joints.start)
+        self._constant = arm.motors.torque_constant
+        self._motors = range(1, len(self._home) + 1)
         self.is_at_home, self.woken = False, list[int]()
 
     def steps(self) -> Generator[Wait, None, list[Motor]]:
-        """Go on after each step; yields what the start waits for, and returns the motors as they were read.
+        """Go on after some time; yields what the start waits for, and returns the motors as they were read.
 
         Raises
         ------
@@ -57,92 +61,78 @@ class StartUp:
         yield from self._await_idle()
         yield Wait.WAKE
         self._find()
-        self._restore_limits()
+        for name in ("VL1", "VL2", "TL1", "TL2"):  # as the safety module has stored them
+            for what in ("DEF", "LOAD"):
+                self.write(SAFETY, what, self.number(SAFETY, name))
         yield from self._wake()
-        limit = min(self._host.demand(BusNode.SAFETY_MODULE, "TL1"), BUS.largest_torque)
+        limit = min(self.demand(SAFETY, "TL1"), BUS.largest_torque)
         motors = [self._read(node, limit) for node in self._motors]
-        if self.woken or self._host.demand(BusNode.SAFETY_MODULE, "ZERO") != 1:
+        if self.woken or self.demand(SAFETY, "ZERO") != 1:
             while not self.is_at_home:
-                yield from self._pause(Wait.HOME, BUS.look)
+                yield Wait.HOME
             self._set_zero(motors)
-        self._host.write(BusNode.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
+        self.write(SAFETY, "IFAULT", BUS.ignored_velocities)
         return motors
 
-    def _pause(self, wait: Wait, seconds: float) -> Iterator[Wait]:
-        """Let time pass in pieces, so that the caller may do other things."""
-        end = self._host.now() + seconds
-        while self._host.now() < end:
-            yield wait
-            self._host.sleep(BUS.between_writes)
+    def write(self, node: int, name: str, value: int) -> None:
+        """Write a property of a node, which takes some time for it."""
+        super().write(node, name, value)
+        self.line.sleep(BUS.between_writes)
 
     def _await_idle(self) -> Iterator[Wait]:
         """Until the safety module is idle: in E-stop no controller answers, active it needs the positions."""
-        host = self._host
-        while host.ask(BusNode.SAFETY_MODULE, "STAT") is None:
-            if any(host.ask(node, "STAT", 1) is not None for node in self._motors):
-                host.demand(BusNode.SAFETY_MODULE, "STAT")  # once more, as the power may have come in between
-            yield from self._pause(Wait.POWER, BUS.look)
-        host.versions[BusNode.SAFETY_MODULE] = host.demand(BusNode.SAFETY_MODULE, "VERS")
-        while host.demand(BusNode.SAFETY_MODULE, "MODE") != SafetyMode.IDLE:
-            yield from self._pause(Wait.IDLE, BUS.look)
+        while self.ask(SAFETY, "STAT") is None:
+            if any(self.ask(node, "STAT", 1) is not None for node in self._motors):
+                self.demand(SAFETY, "STAT")  # once more, as the power may have come in between
+            yield Wait.POWER
+        self.versions[SAFETY] = self.demand(SAFETY, "VERS")
+        while self.demand(SAFETY, "MODE") != SafetyMode.IDLE:
+            yield Wait.IDLE
 
     def _find(self) -> None:
         """Whether the motors on the bus are those of this arm, and of one firmware."""
-        host = self._host
         for node in range(len(self._motors) + 1, BUS.motors + 1):
-            if host.ask(node, "STAT", 1) is not None:
+            if self.ask(node, "STAT", 1) is not None:
                 raise Trouble(BusFault.UNKNOWN_NODE, node)
         for node in self._motors:
-            host.versions[node] = host.demand(node, "VERS")
-            host.demand(node, "ROLE", BUS.motor_roles, BusFault.NOT_MOTOR)
+            self.versions[node] = self.demand(node, "VERS")
+            self.demand(node, "ROLE", BUS.motor_roles, BusFault.NOT_MOTOR)
             for name in ("P", "T", "MODE"):
-                if host.number(node, name) != host.number(1, name):
+                if self.number(node, name) != self.number(1, name):
                     raise Trouble(BusFault.MIXED_FIRMWARE, node, name)
-        host.versions[BusGroup.MOTORS] = host.versions[1]
-
-    def _restore_limits(self) -> None:
-        """The limits that the safety module has stored."""
-        for name in ("VL1", "VL2", "TL1", "TL2"):
-            for what in ("DEF", "LOAD"):
-                self._host.write(BusNode.SAFETY_MODULE, what, self._host.number(BusNode.SAFETY_MODULE, name))
-                self._host.sleep(BUS.between_writes)
+        self.versions[BusGroup.MOTORS] = self.versions[1]
 
     def _wake(self) -> Iterator[Wait]:
         """Wake those that sleep; as they have lost their counts, the zero is unknown, also in later starts."""
-        host = self._host
-        self.woken = [node for node in self._motors if host.demand(node, "STAT") != BUS.ready]
+        self.woken = [node for node in self._motors if self.demand(node, "STAT") != BUS.ready]
         for node in self.woken:
-            host.write(BusNode.SAFETY_MODULE, "ZERO", 0)
-            host.write(node, "STAT", BUS.ready)
-            host.sleep(BUS.between_writes)
-        if self.woken:
-            yield from self._pause(Wait.WAKE, BUS.silence)
+            self.write(SAFETY, "ZERO", 0)
+            self.write(node, "STAT", BUS.ready)
+        end = self.now() + BUS.silence
+        while self.woken and self.now() < end:
+            yield Wait.WAKE
         for node in self.woken:
-            host.demand(node, "STAT", [BUS.ready], BusFault.NOT_AWAKE)
-        host.write(BusGroup.MOTORS, "MODE", BUS.idle_mode)
+            self.demand(node, "STAT", [BUS.ready], BusFault.NOT_AWAKE)
+        self.write(BusGroup.MOTORS, "MODE", BUS.idle_mode)
 
     def _read(self, node: int, limit: int) -> Motor:
         """Read and check what the driver relies on, with a limit of the torque by the safety module, counts."""
-        demand, maker = self._host.demand, properties.ARM[node]
-        if node == BUS.motors and "POLES" in properties.numbers(self._host.versions[node]):
+        demand, maker = self.demand, properties.ARM[node]
+        if node == BUS.motors and "POLES" in properties.numbers(self.versions[node]):
             demand(node, "POLES", [maker["POLES"]], BusFault.WRIST)
         for name in ("PIDX", "GRPA", "GRPB", "GRPC"):
             demand(node, name, [maker[name]], BusFault.INDEX)
         turn = demand(node, "CTS", BUS.encoders, BusFault.COUNTS)
-        gain = demand(node, "IPNM")
-        if not 1.0 / BUS.gain_ratio < gain / maker["IPNM"] < BUS.gain_ratio:
-            raise Trouble(BusFault.GAIN, node, gain)
+        usual = range(int(maker["IPNM"] / BUS.gain_ratio), int(maker["IPNM"] * BUS.gain_ratio))
+        gain = demand(node, "IPNM", usual, BusFault.GAIN)
         most = demand(node, "MT", range(1, 1 << 31), BusFault.LIMIT)
         return Motor(node, turn, gain * self._constant[node - 1], min(most, limit))
 
     def _set_zero(self, motors: Sequence[Motor]) -> None:
         """Write the counts of the home pose, at which the arm is."""
-        host = self._host
-        host.write(BusNode.SAFETY_MODULE, "IFAULT", BUS.ignored_velocities)
+        self.write(SAFETY, "IFAULT", BUS.ignored_velocities)
         for motor, angle in zip(motors, self._home, strict=True):
-            host.write(motor.node, "P", motor.count_at(angle))
+            self.write(motor.node, "P", motor.count_at(angle))
             near = range(motor.count_at(angle - BUS.jump), motor.count_at(angle + BUS.jump))
-            host.demand(motor.node, "P", near, BusFault.NOT_ZEROED)
-        host.sleep(BUS.between_writes)
-        host.write(BusNode.SAFETY_MODULE, "ZERO", 1)
-        host.sleep(BUS.between_writes)
+            self.demand(motor.node, "P", near, BusFault.NOT_ZEROED)
+        self.write(SAFETY, "ZERO", 1)
