@@ -68,9 +68,10 @@ def cost(chunks: int, interface: str, channel: str) -> tuple[float, float]:
         driver.exchange()
     clock = count(arm_of_start.now() + PERIOD, PERIOD)
     at = [next(clock)]
-    line = CanLine(host, 0.1 * (interface == "udp_multicast"))
+    line = CanLine(host, time, 0.1 * (interface == "udp_multicast"))
     own = driver._host
-    own.line, own.now = line, lambda: at[0]
+    driver._line = own.line = line
+    own.now = lambda: at[0]
 
     def driven(tick: int) -> None:
         driver.exchange()

@@ -3,6 +3,7 @@
 import math
 import os
 import random
+import time
 from collections.abc import Callable
 from functools import cache
 
@@ -42,9 +43,9 @@ class Served(CanLine):
         is_multicast = interface == "udp_multicast"
         place = {"port": 20000 + os.getpid() % 10000} if is_multicast else {}  # that no other run on this computer uses
         own, other = (can.Bus(interface=interface, channel=channel, **place) for _ in range(2))
-        super().__init__(own, 0.1 * is_multicast)
+        super().__init__(own, time, 0.1 * is_multicast)
         self.now, self.sleep, self.let_pass = bus.now, bus.sleep, bus.let_pass
-        self._bus_of_arm, self._end = bus, CanLine(other)
+        self._bus_of_arm, self._end = bus, CanLine(other, time)
 
     def send(self, frame: Frame) -> bool:
         is_taken = super().send(frame)

@@ -1,6 +1,7 @@
 """The line over python-can: frames arrive as they were sent, and errors of the adapter are counted."""
 
 import random
+import time
 
 import can
 
@@ -12,7 +13,7 @@ from wam_driver.bus.line import CanLine
 def lines(channel: str) -> tuple[CanLine, CanLine]:
     """Two ends of a virtual bus; nothing here waits."""
     both = [can.Bus(interface="virtual", channel=channel) for _ in range(2)]
-    return CanLine(both[0]), CanLine(both[1])
+    return CanLine(both[0], time), CanLine(both[1], time)
 
 
 def test_frames_arrive_as_they_were_sent() -> None:

@@ -1,6 +1,7 @@
 """A dry run of the driver on a bus: nothing is sent, and what would be sent is what is sent."""
 
 import re
+import time
 
 import can
 import pytest
@@ -21,7 +22,7 @@ def virtual(name: str) -> BusParameters:
 
 def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
     with can.Bus(interface="virtual", channel="dry") as other:
-        line = line_of(BUS4.shared, virtual("dry"))
+        line = line_of(BUS4.shared, virtual("dry"), time)
         for count in (100, 200, 300):
             position = frames.position(2, count)
             other.send(can.Message(arbitration_id=position.identifier, data=position.data, is_extended_id=False))
@@ -32,7 +33,7 @@ def test_what_others_send_is_shown_and_nothing_is_sent() -> None:
 
 
 def test_a_silent_bus_is_no_fault() -> None:
-    line = line_of(BUS4.shared, virtual("silent"))
+    line = line_of(BUS4.shared, virtual("silent"), time)
     (text,) = heard(line, 0.05)
     line.close()
     assert "the bus is silent while no driver asks" in text

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -123,7 +124,7 @@ def _serve(configuration: Configuration, version: int) -> None:
     """Be the arm on the bus of a configuration, as prompt as the driver."""
     shared, own = configuration.shared, configuration.node("driver", BusParameters)
     set_priority(shared.timing.fifo_priority, shared.timing.niceness)
-    line, arm = line_of(shared, own), SimulatedBus(shared, own, version)
+    line, arm = line_of(shared, own, time), SimulatedBus(shared, own, version)
     while True:
         answer(line, arm, shared.timing.period)
 
@@ -135,7 +136,7 @@ def _listen(configuration: Configuration, seconds: float) -> int:
             "--dry-run is for a driver on a bus; give its configuration, for example --config barrett-wam4-bus"
         )
     own = configuration.node("driver", BusParameters)
-    line = line_of(configuration.shared, own)
+    line = line_of(configuration.shared, own, time)
     print(f"heard on {own.interface} {own.channel} within {seconds:g} s, nothing was sent:", flush=True)
     try:
         print(*heard(line, seconds), sep="\n")

@@ -46,7 +46,7 @@ class BusDriver(ArmDriver):
         """The motors: those of the production WAM on its bus."""
         if own.interface != SIMULATED:
             self.get_logger().warning("this driver was tested on a simulated bus only, never on a real arm")
-        return ArmBus(line_of(shared, own), shared.arm, shared.timing.period)
+        return ArmBus(line_of(shared, own, time), shared.arm, shared.timing.period)
 
     @property
     def stamp(self) -> int:

@@ -1,8 +1,7 @@
 """The line to the bus: one of python-can and a clock, or the simulated one."""
 
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from wam_description.arm import Shared
@@ -19,23 +18,21 @@ class CanLine:
     Parameters
     ----------
     bus : `can.Bus` of any interface.
+    clock : of the computer, the module `time`.
     slack : s, by which answers may be late; above 0 for a simulated arm in another process, whose bus gives own frames
         back.
 
     Attributes
     ----------
-    now, sleep : the steady clock, s.
     counts : of errors.
     """
 
-    now, sleep = staticmethod(time.perf_counter), staticmethod(time.sleep)
-
-    def __init__(self, bus: Any, slack: float = 0.0) -> None:
+    def __init__(self, bus: Any, clock: Any, slack: float = 0.0) -> None:
         import can
 
         self._bus, self._errors, self.slack = bus, (can.CanError, OSError), slack
         self._message: Any = can.Message(is_extended_id=False)  # to be sent, again and again
-        self.close: Callable[[], None] = bus.shutdown
+        self.now, self.sleep, self.close = clock.perf_counter, clock.sleep, bus.shutdown
         self.counts: Counter[str] = Counter()
 
     def let_pass(self, seconds: float) -> None:
@@ -75,8 +72,8 @@ def incoming(line: Line, seconds: float) -> Iterator[Frame]:
             yield frame
 
 
-def line_of(shared: Shared, own: BusParameters) -> Line:
-    """The line to the bus of a driver.
+def line_of(shared: Shared, own: BusParameters, clock: Any) -> Line:
+    """The line to the bus of a driver, with the clock of a real one, the module `time`.
 
     Raises
     ------
@@ -93,7 +90,7 @@ def line_of(shared: Shared, own: BusParameters) -> Line:
         raise ParameterError("python-can is not installed: pip install 'wam_stack[bus]'") from error
     except (can.CanError, OSError, ValueError) as error:
         raise ParameterError(f"bus {own.interface} {own.channel}: {error}; check adapter and 'ip link'") from error
-    return CanLine(bus, BUS.slack if own.interface == "udp_multicast" else 0.0)
+    return CanLine(bus, clock, BUS.slack if own.interface == "udp_multicast" else 0.0)
 
 
 def answer(line: Line, arm: SimulatedBus, timeout: float) -> None:
