@@ -263,7 +263,6 @@ class ReportLayout:
     arm: tuple[float, float] = (5.6, 4.2)  # inches, of the picture of the arm
     dots: int = 1500  # of a picture of dots
     first_charts: int = 2  # before the sections: with the picture of the arm they fill a screen
-    grey: str = "#9aa3ad"  # of raw values behind a line
     amplitude: float = 1e-9  # rad; a smaller one is shown as this, as the axis is logarithmic
     still: float = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
     flat: float = 1e-4  # of the value; a smaller range of a plot is not blown up

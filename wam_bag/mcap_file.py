@@ -340,7 +340,7 @@ class McapFile:
                 index = self._data[block.end : block.indexes_end]
             else:
                 part[:] = np.frombuffer(self._data[block.start : block.end], np.uint8)
-            for channel, found in find(part, index, self.define).items():
-                parts.setdefault(channel, []).append(Found(found.offsets + position, found.sizes))
+            for channel, found in find(part, index, self.define, position).items():
+                parts.setdefault(channel, []).append(found)
             position += len(part)
         return MessageBatch(buffer, {channel: together(found) for channel, found in parts.items()})

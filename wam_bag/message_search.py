@@ -14,6 +14,7 @@ from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, walk
 
 NEVER: Final = 2**63  # ns; later than every log time
 DATA: Final = HEAD.size + 22  # bytes of a message record before its data: head, channel, sequence, two times
+_HEADS: Final = np.dtype([("opcode", "u1"), ("length", "<i8"), ("channel", "<u2")])  # first bytes of a message record
 _INDEX_HEAD: Final = HEAD.size + 6  # bytes of a message index record before its entries
 
 Define = Callable[[int, bytes], None]
@@ -34,7 +35,7 @@ class MessageBatch(NamedTuple):
     found: dict[int, Found]
 
 
-def find(part: Bytes, index: bytes, define: Define) -> dict[int, Found]:
+def find(part: Bytes, index: bytes, define: Define, begin: int) -> dict[int, Found]:
     """The messages among the records of a chunk, by channel id.
 
     Parameters
@@ -43,12 +44,13 @@ def find(part: Bytes, index: bytes, define: Define) -> dict[int, Found]:
     index : message index records of the chunk, empty if there are none.  They make the search fast and need
         not be right: every byte of the chunk is accounted for.
     define : is called with each definition.
+    begin : of the records in the buffer.
     """
-    found = _by_index(part, index, define) if index else None
-    return _by_walking(part.tobytes(), define) if found is None else found
+    found = _by_index(part, index, define, begin) if index else None
+    return _by_walking(part.tobytes(), define, begin) if found is None else found
 
 
-def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | None:
+def _by_index(part: Bytes, index: bytes, define: Define, begin: int) -> dict[int, Found] | None:
     """Messages that the index names, if they are distinct and fill all bytes behind the definitions, else None."""
     start, size = 0, len(part)
     while start + HEAD.size <= size and part[start] in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -74,15 +76,17 @@ def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | N
     if not entries:
         return None
     offsets = np.concatenate(list(entries.values()))
-    ends = np.cumsum([len(some) for some in entries.values()])
+    counts = [len(some) for some in entries.values()]
+    ends = np.cumsum(counts)
     is_rising = np.diff(offsets) > 0
     is_rising[ends[:-1] - 1] = True
     if not is_rising.all() or offsets.min() < start or offsets.max() > size - DATA:
         return None
-    sizes = at(part, offsets + 1, "<i8") - (DATA - HEAD.size)
+    heads = at(part, offsets, f"V{_HEADS.itemsize}").view(_HEADS)
+    sizes = heads["length"] - (DATA - HEAD.size)
     is_whole = (
-        (part[offsets] == Opcode.MESSAGE).all()
-        and (at(part, offsets + HEAD.size, "<u2") == np.repeat(list(entries), np.diff(ends, prepend=0))).all()
+        (heads["opcode"] == Opcode.MESSAGE).all()
+        and (heads["channel"] == np.repeat([*entries], counts)).all()
         and sizes.min() >= 0
         and sizes.max() <= size
         and int(sizes.sum()) + DATA * len(offsets) == size - start
@@ -90,17 +94,18 @@ def _by_index(part: Bytes, index: bytes, define: Define) -> dict[int, Found] | N
     if not is_whole:
         return None
     rows = zip(entries, pairwise([0, *ends.tolist()]), strict=True)
+    offsets = offsets + begin
     return {channel: Found(offsets[first:end], sizes[first:end]) for channel, (first, end) in rows}
 
 
-def _by_walking(data: bytes, define: Define) -> dict[int, Found]:
+def _by_walking(data: bytes, define: Define, begin: int) -> dict[int, Found]:
     places: dict[int, list[tuple[int, int]]] = {}
     for opcode, start, end in walk(data, 0, len(data)):
         if opcode == Opcode.MESSAGE:
             if end - start < DATA:
                 raise Damage("a message record ends early")
             channel = int.from_bytes(data[start + HEAD.size : start + HEAD.size + 2], "little")
-            places.setdefault(channel, []).append((start, end - start - DATA))
+            places.setdefault(channel, []).append((begin + start, end - start - DATA))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             define(opcode, data[start + HEAD.size : end])
         elif opcode < FIRST_PRIVATE:
