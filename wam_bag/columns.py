@@ -281,7 +281,14 @@ def irregularities(names: Sequence[str], widths: Mapping[str, int]) -> Iterator[
     yield from (f"{field} of another length than the names" for field, width in widths.items() if 0 < width < most)
 
 
-def _joint_columns(times: Times, groups: list[Any]) -> JointColumns:
+def joint_columns(times: Times, groups: list[Any]) -> JointColumns:
+    """Joint states of k messages.
+
+    Parameters
+    ----------
+    times : log times, ns, (k,).
+    groups : rows of messages that are alike, with their stamps, ns, frame, names, and fields, each (m, n).
+    """
     irregular = Counter[str]()
     owners = []
     for _, (stamps, _, given, fields) in groups:
@@ -316,7 +323,7 @@ def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
 Extract = Callable[[Group], tuple[Any, ...]]
 Assemble = Callable[[Times, list[Any]], Columns]
 _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
-    "sensor_msgs/msg/JointState": (_joints, _joint_columns),
+    "sensor_msgs/msg/JointState": (_joints, joint_columns),
     "geometry_msgs/msg/WrenchStamped": (
         lambda group: (*_header(group), group.vector("wrench.force"), group.vector("wrench.torque")),
         partial(_assembled, WrenchColumns, ((3,), (3,))),

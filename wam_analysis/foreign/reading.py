@@ -22,7 +22,7 @@ from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
-from wam_bag.columns import UNNAMED, irregularities, joint_names
+from wam_bag.columns import UNNAMED, joint_columns, joint_names
 from wam_bag.contents import contents
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
@@ -376,28 +376,23 @@ def _numbers(topic: str, columns: Messages, path: str) -> list[Numbers]:
 
 def _joints(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> JointColumns:
     taken = {q: _numbers(topic, columns, fields[q]) for q in IN_JOINTS if q in fields}
-    irregular = Counter[str]()
-    own: list[tuple[str, ...]] = []
+    times, frames = _times(topic, columns, fields, given), _frames(columns)
+    alike: dict[Any, list[int]] = {}  # rows by frame, names and lengths of the fields
     for k, message in enumerate(columns.messages):
-        widths = {q: len(rows[k]) for q, rows in taken.items()}
-        most = max(widths.values())
-        names = [*_at(topic, message, fields["name"])] if "name" in fields else []
-        is_named = not names and len(given.joints) == most
-        if "name" in fields and not is_named:
-            irregular.update(irregularities(names, widths))
-        own.append(joint_names(given.joints if is_named else names, most))
-    every = tuple(dict.fromkeys(name for some in dict.fromkeys(own) for name in some))
-    place = {name: i for i, name in enumerate(every)}
-    arrays = []
-    for quantity in IN_JOINTS:
-        rows = taken.get(quantity, [])
-        array = np.full((len(own), len(every) if any(map(len, rows)) else 0), np.nan)
-        for k, (some, row) in enumerate(zip(own, rows, strict=False)):
-            if len(some) == len(row):
-                array[k, [place[name] for name in some]] = row
-        arrays.append(given.scaled(quantity)[0] * array)
-    times, (p, v, e) = _times(topic, columns, fields, given), arrays
-    return JointColumns(columns.log_time_ns, times, _frames(columns), every, p, v, e, irregular)
+        names = tuple(_at(topic, message, fields["name"])) if "name" in fields else ()
+        widths = tuple(len(taken[q][k]) if q in taken else 0 for q in IN_JOINTS)
+        if not names and len(given.joints) == max(widths):
+            names = given.joints
+        alike.setdefault((frames[k], names, widths), []).append(k)
+    groups = []
+    for (frame, names, _), rows in alike.items():
+        values = [
+            given.scaled(q)[0] * np.array([taken[q][k] if q in taken else () for k in rows], np.float64)
+            for q in IN_JOINTS
+        ]
+        groups.append((np.array(rows), (times[rows], frame, names, values)))
+    found = joint_columns(columns.log_time_ns, groups)
+    return found if "name" in fields else found._replace(irregular={})
 
 
 def _wrench(topic: str, columns: Messages, fields: Mapping[str, str], given: TopicMap) -> WrenchColumns:
