@@ -125,17 +125,20 @@ def count(chapters: Mapping[str, Sequence[Claim]]) -> str:
 def table(claims: Iterable[Claim], measured: Mapping[str, str]) -> str:
     """The items of a chapter with what shows each, as Markdown; agreement of what the plant shows.
 
+    The first item of a section has its number.
+
     Parameters
     ----------
     measured : greatest distance of each figure and effect, by the name that an agreement has in braces.
     """
-    rows = []
+    rows, section = [], ""
     for claim in claims:
+        number, section = "" if claim.section == section else f"{claim.section} ", claim.section
         agreement = PLACE.sub(lambda found: measured[found[0][1:-1]], claim.agreement)
         links = dict.fromkeys(filter(None, map(_link, claim.shown)))
         found = agreement if claim.status is Status.PLANT else ""
         remark = ". ".join(f"{one[0].upper()}{one[1:]}" for one in (found, claim.open) if one)
-        rows.append((f"{claim.section} {claim.claim}", " ".join([claim.status, *links]), remark))
+        rows.append((f"{number}{claim.claim}", " ".join([claim.status, *links]), remark))
     return markdown(("claim", "status", "agreement; what is open"), rows)
 
 
