@@ -12,6 +12,7 @@ from typing import Any
 from wam_control.contact.contact_estimator import ContactEstimate
 from wam_control.task.scenario import FORCE_LOOP, Scenario, ScenarioStep
 from wam_control.task.scenario_settings import require_settings
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.event import Event, Level
 from wam_description.interface import Interface, require_sections
@@ -86,8 +87,9 @@ class Simulation:
         require_sections(configuration.sections, shared.nodes)
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
-                more = (self._scenario(configuration, dict(controllers or {})),) if name == SCENARIO else ()
-                self._connect(name, declaration, configuration, more)
+                is_scenario = name == SCENARIO
+                more = (self._scenario(configuration, shared, dict(controllers or {})),) if is_scenario else ()
+                self._connect(name, declaration, configuration, shared, more)
         self._motors = len(shared.arm.motors.names)
         has_sensors = "joint_sensors" in self._interface.topics
         self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
@@ -95,18 +97,23 @@ class Simulation:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
-    def _scenario(self, configuration: Configuration, controllers: Mapping[str, Any]) -> Scenario:
+    def _scenario(self, configuration: Configuration, shared: Shared, controllers: Mapping[str, Any]) -> Scenario:
         """What is to be played; what it sets has to fit the other values of its node."""
-        scenario = Scenario(self._steps, configuration.shared, controllers)
+        scenario = Scenario(self._steps, shared, controllers)
         require_settings("the scenario", [step.settings for step in scenario.steps], configuration, controllers)
         return scenario
 
     def _connect(
-        self, name: str, declaration: Declaration, configuration: Configuration, more: Sequence[Scenario]
+        self,
+        name: str,
+        declaration: Declaration,
+        configuration: Configuration,
+        shared: Shared,
+        more: Sequence[Scenario],
     ) -> None:
         kind = declaration.parameter_class
         own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        node = declaration.make(configuration.shared, own, *more)
+        node = declaration.make(shared, own, *more)
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
         feeds = self._interface.feeds(declaration, node)
