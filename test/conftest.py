@@ -33,12 +33,23 @@ LONG = 300.0  # s, for what must happen at all, on a machine as busy as may be
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that start ROS nodes; one worker runs them all, so that they do not slow each other."""
+    """Mark the tests that start ROS nodes; one worker runs them all, so that they do not slow each other.
+
+    Those that share a fixture of a module are run by one worker, too, so that it is made once.
+    """
     for item in items:
         if {"domain_id", "domain_of_module"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("ros")
-        if item.get_closest_marker("ros") and config.pluginmanager.hasplugin("xdist"):
-            item.add_marker(pytest.mark.xdist_group("ros"))
+        if config.pluginmanager.hasplugin("xdist"):
+            if item.get_closest_marker("ros"):
+                item.add_marker(pytest.mark.xdist_group("ros"))
+            elif isinstance(item, pytest.Function) and _shares_a_fixture(item):
+                item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
+def _shares_a_fixture(item: pytest.Function) -> bool:
+    found = item._fixtureinfo.name2fixturedefs.values()
+    return any(one.scope == "module" for definitions in found for one in definitions)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 LARGEST_PICTURE = 1_000_000  # bytes
 NEEDED = ("sphinx", "myst_parser", "numpydoc", "furo")
-ONE_SITE = pytest.mark.xdist_group("site")  # one worker builds it, once
 MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
 
 sys.path.insert(0, str(ROOT / "docs"))
@@ -78,7 +77,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
-@ONE_SITE
 @pytest.mark.slow
 def test_no_link_of_the_site_is_dead(site: Path) -> None:
     assert dead_links(site) == []
@@ -86,7 +84,6 @@ def test_no_link_of_the_site_is_dead(site: Path) -> None:
     assert {path.stem for path in (ROOT / "docs").glob("*.md")} <= {path.stem for path in site.glob("*.html")}
 
 
-@ONE_SITE
 @pytest.mark.slow
 def test_the_site_requests_nothing_from_the_network(site: Path) -> None:
     for path in site.rglob("*.html"):
