@@ -146,7 +146,7 @@ def speed(quick: bool) -> Measured:
     What is required is of a computer on which the bare plant, MuJoCo's step of the same arm, makes `BARE` times real
     time; each is divided by what the bare plant makes here.
     """
-    length = 2.0 if quick else 5.0
+    length = 1.0 if quick else 5.0
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
         script = Path(folder) / "script.yaml"
         script.write_text(yaml.safe_dump(scenario(length)), encoding="utf-8")
@@ -156,7 +156,7 @@ def speed(quick: bool) -> Measured:
             turn = time.monotonic_ns()
             named = [base.with_values({"recorder:name": f"{how}_{turn}"}) for how in ("one", GROUPED, EACH)]
             yield {
-                FASTER: bare(base, 2.0 if quick else 20.0) / BARE,
+                FASTER: bare(base, 1.0 if quick else 20.0) / BARE,
                 "run without ROS": direct(base, length),
                 "lockstep": lockstep(base),
                 "lockstep, recorded": lockstep(named[0], "recorder"),
@@ -311,7 +311,7 @@ def round_trip(quick: bool) -> Measured:
     Both send a JointState of four motors every millisecond, on the same executor.  Two processes have a processor
     each: where the kernel moves them from one to the other, a round of either lasts 120 to 270 us as it happens.
     """
-    length = 1.0 if quick else 2.0
+    length = 0.5 if quick else 2.0
     while True:
         found = {}
         for way in WAYS:
@@ -385,11 +385,11 @@ def demonstration(folder: Path, name: str, options: list[str]) -> Run:
 
 
 def short_form(folder: Path) -> list[str]:
-    """Options of a demonstration of some seconds."""
+    """Options of a demonstration of some seconds, without a page in the browser."""
     (folder / "short.yaml").write_text(yaml.safe_dump({"steps": SHORT}), encoding="utf-8")
     section = {"ros__parameters": {"script": str(folder / "short.yaml")}}
     (folder / "quick.yaml").write_text(yaml.safe_dump({"base": "wam", "/**/scenario": section}), encoding="utf-8")
-    return ["--config", "quick.yaml"]
+    return ["--config", "quick.yaml", "--no-live"]
 
 
 MOVED = 1e-3  # rad, of a joint since the first message
@@ -438,7 +438,7 @@ def real_time(quick: bool) -> Measured:
             yield {
                 **found,
                 BRAKED: float(not run.passed),
-                START: first_motion(folder, f"start_{turn}", [*short, "--no-live"]),
+                START: first_motion(folder, f"start_{turn}", short),
             }
 
 
