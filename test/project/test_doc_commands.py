@@ -290,6 +290,7 @@ def test_the_client_of_the_documentation_presses_with_the_commanded_force(tmp_pa
             reader.play(block)
             if "force_step.py" in block.code:
                 pressed = presses(reader.printed)
+                reader.stop()  # what follows needs no stack
     assert [commanded for commanded, _ in pressed] == [5.0, 10.0]
     for commanded, measured in pressed:
         assert measured == pytest.approx(commanded, rel=0.2)
