@@ -34,15 +34,15 @@ class FaultKind(NamedTuple):
 
 
 KINDS: Final = {
-    "messages": FaultKind("messages", 960, 3, messages.play, LOCKSTEP),
-    "messages-realtime": FaultKind("messages", 960, 3, messages.play, REALTIME),
-    "parameters": FaultKind("sets", 2000, 10, parameter_sets.play, LOCKSTEP),
+    "messages": FaultKind("messages", 960, 2, messages.play, LOCKSTEP),
+    "messages-realtime": FaultKind("messages", 960, 1, messages.play, REALTIME),
+    "parameters": FaultKind("sets", 2000, 5, parameter_sets.play, LOCKSTEP),
     "losses": FaultKind("losses", 108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
     "losses-realtime": FaultKind("losses", 108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
-    "publishers": FaultKind("publishers", 60, 3, messages.play_second, LOCKSTEP),
-    "publishers-realtime": FaultKind("publishers", 60, 3, messages.play_second, REALTIME),
+    "publishers": FaultKind("publishers", 60, 2, messages.play_second, LOCKSTEP),
+    "publishers-realtime": FaultKind("publishers", 60, 1, messages.play_second, REALTIME),
     "disks": FaultKind("disks", 12, 1, disks.play, LOCKSTEP),
-    "bags": FaultKind("bags", 3000, 30, bags.play, LOCKSTEP),
+    "bags": FaultKind("bags", 3000, 10, bags.play, LOCKSTEP),
     "interruptions": FaultKind("interruptions", 100, 0, interruptions.play, {}),
 }
 
@@ -63,7 +63,7 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
 
     kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
     trials: int = option(0, "trials of each kind; 0: as many as on the page", 0)
-    short: bool = option(False, "a few trials of each kind, half a minute")
+    short: bool = option(False, "one or a few trials of each kind")
 
     run = staticmethod(run_fault)
 
