@@ -297,7 +297,7 @@ def lossy_and_reset(path: Path) -> Made:
 
 def wandering(path: Path) -> Made:
     """Joints that were led by hand: smooth, and never the same twice."""
-    time, drawn = times(40.0), chance(32)
+    time, drawn = times(20.0), chance(32)
     speed = np.zeros((len(time), 3))
     for i in range(1, len(time)):
         speed[i] = 0.995 * speed[i - 1] + 0.01 * drawn.normal(size=3)

@@ -120,8 +120,7 @@ def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_ref
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("firmware", [60, 200])
-@pytest.mark.parametrize("joints", [4, 7])
+@pytest.mark.parametrize(("joints", "firmware"), [(4, 200), (7, 60)])
 def test_the_driver_of_a_real_arm_keeps_the_contract_on_a_simulated_bus(
     ros: Network, tmp_path: Path, joints: int, firmware: int
 ) -> None:
