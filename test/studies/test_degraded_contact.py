@@ -13,11 +13,10 @@ from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
-from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
 from wam_studies.contact.recording import Drive, record
 from wam_studies.contact.replay import arriving, names_payload
-from wam_studies.contact.rows import IDENTIFIED_ARM
+from wam_studies.contact.rows import IDENTIFIED_ARM, degraded_rows, degraded_tables
 from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.study import ContactCase, ContactStudy, play_case
 from wam_studies.contact.touches import axis_of

@@ -31,6 +31,14 @@ class EvaluationLimits:
     sure: float = 0.95  # probability of a link
     outside: float = 0.1  # largest probability of what a 90 % set may lack
 
+    # of a recording
+    late: float = 0.45  # s after the start of a contact, until which it is detected
+    start_after: float = 0.1  # s, of an estimator that starts in contact
+    start_within: float = 0.3  # s
+    start_force: float = 9.0  # N
+    setting_down: float = 0.5  # s after a mass is set down, in which the model is still that with it
+    observer: float = 1.0  # s at the start, whose torques are the observer's own transient
+
 
 EVALUATION = EvaluationLimits()
 
@@ -55,8 +63,9 @@ class TrueContact(NamedTuple):
 
     Attributes
     ----------
-    kind, cover, friction : of the scenario or the drawn contact; coefficient.
+    kind, cover : of the scenario or the drawn contact.
     position, force : at the evaluation; m, N.
+    friction : coefficient.
     first, due, last : numbers of the moments of its start, of the evaluation, and until which it may be detected.
     since : s, from which on the latency counts.
     mass : kg, of a mass at the tool.
@@ -64,9 +73,9 @@ class TrueContact(NamedTuple):
 
     kind: str
     cover: str
-    friction: float
     position: float
     force: float
+    friction: float
     first: int
     due: int
     last: int
@@ -126,11 +135,7 @@ def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length:
     place = min(contact.position, length)
     wrong = [is_sure_and_wrong(m.estimate, contact.cover) for m, acts in zip(moments, acting, strict=True) if acts]
     return ContactOutcome(
-        kind=contact.kind,
-        cover=contact.cover,
-        position=contact.position,
-        force=contact.force,
-        friction=contact.friction,
+        *contact[:5],
         moving=moments[contact.first].is_moving and moments[contact.due].is_moving,
         latency=math.nan if already else times[0] if times else math.inf,
         detected=now.in_contact,

@@ -31,7 +31,7 @@ from wam_studies.identification.trial import play
 
 @dataclass(frozen=True)
 class RecordingTimes:
-    """When contacts are, and for how long the arm is moved."""
+    """When contacts are, for how long the arm is moved, and how many drives of one kind there are."""
 
     warm_up: float = 6.0  # s of free motion before the first contact
     spacing: float = 1.9  # s from one contact to the next
@@ -39,6 +39,9 @@ class RecordingTimes:
     spacing_of_lasting: float = 11.0  # s
     excitation: float = 20.0  # s of motion for an identification
     drift_steps: int = 20  # of friction, over a recording
+    shortest: float = 10.0  # s, with one contact
+    other: float = 0.4  # of the length of a recording, with contacts that last or with masses
+    arms: int = 3  # of each seed, that are identified
 
 
 TIMES = RecordingTimes()

@@ -1,7 +1,6 @@
 """Run the contact estimator on a recording, and score what it reports of each contact, and between contacts."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,21 +29,6 @@ from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.touches import Touch
 
 
-@dataclass(frozen=True)
-class ReplayLimits:
-    """When an estimate of a recording is evaluated, and what counts."""
-
-    late: float = 0.45  # s after the start of a contact, until which it is detected
-    start_after: float = 0.1  # s, of an estimator that starts in contact
-    start_within: float = 0.3  # s
-    start_force: float = 9.0  # N
-    setting_down: float = 0.5  # s after a mass is set down, in which the model is still that with it
-    observer: float = 1.0  # s at the start, whose torques are the observer's own transient
-
-
-REPLAY = ReplayLimits()
-
-
 def arriving(recording: DriveRecording, period: float, seed: int) -> Iterator[tuple[int, State, float]]:
     """Samples as the estimator gets them: number, state and torque, s since the last sample that arrived."""
     measured, arrives = recording.degradation.signals.of(recording.torque, np.random.default_rng((seed, 3)))
@@ -67,7 +51,9 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
     estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
     moments: list[EstimatedMoment] = []
     singles = [
-        t for t in recording.touches if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= REPLAY.start_force
+        t
+        for t in recording.touches
+        if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= EVALUATION.start_force
     ]
     trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
     started: dict[int, tuple[bool, bool]] = {}
@@ -75,7 +61,11 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
         time = i * period
         estimator.observe(state, None, dt)
         for number, touch in enumerate(singles):
-            if touch.begin + REPLAY.start_after <= time < touch.begin + REPLAY.start_after + REPLAY.start_within:
+            if (
+                touch.begin + EVALUATION.start_after
+                <= time
+                < touch.begin + EVALUATION.start_after + EVALUATION.start_within
+            ):
                 if number not in trials:
                     cold = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
                     trials[number] = estimator.restarted_copy(), cold
@@ -96,8 +86,8 @@ def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: 
     acting = [during(moments, touch.begin, touch.end) for touch in touches]
     busy = np.zeros(len(moments), bool)
     for touch in touches:
-        busy |= during(moments, touch.begin, touch.end + (REPLAY.setting_down if touch.mass else EVALUATION.edge))
-    free = ~busy & during(moments, REPLAY.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
+        busy |= during(moments, touch.begin, touch.end + (EVALUATION.setting_down if touch.mass else EVALUATION.edge))
+    free = ~busy & during(moments, EVALUATION.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
     warned = [one.estimate.warning is not None for one, take in zip(moments, ~busy, strict=True) if take]
     truth = np.zeros((len(moments), len(arm.joints.names)))
     return score_of(
@@ -138,10 +128,11 @@ def _mass(touch: Touch, moments: Sequence[EstimatedMoment], acting: Mask) -> Mas
 def _contact(touch: Touch, moments: Sequence[EstimatedMoment]) -> TrueContact:
     first, due, late = (
         next((i for i, one in enumerate(moments) if one.time >= time), len(moments) - 1)
-        for time in (touch.begin, *(min(touch.begin + wait, touch.end) for wait in (EVALUATION.settled, REPLAY.late)))
+        for time in (
+            touch.begin,
+            *(min(touch.begin + wait, touch.end) for wait in (EVALUATION.settled, EVALUATION.late)),
+        )
     )
     force = float(np.linalg.norm(touch.force)) + STANDARD_GRAVITY * touch.mass
     place = touch.place_at(moments[due].time)
-    return TrueContact(
-        touch.kind, touch.cover, touch.friction, place, force, first, due, late, touch.begin, mass=touch.mass
-    )
+    return TrueContact(touch.kind, touch.cover, place, force, touch.friction, first, due, late, touch.begin, touch.mass)

@@ -137,7 +137,7 @@ def _contact(played: Played, span: Span) -> TrueContact:
     due = max(i for i in range(span.first, span.last) if moments[i].time - begin <= wait + 1e-9)
     load = played.loads[due] if played.loads[due].cover else played.loads[due - 1]
     since, friction = moments[max(span.first - 1, 0)].time, planned.friction if planned else np.nan
-    return TrueContact(kind, span.cover, friction, load.position, force_of(load), span.first, due, span.last, since)
+    return TrueContact(kind, span.cover, load.position, force_of(load), friction, span.first, due, span.last, since)
 
 
 def _planned(planned: Sequence[PlannedContact], time: float) -> PlannedContact | None:

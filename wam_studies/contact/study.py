@@ -9,11 +9,19 @@ import numpy as np
 
 from wam_description.configuration import Configuration
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
-from wam_studies.contact.degraded_rows import degraded_rows, degraded_tables
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore
-from wam_studies.contact.recording import CONTACTS, Drive, record
+from wam_studies.contact.recording import CONTACTS, TIMES, Drive, record
 from wam_studies.contact.replay import replay
-from wam_studies.contact.rows import IDENTIFIED_ARM, STATED, error_of, near, on_outer_link, stated_rows
+from wam_studies.contact.rows import (
+    IDENTIFIED_ARM,
+    STATED,
+    degraded_rows,
+    degraded_tables,
+    error_of,
+    near,
+    on_outer_link,
+    stated_rows,
+)
 from wam_studies.contact.scenarios import KINDS, RANGES, BenchmarkScenario, ScenarioGenerator
 from wam_studies.contact.simulation import play, score
 from wam_studies.figures.panels import Panel, Panels, line_only, measured
@@ -23,17 +31,6 @@ from wam_studies.scores import Row, Scores, ScoreTable
 ALL = "all"
 BINS = 6  # of the picture
 CENTIMETRES = 100.0
-
-
-class DriveExtent(NamedTuple):
-    """How drives of one kind of contacts follow from the length of a recording."""
-
-    shortest: float = 10.0  # s, with one contact
-    other: float = 0.4  # of the length of a recording, with contacts that last or with masses
-    arms: int = 3  # of each seed, that are identified
-
-
-EXTENT = DriveExtent()
 
 
 class ContactCase(NamedTuple):
@@ -68,7 +65,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
     degradations: tuple[str, ...] = option((), "degradations of arm and signals", choices=(ALL, *NAMES))
-    seconds: float = option(110.0, "length of a recording with degradations", EXTENT.shortest)
+    seconds: float = option(110.0, "length of a recording with degradations", TIMES.shortest)
 
     def cases(self, seed: int) -> list[ContactCase]:
         """The scenarios of a seed, then its drives."""
@@ -90,10 +87,10 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         """
         for name in NAMES if ALL in self.degradations else self.degradations:
             wide = Drive(self.configuration, name, seed, self.seconds)
-            lasting = wide._replace(contacts="lasting", seconds=max(EXTENT.shortest, EXTENT.other * self.seconds))
+            lasting = wide._replace(contacts="lasting", seconds=max(TIMES.shortest, TIMES.other * self.seconds))
             yield from (wide, lasting, lasting._replace(contacts="masses"))
-            for arm in range(EXTENT.arms) if name in IDENTIFIED else ():
-                level = wide._replace(contacts="level", seed=EXTENT.arms * seed + arm)
+            for arm in range(TIMES.arms) if name in IDENTIFIED else ():
+                level = wide._replace(contacts="level", seed=TIMES.arms * seed + arm)
                 yield from (level, level._replace(is_identified=True))
 
     def own_values(self, case: ContactCase) -> Collection[str]:

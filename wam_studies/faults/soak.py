@@ -4,6 +4,7 @@ import resource
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar, Final, NamedTuple
@@ -63,12 +64,13 @@ def soak(case: SoakCase) -> SoakRecord:
         nodes = [*configuration.shared.nodes, "scenario", "recorder"]
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
         with Composition(configuration.with_values(own)) as composition:
-            clock = _Sampler()
-            failure = composition.play(clock).failure
+            samples: list[_MemorySample] = []
+            failure = composition.play(partial(_sample, samples)).failure
         found = contents(Path(folder, "soak"))
-    early, late = clock.memory[len(clock.memory) // 10], clock.memory[-1]
+    first, last, early = samples[0], samples[-1], samples[len(samples) // 10].memory
+    factor = (last.seconds - first.seconds) / max(last.wall - first.wall, 1e-9)
     count = sum(topic.messages for topic in found.topics.values())
-    return SoakRecord(clock.seconds, clock.factor, early, late, count, tuple(lost_in(found)), failure)
+    return SoakRecord(last.seconds, factor, early, last.memory, count, tuple(lost_in(found)), failure)
 
 
 @dataclass(frozen=True)
@@ -129,23 +131,18 @@ def _steps(arm: Arm, case: SoakCase) -> list[dict[str, Any]]:
     ]
 
 
-class _Sampler:
-    """Samples memory once in a second of wall time, and the real-time factor; never ends the run."""
+class _MemorySample(NamedTuple):
+    """Wall time and the arm's time, s, and resident memory, MB."""
 
-    def __init__(self) -> None:
-        self.memory: list[float] = []
-        self._next = self._begin = time.monotonic()
-        self._first: float | None = None
-        self.seconds = self.factor = 0.0
+    wall: float
+    seconds: float
+    memory: float
 
-    def __call__(self, seconds: float) -> bool:
-        """False, at an arm's time, s."""
-        now = time.monotonic()
-        self._first = seconds if self._first is None else self._first
-        if now >= self._next:
-            self._next = now + 1.0
-            pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
-            self.memory.append(pages * resource.getpagesize() / 1e6)
-            self.seconds = seconds
-            self.factor = (self.seconds - self._first) / max(now - self._begin, 1e-9)
-        return False
+
+def _sample(samples: list[_MemorySample], seconds: float) -> bool:
+    """Take a sample once in a second of wall time; False, as the run does not end."""
+    now = time.monotonic()
+    if not samples or now >= samples[-1].wall + 1.0:
+        pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
+        samples.append(_MemorySample(now, seconds, pages * resource.getpagesize() / 1e6))
+    return False

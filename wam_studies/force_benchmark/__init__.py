@@ -5,7 +5,6 @@ surfaces       the plane or rod of a task: where it is, and whether the arm is c
 trial          one task in simulation: true force, motion, impact (3.1), and what the loop reports
 controllers    what a user would write in place of the force loop
 outcome        done, refused, ended with a reason, or silent; cycles and overshoot
-groupings      the classes into which tasks are divided
-study          many tasks in the harness, and what is drawn of them
+study          many tasks in the harness by classes, and what is drawn of them
 straight_arm   a nearly straight arm that presses ahead and aside (docs/force.md)
 """
