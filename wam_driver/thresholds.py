@@ -60,7 +60,6 @@ class BusThresholds:
     silence: float = 1.0  # s after the wake-up, in which a frame would drive the controllers off the bus
     look: float = 0.01  # s, between two looks at what a person has to do
     silent: float = 0.01  # s without a position of a motor, above which there is a fault
-    unguarded: float = 0.045  # s without the mode of the safety module, above which there is a fault
     described_firmware: int = 200  # whose names of properties a dry run shows
     slack: float = 0.1  # s, by which a simulated arm in another process may answer later, where computers are busy
     poll: float = 0.02  # s, between two questions for the modes of safety module and controllers
