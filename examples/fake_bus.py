@@ -1,4 +1,4 @@
-"""A motor bus that is none: what `bus_driver.py` needs of yours, the methods and attributes of this class."""
+"""A simulated motor bus: `bus_driver.py` needs a bus with the methods and attributes of this class."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,15 +7,15 @@ from wam_description.signals import State
 
 
 class FakeBus:
-    """Motors with inertia and damping; replace it by yours, with the same methods and attributes.
+    """Motors with inertia and damping; replace it by your bus.
 
     Attributes
     ----------
     position, velocity, current : of the motors, rad, rad/s, A, as measured.
-    is_running : whether they are known; until then `exchange` starts the motors.
-    advice : what a person has to do before the motors may be released, '' where nothing.
-    trouble : why they were braked, as an exception; None where there is no reason.
-    counts : of errors that are no fault, for the diagnostics.
+    is_running : whether these are known; until then `exchange` starts the motors.
+    advice : what a person has to do before the motors may be released, '' if nothing.
+    trouble : why the motors were braked, as an exception; None if they were not.
+    counts : numbers of errors that are not a fault, for the diagnostics.
     """
 
     INERTIA, DAMPING = 2e-3, 0.02  # kg m^2, N m s/rad

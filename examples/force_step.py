@@ -1,7 +1,7 @@
 """A node of your own: touch the foam box, press 5 N, then 10 N, print what was measured, brake.
 
 Start the stack in one terminal, `wam up`, and this in another, `python3 examples/force_step.py`.
-It needs nothing of this package: topics and one service are the whole contract (docs/topics.md).
+It does not import this package: it needs only topics and one service (docs/topics.md).
 """
 
 import sys

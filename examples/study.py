@@ -1,4 +1,4 @@
-"""A study of three cases, to be copied: the force that the testbed reaches, by the force that is commanded.
+"""An example of a study with three cases: the force that the testbed reaches, for each commanded force.
 
 python3 examples/study.py --seeds 1 2 --jobs 2
 """

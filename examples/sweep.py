@@ -2,7 +2,7 @@
 
     python3 examples/sweep.py --gains 100 --picture sweep.png
 
-The stability guard is off, so that the unstable gains are seen, too; its verdict is drawn as a line.
+The stability guard is off, so that unstable gains are shown, too; a line shows the largest gain that it accepts.
 """
 
 import argparse

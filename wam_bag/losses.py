@@ -111,7 +111,7 @@ class Losses(NamedTuple):
             listed = ", ".join(f"{count} of {where}" for where, count in self.at_end.items())
             lines.append(f"Lost at the end: {listed}.")
         if self.unfinished:
-            lines.append(f"Lost at the end: not known of {self.unfinished}, which gave no final count.")
+            lines.append(f"Lost at the end: not known for {self.unfinished}, which published no final count.")
         if self.uncounted:
             lines.append(
                 "The recorder wrote no counts, because it was killed or its disk was full: further losses are unknown."

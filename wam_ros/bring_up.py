@@ -144,7 +144,7 @@ class Processes(Closing):
             recorder.terminate()
             self._wait_for_recorder(recorder)
         if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
-            self.bag_failure = f"the recorder ended with code {code}; what it wrote may lack messages"
+            self.bag_failure = f"the recorder ended with code {code}; the bag may lack messages"
         elif was_first and others:
             self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
         self._stack.close()
@@ -249,10 +249,10 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 def _ending(code: int) -> str:
     """How a process ended that should not have, in words."""
     if code > 0:
-        return f"ended by itself with code {code}; why, it has printed above"
+        return f"ended by itself with code {code}; it printed the reason above"
     number = -code
     name = signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
-    cause = "; the system does that where memory is short" if name == "SIGKILL" else ""
+    cause = "; the system does that if memory is short" if name == "SIGKILL" else ""
     return f"was ended from outside by {name}{cause}"
 
 

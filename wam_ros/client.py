@@ -223,7 +223,7 @@ class StackClient(Closing):
         question, limit = DescribeParameters.Request(names=list(names)), CALL_LIMITS.answer
         answer = self.answer(client, question, limit) if self.wait(client.service_is_ready, limit) else None
         if answer is None:
-            raise NoAnswerError(f"node '{node}' does not describe its parameters within {limit:g} s; {START}")
+            raise NoAnswerError(f"node '{node}' does not answer with its parameters within {limit:g} s; {START}")
         return [found.name for found in answer.descriptors if not found.read_only]
 
     # statuses and topics

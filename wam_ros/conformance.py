@@ -50,7 +50,7 @@ class Conformance:
         for key in REQUIREMENTS:
             row = ConformanceRow(key, NOT_TESTED, blocked) if blocked else self.row(key)
             if key == "interface" and row.verdict == WRONG:
-                blocked = "the interface is not there"
+                blocked = "the interface is missing"
             yield row
         self._bench.brake()
 
@@ -73,6 +73,6 @@ class Conformance:
             pause = bench.longest_pause
             left, held_up = (left, held_up - 1) if pause > CONFORMANCE_LIMITS.pause else (left - 1, held_up)
         if row.verdict != OK and not held_up:
-            late = f"this computer held up the test itself, last by {1e3 * pause:.0f} ms"
+            late = f"this computer delayed the test itself, last by {1e3 * pause:.0f} ms"
             row = ConformanceRow(key, NOT_TESTED, f"{row.found} ({late})")
         return row

@@ -39,7 +39,7 @@ def _rate(bench: DriverBench) -> str:
     share = len(states) * period * 1e-9 / elapsed
     if not bench.contract.least_share <= share <= 1.0 + 2 * CONFORMANCE_LIMITS.period_error:
         busy, cores = os.getloadavg()[0], os.cpu_count() or 1
-        why = f"; {busy:.0f} processes want the {cores} processors of this machine" if busy > cores else ""
+        why = f"; {busy:.0f} processes compete for the {cores} processors of this machine" if busy > cores else ""
         return f"{len(states)} states in {elapsed:.2f} s, {share:.0%} of the periods{why}"
     return ""
 
@@ -239,7 +239,7 @@ def _discard(bench: DriverBench) -> str:
         return f"enable, straight after a command, is refused: '{text}'"
     bench.watch(CONFORMANCE_LIMITS.settle)
     if bench.last_flow():
-        return "a current of before flows"
+        return "the current of an earlier command flows"
     return "" if bench.status.since > since else f"since stays {since} ns"
 
 

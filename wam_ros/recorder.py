@@ -311,7 +311,8 @@ def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:
     at_end = [f"{c.lost_at_end} of {c.topic} from {c.publisher}" for c in listed if c.lost_at_end]
     printed = [f"{sum(c.received for c in listed)} messages"]
     printed += [f"lost: {', '.join(lost)}"] * bool(lost) + [f"lost at the end: {', '.join(at_end)}"] * bool(at_end)
-    printed += [f"lost at the end: not known of {', '.join(unfinished)}, which gave no final count"] * bool(unfinished)
+    silent = f"lost at the end: not known for {', '.join(unfinished)}, which published no final count"
+    printed += [silent] * bool(unfinished)
     return ", ".join([*printed, *["none lost"] * (len(printed) == 1)])
 
 

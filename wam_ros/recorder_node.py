@@ -222,8 +222,8 @@ class RecorderNode(TolerantNode):
         self.recorder.finish(unfinished)
         counts = summary(self.recorder.counts(), unfinished)
         if self.recorder.failure:
-            lost = f"{self.recorder.lost_at_disk} of the messages that came are not in it"
-            self.get_logger().error(f"{self.recorder.failure}; {lost}; that came: {counts} on the way")
+            lost = f"{self.recorder.lost_at_disk} of the received messages are not in the bag"
+            self.get_logger().error(f"{self.recorder.failure}; {lost}; received: {counts} on the way")
         elif self.recorder.lost_at_end() or unfinished:
             self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:

@@ -328,7 +328,7 @@ def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     errors = [line for line in stack.said().splitlines() if line.startswith("error: ")]
-    cause = f"error: node {named} was ended from outside by SIGKILL; the system does that where memory is short"
+    cause = f"error: node {named} was ended from outside by SIGKILL; the system does that if memory is short"
     assert errors[0] == f"{cause}; all others are stopped now", "the cause comes first"
     assert errors[-1] == f"{cause}; all others were stopped"
     assert stack.process.returncode == 9

@@ -527,7 +527,7 @@ def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_pa
     ros.wait(lambda: received(node, "/diagnostics") == 3)
     ros.remove(node)
     lost = "lost at the end: 3 of /wam/motor_states from driver"
-    unknown = "lost at the end: not known of gravity, transform, which gave no final count"
+    unknown = "lost at the end: not known for gravity, transform, which published no final count"
     assert f"10 messages, {lost}, {unknown}" in capfd.readouterr().err
     bag = read(tmp_path / "bag")
     assert bag.metadata["recording"]["/wam/motor_states driver lost_at_end"] == "3"
@@ -535,7 +535,7 @@ def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_pa
     assert found.at_end == {"/wam/motor_states from driver": 3}
     assert found.sentences(0) == [
         "Lost at the end: 3 of /wam/motor_states from driver.",
-        "Lost at the end: not known of gravity, transform, which gave no final count.",
+        "Lost at the end: not known for gravity, transform, which published no final count.",
     ]
 
 

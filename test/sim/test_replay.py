@@ -268,7 +268,7 @@ def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
     done = Replay("gravity", "realtime", (different,), (), ())
     assert stated(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
     (why,) = reasons(done)
-    assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity took what was newest")
+    assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity used the newest inputs")
     assert reasons(done._replace(mode="lockstep")) == []
 
 

@@ -60,7 +60,7 @@ def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
     if rotors <= SHAFT.drowned * cables:
         return ""
     return (
-        "Friction, ripple and efficiency of the motors were not measured: the rotors need up to "
+        "Friction and efficiency of the motors were not measured: the rotors need up to "
         f"{shown(rotors, 'N m')} to accelerate, but the cables carry only {shown(cables, 'N m')}. So the motors "
         "of this recording are velocity sources, and their torque does not show the losses."
     )

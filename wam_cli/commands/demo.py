@@ -95,7 +95,7 @@ def run(given: argparse.Namespace) -> int:
             print(f"next: {command}", file=stream)
         return 1
     bag_word = shlex.quote(str(bag))
-    print(f"next     wam live {bag_word}       # the recording in the browser, to play and to scrub")
+    print(f"next     wam live {bag_word}       # the recording in the browser")
     print(f"         wam analyse {bag_word}    # measured and compared with theory")
     return exit_code_of(stated.unmet)
 

@@ -123,7 +123,7 @@ def _samples(given: argparse.Namespace) -> int:
         print(_stated(entry, folder, not found))
     size = sum(entry.size for entry in entries.values())
     if size >= LIMIT:
-        wrong.append(f"the samples have {size} bytes together; {LIMIT} are allowed: cut less in their experiments")
+        wrong.append(f"the samples have {size} bytes together; {LIMIT} are allowed: shorten them in their experiments")
     print("\n".join(wrong) if wrong else f"every sample is as the index lists it, {size / 1e6:.2f} MB together")
     return 1 if wrong else 0
 

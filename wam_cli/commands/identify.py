@@ -105,7 +105,7 @@ def run(given: argparse.Namespace) -> int:
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         write_overlay(given.write, _base(given), values, command)
-        print(f"written: {given.write}; use it with --config {given.write}, or as base: of a configuration of yours")
+        print(f"written: {given.write}; use it with --config {given.write}, or as base: of your own configuration")
     return 0
 
 
@@ -114,12 +114,11 @@ def _warn(run: RecordedRun, against: Sequence[str]) -> None:
     for text in against:
         print(f"CONTRADICTS the configuration: {text}")
     if run.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
-        print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
+        print("warning: recorded with dither, so all values are wrong; record with timing.dither_cycle 0")
     if loads := " and ".join(loaded(run)):
         print(
-            f"warning: {loads} of the recording: what acted on the arm is in the values above, and not in their "
-            "standard errors; identify from free motion. A contact where nothing was comes from a model that is off, "
-            "as before an identification"
+            f"warning: {loads} of the recording. This changes the values above, and their standard errors do not show "
+            "it; identify from motion without contact. If nothing touched the arm, the present model is wrong"
         )
 
 
@@ -151,7 +150,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
     record = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
-    print(f"written: {given.excite}; on an arm of yours: {record}", flush=True)
+    print(f"written: {given.excite}; on a real arm: {record}", flush=True)
     if given.only_write:
         return None
     folder = given.directory or writable_directory("bags")

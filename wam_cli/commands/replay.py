@@ -58,10 +58,8 @@ def without_effect(values: list[str], done: Replay) -> list[str]:
     """That nothing has changed with new values, which one would else take for a result."""
     if not values or not done.is_same:
         return []
-    why = f"either the recording had these values, or with its other parameters they have no effect on {done.node}"
-    return [
-        f"nothing changed with {', '.join(values)}: {why}, as the model of friction has none with use_joint_sensors"
-    ]
+    why = f"either the recording had these values, or they have no effect on {done.node} with its other parameters"
+    return [f"nothing changed with {', '.join(values)}: {why}. For example, friction has none with use_joint_sensors"]
 
 
 def reasons(done: Replay) -> list[str]:
@@ -72,8 +70,8 @@ def reasons(done: Replay) -> list[str]:
     gaps = done.gaps if done.mode != "realtime" or done.lost else ()  # else the driver left periods out itself
     if gaps:
         lines.append(
-            f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
-            "rest of it, and after a gap the outputs follow from a different state"
+            f"the bag lacks inputs of {done.node}: without one the node has no output, in lockstep perhaps for the "
+            "rest of the bag; after a gap its state differs"
         )
         lines += [
             f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
@@ -85,8 +83,8 @@ def reasons(done: Replay) -> list[str]:
     if done.mode == "realtime" and different:
         lines.append(
             f"recorded in realtime: {different} of {compared} messages ({100.0 * different / compared:.1f} %) differ: "
-            f"{done.node} took what was newest when it worked, and the bag knows the order of arrival only roughly, "
-            "from when the recorder received it. Only a lockstep recording can be the same bit for bit"
+            f"{done.node} used the newest inputs, but the bag has only the order in which the recorder received them. "
+            "Only a lockstep recording can be the same bit for bit"
         )
     return lines
 

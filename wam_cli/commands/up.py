@@ -83,7 +83,7 @@ def run(given: argparse.Namespace) -> int:
             print(f"node {node} has ended; all were stopped")
     if given.scenario and "scenario" in ended and not any(ended.values()):
         bag = "BAG" if given.record else "BAG, of a run with --record,"
-        print(f"played; whether its commands were carried out: {command('wam analyse', bag, '--steps')}")
+        print(f"played; to see whether its commands were carried out: {command('wam analyse', bag, '--steps')}")
     for failure in failures:
         print(f"error: {failure}; all others were stopped", file=sys.stderr)
     if stack.bag_failure:
