@@ -386,7 +386,7 @@ def test_two_publishers_of_the_same_joints_are_said_and_make_no_cycle(late: floa
     other = at_rest(time, ["a", "b"], 45) + np.array([0.3, 0.0])
     sent += joints("/joint_states", time + late, ["a", "b"], position=other)
     analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
-    assert "two publishers take turns; the topic is not analysed (a)" in " ".join(analysis.sections[0].sentences)
+    assert "two publishers took turns; the topic is not analysed (a)" in " ".join(analysis.sections[0].sentences)
     assert not numbers
 
 
@@ -406,7 +406,7 @@ def section(analysis: Analysis, key: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
-    ("commands", "origin"), [(("left", "right"), "it was not commanded"), (("left",), "no command of it")]
+    ("commands", "origin"), [(("left", "right"), "it was not commanded"), (("left",), "its command is not known")]
 )
 def test_of_two_robots_neither_has_the_command_of_the_other(commands: str, origin: str, tmp_path: Path) -> None:
     time, names = np.arange(0.0, 10.0, 0.01), ["joint1", "joint2"]
