@@ -21,7 +21,7 @@ tune(own) : take new live parameters, or refuse them with ParameterError.
 owns : name of a group of shared parameters that are live at this node, taken by ``retune(group)``.
 follows : a `Followed` group of parameters of another node; its values there go to ``retune(group)``, or the arm brakes.
 take_status(status) : called with the `NodeStatus` that any other node reports; it may return outputs.
-services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
+services : names of methods, each of which answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
 requests : list of `Call` and `SetParameters`, filled by steps; made in order before the step's outputs are published.
 refused(message) : outputs in place of the step's where one of them is refused; none without it.
 refusals : by topic, why the present input is not used, as an `Event` or in words; reported once for each message.
