@@ -107,6 +107,7 @@ clean:  ## remove .venv, caches and build files; recordings stay
 $(STAMPS)/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "wam_stack needs Python 3.11 or newer: make PYTHON=python3.12 ..." >&2; exit 1; }
+	@echo "Making $(VENV)"
 	@$(PYTHON) -m venv --clear $(VENV) || { \
 		echo "Could not make $(VENV); on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	@mkdir -p $(STAMPS) && touch $@

@@ -264,7 +264,8 @@ def _changes(name: str, old: Any, new: Any) -> list[str]:
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         pairs = enumerate(zip(old, new, strict=True))
         return [f"  {name}[{i}]: {one}, now {other}" for i, (one, other) in pairs if one != other]
-    return [f"  {name}: {textwrap.shorten(f'{old}, now {new}', LONGEST_DIFFERENCE)}"]
+    before = "not given" if old is None else old
+    return [f"  {name}: {textwrap.shorten(f'{before}, now {new}', LONGEST_DIFFERENCE)}"]
 
 
 def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:

@@ -289,7 +289,7 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
 
     if field.kind is str or field.kind is bool:
         if not isinstance(value, field.kind):
-            raise refuse(f"a {field.kind.__name__}")
+            raise refuse("true, false" if field.kind is bool else f"a text in quotes, as '{value}'")
         if field.choices and value not in field.choices:
             raise refuse(field.allowed)
         return value

@@ -47,7 +47,7 @@ def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> 
                 raise ValueError(f"not pushed: {refusal}")
     except TimeoutError as error:
         stated = "the push ended" if begin else "not pushed"
-        raise ValueError(f"{stated}: {error}; wam call resume") from error
+        raise ValueError(f"{stated}: {error}") from error
     finally:
         release(hold, stamp)
     return (stamp - begin) / 1e9
@@ -62,7 +62,7 @@ def release(hold: HeldTopic, stamp: int) -> None:
 
 def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
     if PAUSED in statuses["driver"].facts:
-        raise TimeoutError("the arm is paused")
+        raise TimeoutError("the arm is paused; wam call resume")
 
 
 def _state(driver: NodeStatus) -> str:

@@ -332,6 +332,8 @@ class RunningArm:
         """
         if self._composition is None:
             self.start(configuration=playing(steps, self._folder, **start))
+        elif steps or start or "scenario" not in self.configuration.shared.nodes:
+            raise ValueError("the arm has been started already; call play in its place, with what start takes")
         assert self._composition is not None
         played = self._composition.play()
         self.close()

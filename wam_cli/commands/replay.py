@@ -94,7 +94,8 @@ def stated(topic: Compared) -> str:
     line = f"{topic.topic}: {topic.compared} messages, "
     if topic.different:
         share = 100.0 * topic.different / topic.compared
-        line += f"{topic.different} differ ({share:.1f} %), at most by {topic.largest:.6g} {topic.unit}".rstrip()
+        line += f"{topic.different} differ ({share:.1f} %)"
+        line += f", at most by {topic.largest:.6g} {topic.unit}".rstrip() if topic.largest else ""
     else:
         line += "the same bit for bit" if topic.compared else "none on both sides"
     if topic.only_recorded or topic.only_replayed:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError
+from wam_description.parameters import ParameterError, require
 from wam_driver.bus.frames import HOST, Frame
 from wam_driver.bus.parameters import SIMULATED, BusParameters
 from wam_driver.bus.simulator import SimulatedBus
@@ -81,6 +81,7 @@ def line_of(shared: Shared, own: BusParameters, clock: Any) -> Line:
         where python-can is not installed, or cannot open the bus.
     """
     if own.interface == SIMULATED:
+        require(own.channel.isdigit(), f"channel of a simulated bus is '{own.channel}'; give its firmware, as '200'")
         return SimulatedBus(shared, own, int(own.channel))
     try:
         import can
