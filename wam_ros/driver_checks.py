@@ -99,7 +99,7 @@ def _velocity(bench: DriverBench) -> str:
         if travelled < CONFORMANCE_LIMITS.least_travel:
             continue
         compared.append(name)
-        if abs(integral - moved) > 0.1 * travelled:
+        if abs(integral - moved) > CONFORMANCE_LIMITS.rate_error * travelled:
             return f"{name} moved {moved:.4f} rad, the integral of its velocity is {integral:.4f} rad"
     if not compared:
         raise Untested(f"no motor moved {CONFORMANCE_LIMITS.least_travel} rad; give a larger --current")

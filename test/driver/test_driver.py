@@ -524,9 +524,11 @@ def test_wrong_value_is_refused_with_its_name_and_what_is_allowed(prefix: str, f
     key, value = prefix + field.name, present(prefix, field)
     bad: list[tuple[object, str]] = []
     if field.kind is bool:
-        bad += [(1, "a bool"), ("yes", "a bool")]
+        bad += [(1, "true, false"), ("yes", "true, false")]
     elif field.kind is str:
-        bad += [(1, "a str")] + [("nonsense", "one of " + ", ".join(field.choices))] * bool(field.choices)
+        bad += [(1, "a text in quotes, as '1'")] + [("nonsense", "one of " + ", ".join(field.choices))] * bool(
+            field.choices
+        )
     else:
         bad += [("much", "a number"), (True, "a number"), (math.nan, ""), (math.inf, "")]
         bad += [(field.low - 1, field.allowed)] * math.isfinite(field.low)

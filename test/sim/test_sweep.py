@@ -198,7 +198,7 @@ def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_
     ("axes", "words"),
     [
         ((f"{GAIN}=0.001", f"{GAIN}=0.01"), f"--vary has {GAIN} 2 times"),
-        (("scenario:script=a,b",), "the scenario is that of --scenario"),
+        (("scenario:script=a,b",), "give the scenario as --scenario"),
         (("timing.mode=lockstep,realtime",), "--vary timing.mode has no effect in runs without ROS"),
         (("driver:late_periods=0.1,1.0",), "--vary driver:late_periods has no effect .* play 'wam demo' with each"),
         ((f"{GAIN}=0.001,0.01", "--set=timing.real_time_factor=2.0"), "--set timing.real_time_factor has no effect"),

@@ -37,6 +37,7 @@ Maker = Callable[[AnalysedRecording], Section | None]
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
     *OF_STEPS, "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
+    "contact/tracked_friction",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",

@@ -41,8 +41,7 @@ class BusFault(Enum):
     @property
     def loses_controllers(self) -> bool:
         """Whether the start has to be repeated."""
-        kept = (BusFault.SAFETY_IDLE, BusFault.CONTROLLER_IDLE, BusFault.FOREIGN, BusFault.DOUBLED)
-        return self not in kept
+        return self not in (BusFault.SAFETY_IDLE, BusFault.CONTROLLER_IDLE, BusFault.FOREIGN, BusFault.DOUBLED)
 
 
 class Trouble(Exception):

@@ -61,8 +61,7 @@ def _listed(found: Iterable[Frame], version: int) -> Iterator[str]:
 def in_words(frame: Frame, version: int) -> str:
     """A frame: who sends it to whom, and what; the names of properties are those of a version of the firmware."""
     start = f"{frame.identifier:03x} {frame.data.hex(' '):24}{_node(frame.sender)}"
-    found = frames.read(frame)
-    if found:
+    if found := frames.read(frame):
         name = "P" if found.number is None else _name(found.number, version, found.node)
         return f"{start} has {name} = {found.value}"
     if not frame.data:

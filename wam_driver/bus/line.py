@@ -68,7 +68,7 @@ def incoming(line: Line, seconds: float) -> Iterator[Frame]:
     """Frames that come within a time, s."""
     end = line.now() + seconds
     while (left := end - line.now()) > 0.0:
-        if (frame := line.receive(left)) is not None:
+        if frame := line.receive(left):
             yield frame
 
 

@@ -22,5 +22,4 @@ def faults(pendant: int) -> list[str]:
 
 def pendant_of(*faulty: str) -> int:
     """The property PEN with lamps of faults, without buttons, segments and warnings."""
-    lamps = (FAULT if name in faulty else SAFE for name in WATCHED)
-    return 3 << 26 | sum(lamp << 3 * at for at, lamp in enumerate(lamps))
+    return 3 << 26 | sum((FAULT if name in faulty else SAFE) << 3 * at for at, name in enumerate(WATCHED))
