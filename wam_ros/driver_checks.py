@@ -90,16 +90,19 @@ def _velocity(bench: DriverBench) -> str:
     compared = []
     for i, name in enumerate(bench.contract.motors):
         moved = travelled = integral = 0.0
+        finest = math.inf  # step of the encoder, rad
         for before, after in pairwise(states):
             step = after.message.position[i] - before.message.position[i]
             moved += step
             travelled += abs(step)
+            finest = min(finest, abs(step) or math.inf)
             dt = (after.stamp - before.stamp) * 1e-9
             integral += 0.5 * (before.message.velocity[i] + after.message.velocity[i]) * dt
         if travelled < CONFORMANCE_LIMITS.least_travel:
             continue
         compared.append(name)
-        if abs(integral - moved) > CONFORMANCE_LIMITS.rate_error * travelled:
+        # of few counts that are read between other frames, at intervals that vary, the rates are off by their root
+        if abs(integral - moved) > 0.1 * travelled + math.sqrt(travelled * finest):
             return f"{name} moved {moved:.4f} rad, the integral of its velocity is {integral:.4f} rad"
     if not compared:
         raise Untested(f"no motor moved {CONFORMANCE_LIMITS.least_travel} rad; give a larger --current")

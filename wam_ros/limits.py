@@ -94,8 +94,6 @@ class ConformanceLimits:
     start: float = 60.0  # s, for a driver to appear on a busy machine
     person: float = 600.0  # s, for a person to do what the driver waits for
     least_travel: float = 0.02  # rad, below which a velocity cannot be compared
-    # of the travel: encoders of few counts that are read between other frames, at intervals that vary
-    rate_error: float = 0.25
     period_error: float = 0.05  # largest relative difference of the period
     vanish: float = 5.0  # s, for a publisher to vanish
 

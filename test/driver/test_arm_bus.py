@@ -130,10 +130,10 @@ def test_the_arm_is_reached_over_a_bus_of_python_can(interface: str, channel: st
     rig = Rig(via=lambda bus: Served(bus, interface, channel))
     rig.enable()
     rig.run(0.05)
+    # before the end: the idle arm moves on until its thread ends
+    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=0.2)
     rig.arm.close()
     assert rig.arm.trouble is None
-    # the idle arm moves on until its thread ends, on a busy computer for longer
-    assert rig.arm.state.position == pytest.approx(rig.plant.theta, abs=1.0)
     assert rig.arm.counts["lost replies"] == rig.arm.counts["other frames"] == 0
 
 

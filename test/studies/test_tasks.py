@@ -80,8 +80,9 @@ def test_a_picture_of_a_task_is_drawn_from_its_sample(tmp_path: Path) -> None:
 
 def test_the_documentation_shows_every_task() -> None:
     page = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
+    assert "`wam demo --task NAME`" in page
     for name in tasks():
-        assert f"`{name}`" in page
+        assert f"**`{name}`**" in page
         assert f"tasks/{name}.png" in page
         assert (ROOT / "docs" / "tasks" / f"{name}.png").is_file()
     assert "MISSED" not in page
