@@ -11,9 +11,8 @@
 - movable: parameters of what the arm can move, and of what moves by itself
 - transmission_map: motors to joints and back, (A.5)
 - small_matrices: inverse and solution of a few equations
-- rigid_body, jacobian: kinematics and dynamics of the links; the hand Jacobian (A.7) in closed form
-- mjcf, urdf: the arm as a model for MuJoCo and for ROS; frames: its frames as transforms
-- ros2_control: the URDF with the tag for controllers of ros2_control
+- rigid_body: kinematics and dynamics of the links
+- mjcf, urdf: the arm as a model for MuJoCo and for ROS; xml_element: their numbers; frames: its frames as transforms
 - mjcf_objects: free bodies and doors in the model for MuJoCo
 - contact_pairs: what may touch what, and the law of each contact force
 - wiring, synchroniser: declaration of a node; its inputs brought together by stamp

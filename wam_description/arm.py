@@ -13,8 +13,8 @@ import numpy as np
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
-from wam_description.parameters import lengths, parameter, require, tunable
-from wam_description.parts import Joints, Links, Motors, distinct
+from wam_description.parameters import aligned, lengths, named, parameter, require, rows, tunable
+from wam_description.parts import Joints, Links, Motors
 from wam_description.thresholds import MODEL
 from wam_description.units import STANDARD_GRAVITY
 
@@ -33,23 +33,22 @@ class Covers:
     names: tuple[str, ...] = parameter("cover names; contacts and pushes use them as frame ids")
     links: tuple[str, ...] = parameter("link that carries the cover")
     origin: tuple[float, ...] = parameter(
-        "origin of the cover's frame in its link's frame, x y z", "m", low=-3.0, high=3.0
+        "origin of the cover's frame in its link's frame, x y z", "m", low=-3.0, high=3.0, width=3
     )
     rotation: tuple[float, ...] = parameter(
-        "rotation from the link's axes to the cover's, roll pitch yaw", "rad", low=-6.3, high=6.3
+        "rotation from the link's axes to the cover's, roll pitch yaw", "rad", low=-6.3, high=6.3, width=3
     )
     length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", low=0.0, high=3.0)
     start: tuple[float, ...] = parameter(
-        "start of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0
+        "start of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
     )
-    end: tuple[float, ...] = parameter("end of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0)
+    end: tuple[float, ...] = parameter(
+        "end of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
+    )
     radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4, high=0.5)
 
     def __post_init__(self) -> None:
-        distinct("arm.covers", self.names)
-        lengths("arm.covers", self.names, {"links": self.links, "length": self.length, "radius": self.radius})
-        spatial = {key: getattr(self, key) for key in ("origin", "rotation", "start", "end")}
-        lengths("arm.covers", self.names, spatial, width=3)
+        named("arm.covers", self, least=1)
 
     def length_of(self, name: str) -> float:
         """Length of the tube of this name, m."""
@@ -128,22 +127,24 @@ class Arm:
 
     def _require_joined(self) -> None:
         """Refuse covers that do not end where the kinematics have the next joint, or the tool."""
-        covers, joints, links = self.covers, self.joints, self.links.names
-        for k, name in enumerate(covers.names):
-            three = slice(3 * k, 3 * k + 3)
-            x = _turned_x(covers.rotation[three])
-            ends = [start + covers.length[k] * along for start, along in zip(covers.origin[three], x, strict=True)]
-            link = links.index(covers.links[k])
-            coupled = f"; a longer {name} changes arm.covers.length and end, {{}}, and arm.links.mass, centre, inertia"
+        joints, links = rows(self.joints), self.links.names
+        for cover in rows(self.covers):
+            x = _turned_x(cover.rotation)
+            ends = [start + cover.length * along for start, along in zip(cover.origin, x, strict=True)]
+            link = links.index(cover.link)
+            coupled = (
+                f"; a longer {cover.name} changes arm.covers.length and end, {{}}, and arm.links.mass, centre, inertia"
+            )
             if link + 1 < len(links):
-                twist, offset = joints.twist[link + 1], joints.offset[link + 1]
-                joint = (joints.length[link + 1], -math.sin(twist) * offset, math.cos(twist) * offset)
-                here = f"arm.joints.offset and length of {joints.names[link + 1]}, arm.covers.origin"
-                where = f"{joints.names[link + 1]} is at {_point(joint)} m"
+                following = joints[link + 1]
+                twist, offset, name = following.twist, following.offset, following.name
+                joint = (following.length, -math.sin(twist) * offset, math.cos(twist) * offset)
+                here = f"arm.joints.offset and length of {name}, arm.covers.origin"
+                where = f"{name} is at {_point(joint)} m"
                 beyond = [end - there for end, there in zip(ends, joint, strict=True)]
                 along = sum(a * b for a, b in zip(beyond, x, strict=True))
                 across = math.sqrt(max(0.0, sum(a * a for a in beyond) - along * along))
-                across = max(0.0, across - covers.radius[k])  # the axis of a joint may cross the tube anywhere
+                across = max(0.0, across - cover.radius)  # the axis of a joint may cross the tube anywhere
                 apart = math.hypot(along, across)
             else:
                 here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
@@ -153,39 +154,41 @@ class Arm:
                 apart = max(0.0, short) if is_on_axis else 0.0  # a tool may be beyond the link or next to it
             require(
                 apart <= MODEL.same_point,
-                f"{name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {links[link]}, but {where}"
+                f"{cover.name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {cover.link}, but "
+                + where
                 + coupled.format(here),
             )
-            before = (-joints.length[link], 0.0, -joints.offset[link])  # the joint before, in this link's frame
-            origin = covers.origin[three]
+            own = joints[link]
+            before = (-own.length, 0.0, -own.offset)  # the joint before, in this link's frame
             require(
-                min(math.hypot(*origin), math.dist(origin, before)) <= MODEL.same_point,
-                f"{name}: arm.covers.origin is {_point(origin)} m; its link begins at (0, 0, 0) or, by "
-                f"arm.joints.offset of {joints.names[link]}, at {_point(before)}"
+                min(math.hypot(*cover.origin), math.dist(cover.origin, before)) <= MODEL.same_point,
+                f"{cover.name}: arm.covers.origin is {_point(cover.origin)} m; its link begins at (0, 0, 0) or, by "
+                f"arm.joints.offset of {own.name}, at {_point(before)}"
                 + coupled.format("arm.covers.origin, arm.joints.offset"),
             )
-            far = max(covers.start[3 * k], covers.end[3 * k])
+            far = max(cover.start[0], cover.end[0])
             require(
-                far <= covers.length[k] + MODEL.same_point,
-                f"{name}: the tube ends at {far:g} m, arm.covers.end, but arm.covers.length is {covers.length[k]:g} m"
+                far <= cover.length + MODEL.same_point,
+                f"{cover.name}: the tube ends at {far:g} m, arm.covers.end, but arm.covers.length is {cover.length:g} m"
                 + coupled.format(here),
             )
 
     def _require_plausible(self) -> None:
         """Refuse links that this arm cannot have, such as values in other units."""
-        joints, links = self.joints, self.carried
+        joints, links = self.joints, rows(self.carried)
         spans = [abs(a) + abs(d) for a, d in zip(joints.length, joints.offset, strict=True)]
         size = sum(spans) + math.hypot(*self.tool)
-        for i, name in enumerate(links.names):
-            centre, inertia = math.hypot(*links.centre[3 * i : 3 * i + 3]), max(links.inertia[3 * i : 3 * i + 3])
+        for link in links:
+            centre, inertia = math.hypot(*link.centre), max(link.inertia)
             require(
                 centre <= size,
-                f"{name}: arm.links.centre is {centre:.3g} m from the link's frame; the whole arm is {size:.3g} m long",
+                f"{link.name}: arm.links.centre is {centre:.3g} m from the link's frame; the whole arm is "
+                f"{size:.3g} m long",
             )
             require(
-                math.sqrt(inertia / links.mass[i]) <= size,
-                f"{name}: arm.links.inertia {inertia:.3g} kg m^2 is more than {links.mass[i]:.3g} kg have at the ends "
-                f"of an arm of {size:.3g} m, {links.mass[i] * size * size:.3g} kg m^2",
+                math.sqrt(inertia / link.mass) <= size,
+                f"{link.name}: arm.links.inertia {inertia:.3g} kg m^2 is more than {link.mass:.3g} kg have at the ends "
+                f"of an arm of {size:.3g} m, {link.mass * size * size:.3g} kg m^2",
             )
         require(
             self.gravity[2] <= 0.0,
@@ -196,8 +199,8 @@ class Arm:
         strength = (np.abs(inverse).T @ self.motors.peak_torque).tolist()
         for i, joint in enumerate(joints.names):
             torque = STANDARD_GRAVITY * sum(
-                mass * (sum(spans[i + 1 : j + 1]) + math.hypot(*links.centre[3 * j : 3 * j + 3]))
-                for j, mass in enumerate(links.mass)
+                link.mass * (sum(spans[i + 1 : j + 1]) + math.hypot(*link.centre))
+                for j, link in enumerate(links)
                 if j >= i
             )
             require(
@@ -379,8 +382,7 @@ class Shared:
             "timing.outer_divisor): commands of outer nodes would always count as absent; raise it, or shorten that",
         )
         self.arm.links.require_bodies()
-        each = ("joint_speed", "joint_acceleration", "joint_jerk")
-        lengths("motion", self.arm.joints.names, {key: getattr(self.motion, key) for key in each})
+        aligned("motion", self.arm.joints.names, self.motion)
 
     def push_excess(self, force: Sequence[float], torque: Sequence[float]) -> str:
         """Why a push is not allowed, '' where it is.

@@ -1,11 +1,11 @@
 """What may touch what, and the law of each contact force."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wam_description.arm import Arm
-from wam_description.movable import Doors, FreeBodies
+from wam_description.parameters import rows
 from wam_description.world import World
 
 
@@ -40,18 +40,13 @@ def contact_pairs(arm: Arm, world: World) -> Iterator[ContactPair]:
 
     Covers that follow each other touch where `World.folding` has a stiffness.
     """
-    obstacles, pushers = world.obstacles, world.pushers
     for cover in arm.covers.names:
-        for i, name in enumerate(obstacles.names):
-            law = obstacles.stiffness[i], obstacles.damping[i], obstacles.hardening[i], obstacles.friction[i]
-            yield _through_cover(ContactPair(cover, name, f"obstacle '{name}'", *law), world.cover_stiffness)
-    for i, name in enumerate(pushers.names):
-        if pushers.force[i] > 0.0:
-            law = pushers.stiffness[i], pushers.damping[i], 0.0, pushers.friction[i]
-            yield ContactPair(pushers.covers[i], name, f"pusher '{name}'", *law)
+        yield from _on_cover(cover, "obstacle", rows(world.obstacles), world.cover_stiffness)
+    for pusher in world.pushers.present:
+        yield from _on_cover(pusher.cover, "pusher", [pusher])
     for cover in arm.covers.names:
-        for pair in (*_on_cover(cover, "body", world.bodies), *_on_cover(cover, "door", world.doors)):
-            yield _through_cover(pair, world.cover_stiffness)
+        yield from _on_cover(cover, "body", world.bodies.present, world.cover_stiffness)
+        yield from _on_cover(cover, "door", world.doors.present, world.cover_stiffness)
     yield from _of_bodies(world)
     folding = world.folding
     for one, other in pairwise(arm.covers.names):
@@ -79,23 +74,23 @@ def _through_cover(pair: ContactPair, stiffness: float) -> ContactPair:
     )
 
 
-def _on_cover(cover: str, what: str, group: FreeBodies | Doors) -> Iterator[ContactPair]:
-    for i in group.present:
-        law = group.stiffness[i], group.damping[i], 0.0, group.friction[i]
-        yield ContactPair(cover, group.names[i], f"{what} '{group.names[i]}'", *law)
+def _on_cover(cover: str, what: str, touched: Sequence[Any], stiffness: float = 0.0) -> Iterator[ContactPair]:
+    """A cover of this stiffness, N/m, 0 for a rigid one, with everything that it may touch."""
+    for one in touched:
+        law = one.stiffness, one.damping, getattr(one, "hardening", 0.0), one.friction
+        yield _through_cover(ContactPair(cover, one.name, f"{what} '{one.name}'", *law), stiffness)
 
 
 def _of_bodies(world: World) -> Iterator[ContactPair]:
     """Contacts that the arm has no part in; of two bodies the softer one counts, and the larger friction."""
-    bodies = world.bodies
-    fixed = [*world.obstacles.names, *(world.doors.names[i] for i in world.doors.present)]
-    for i in bodies.present:
-        law = bodies.ground_stiffness[i], bodies.ground_damping[i], 0.0, bodies.ground_friction[i]
+    bodies = world.bodies.present
+    fixed = [*world.obstacles.names, *(door.name for door in world.doors.present)]
+    for body in bodies:
+        law = body.ground_stiffness, body.ground_damping, 0.0, body.ground_friction
         for other in fixed:
-            yield ContactPair(bodies.names[i], other, f"'{other}' and body '{bodies.names[i]}'", *law, is_shared=False)
-    for i, j in combinations(bodies.present, 2):
-        softer = min(i, j, key=lambda k: bodies.ground_stiffness[k])
-        friction = max(bodies.ground_friction[i], bodies.ground_friction[j])
-        law = bodies.ground_stiffness[softer], bodies.ground_damping[softer], 0.0, friction
-        one, other = bodies.names[i], bodies.names[j]
-        yield ContactPair(one, other, f"bodies '{one}' and '{other}'", *law, is_shared=False)
+            yield ContactPair(body.name, other, f"'{other}' and body '{body.name}'", *law, is_shared=False)
+    for one, other in combinations(bodies, 2):
+        softer = min(one, other, key=lambda body: body.ground_stiffness)
+        friction = max(one.ground_friction, other.ground_friction)
+        law = softer.ground_stiffness, softer.ground_damping, 0.0, friction
+        yield ContactPair(one.name, other.name, f"bodies '{one.name}' and '{other.name}'", *law, is_shared=False)

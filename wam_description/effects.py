@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, option, parameter, require, tunable
+from wam_description.parameters import aligned, option, parameter, require, rows, tunable
 from wam_description.parts import Motors
 
 
@@ -24,8 +24,7 @@ class Ripples:
     phase: tuple[float, ...] = parameter("phase at angle zero", "rad", low=-6.3, high=6.3)
 
     def __post_init__(self) -> None:
-        keys = ("ratio", "amplitude", "cycles", "phase")
-        lengths("effects.ripples", self.shafts, {key: getattr(self, key) for key in keys})
+        aligned("effects.ripples", self.shafts, self)
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,15 @@ class Effects:
         "rad",
         low=0.0,
         high=10.0,
+        is_common=True,
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
-    pretension_share: tuple[float, ...] = tunable(
+    pretension_share: tuple[float, ...] = parameter(
         "active pretension (6.5): fraction of arm.cables.pretension, one for all or one each; it changes at once",
+        low=0.0,
         high=10.0,
+        live=True,
+        is_common=True,
     )
     tension_friction: tuple[float, ...] = parameter(
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
@@ -90,9 +93,7 @@ class Effects:
             f"effects.capstan is {self.capstan:g}, and effects.terminated is true; a cable that ends on its pulleys "
             "does not slip as a whole: set one of them to 0 or false",
         )
-        lengths("effects", arm.joints.names, {"added_coulomb_friction": self.added_coulomb_friction})
-        if len(self.pretension_share) != 1:
-            lengths("effects", motors, {"pretension_share": self.pretension_share})
+        aligned("effects", motors, self)
         for i, (name, pretension, strength) in enumerate(
             zip(motors, cables.pretension, cables.breaking_strength, strict=True)
         ):
@@ -137,8 +138,7 @@ class Effects:
 
     def ripple(self, shaft: str) -> float:
         """Largest torque of the ripples on a motor or joint, N m."""
-        waves = zip(self.ripples.shafts, self.ripples.ratio, self.ripples.amplitude, strict=True)
-        return sum(abs(ratio * amplitude) for name, ratio, amplitude in waves if name == shaft)
+        return sum(abs(one.ratio * one.amplitude) for one in rows(self.ripples) if one.shaft == shaft)
 
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import aligned, parameter
 from wam_description.parts import Joints, Links, Motors
 
 Shafts = TypeVar("Shafts", Motors, Joints)
@@ -34,11 +34,7 @@ def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     ParameterError
         if a list has not one value each, or a payload would tilt the principal axes of the last link.
     """
-    lengths("mismatch", arm.links.names, {"mass": mismatch.mass})
-    lengths("mismatch", arm.motors.names, {"motor_friction": mismatch.motor_friction})
-    lengths("mismatch", arm.motors.names, {"stiffness": mismatch.stiffness})
-    lengths("mismatch", arm.motors.names, {"torque_constant": mismatch.torque_constant})
-    lengths("mismatch", arm.joints.names, {"joint_friction": mismatch.joint_friction})
+    aligned("mismatch", arm.motors.names, mismatch)
     by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
     constants = _scaled(arm.motors.torque_constant, mismatch.torque_constant)

@@ -6,8 +6,8 @@ springs together are the transmission stiffness k_tr on the motor side.
 """
 
 import math
-from collections.abc import Sequence
-from xml.etree import ElementTree
+from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -15,10 +15,11 @@ from wam_description.arm import Arm
 from wam_description.contact_pairs import ContactPair, contact_pairs, folded
 from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
-from wam_description.parameters import lengths, require
-from wam_description.parts import Links, Motors
+from wam_description.parameters import require, rows
+from wam_description.parts import Motors
 from wam_description.thresholds import MODEL
-from wam_description.world import SHAPES, Folding, Obstacles, Pushers, Springs, World
+from wam_description.world import PUSHER_SHAPES, SHAPES, Folding, Pushers, Springs, World
+from wam_description.xml_element import add, text
 
 
 def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
@@ -44,33 +45,33 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
         if an obstacle has the name of a cover, or springs and effects do not fit the arm.
     """
     _refuse_misfits(arm, world, effects)
-    root = ElementTree.Element("mujoco", model=arm.name)
-    _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
+    root = Element("mujoco", model=arm.name)
+    add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
     _add_solver(root, arm, step)
-    bodies = _add(root, "worldbody")
+    bodies = add(root, "worldbody")
     _add_rotors(bodies, effects.dry(arm))
     _add_links(bodies, arm, world.folding)
-    for i, name in enumerate(world.obstacles.names):
-        _add_obstacle(bodies, world.obstacles, i, name, name in world.moving)
+    for obstacle in rows(world.obstacles):
+        _add_obstacle(bodies, obstacle, obstacle.name in world.moving)
     _add_pushers(bodies, world.pushers)
     add_doors(bodies, world.doors)
     add_bodies(bodies, world.bodies)
-    contact = _add(root, "contact")
+    contact = add(root, "contact")
     for pair in contact_pairs(arm, world):
         _add_pair(contact, pair)
-    tendons = _add(root, "tendon")
+    tendons = add(root, "tendon")
     _add_cables(tendons, arm, effects)
     _add_springs(tendons, world.springs)
     _add_actuators(root, arm, effects.ripples)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode")
+    return text(root)
 
 
 def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     motors, joints = arm.motors.names, arm.joints.names
     for name in world.obstacles.names:
         require(name not in arm.covers.names, f"obstacle '{name}' has the name of a cover of the arm; rename it")
-    for name, cover in zip(world.pushers.names, world.pushers.covers, strict=True):
+    for pusher in rows(world.pushers):
+        name, cover = pusher.name, pusher.cover
         taken = (*arm.covers.names, *world.obstacles.names)
         require(name not in taken, f"pusher '{name}' has the name of a cover or an obstacle; rename it")
         known = ", ".join(arm.covers.names)
@@ -81,32 +82,17 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     for name in effects.ripples.shafts:
         shafts = (*motors, *joints)
         require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
-    lengths("effects", motors, {"tension_friction": effects.tension_friction})
-    if len(effects.backlash) != 1:
-        lengths("effects", motors, {"backlash": effects.backlash})
     effects.require_fit(arm)
 
 
-def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, {key: value for key, value in attributes.items() if value})
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def _triple(values: Sequence[float], i: int) -> str:
-    return _numbers(values[3 * i : 3 * i + 3])
-
-
-def _add_solver(root: ElementTree.Element, arm: Arm, step: float) -> None:
+def _add_solver(root: Element, arm: Arm, step: float) -> None:
     # explicit damping: implicitfast omits the terms that couple rotor and joint, which acts like an additional
     # inertia of step x damping on each rotor (5 %) and an error of 0.1 N m in the strain torque
-    option = _add(
+    option = add(
         root,
         "option",
-        timestep=repr(step),
-        gravity=_numbers(arm.gravity),
+        timestep=step,
+        gravity=arm.gravity,
         integrator="Euler",
         solver="Newton",
         cone="elliptic",
@@ -115,97 +101,66 @@ def _add_solver(root: ElementTree.Element, arm: Arm, step: float) -> None:
         noslip_tolerance="0",
     )
     # without autoreset MuJoCo does not put a diverging arm back to zero by itself; the driver stops it instead
-    _add(option, "flag", diagexact="enable", eulerdamp="disable", autoreset="disable")
-    default = _add(root, "default")
+    add(option, "flag", diagexact="enable", eulerdamp="disable", autoreset="disable")
+    default = add(root, "default")
     # a stiff friction constraint: with MuJoCo's own values a stuck joint creeps at about 1 rad/s
-    _add(
+    add(
         default,
         "joint",
         type="hinge",
         axis="0 0 1",
-        solreffriction=_numbers((2 * step, 1.0)),
+        solreffriction=(2 * step, 1.0),
         solimpfriction="0.9999 0.9999 0.001 0.5 2",
-        solreflimit=_numbers((4 * step, 1.0)),
+        solreflimit=(4 * step, 1.0),
     )
-    _add(default, "geom", contype="0", conaffinity="0")
+    add(default, "geom", contype="0", conaffinity="0")
 
 
-def _add_rotors(world: ElementTree.Element, motors: Motors) -> None:
-    for i, name in enumerate(motors.names):
-        body = _add(world, "body", name=f"{name}_rotor", pos=_numbers((-0.3, 0.15 * i, -0.3)))
-        inertia = motors.inertia[i]
-        _add(
-            body,
-            "inertial",
-            pos="0 0 0",
-            mass=repr(MODEL.rotor_mass),
-            diaginertia=_numbers((inertia, inertia, inertia)),
-        )
-        _add(
-            body,
-            "joint",
-            name=name,
-            damping=repr(motors.viscous_friction[i]),
-            frictionloss=repr(motors.static_friction[i]),
-        )
+def _add_rotors(world: Element, motors: Motors) -> None:
+    for i, motor in enumerate(rows(motors)):
+        body = add(world, "body", name=f"{motor.name}_rotor", pos=(-0.3, 0.15 * i, -0.3))
+        add(body, "inertial", pos="0 0 0", mass=MODEL.rotor_mass, diaginertia=[motor.inertia] * 3)
+        add(body, "joint", name=motor.name, damping=motor.viscous_friction, frictionloss=motor.static_friction)
 
 
-def _add_links(world: ElementTree.Element, arm: Arm, folding: Folding) -> None:
-    joints, links, covers = arm.joints, arm.carried, arm.covers
+def _add_links(world: Element, arm: Arm, folding: Folding) -> None:
     parent = world
-    for i, name in enumerate(links.names):
-        twist = joints.twist[i]
-        position = (joints.length[i], -math.sin(twist) * joints.offset[i], math.cos(twist) * joints.offset[i])
-        parent = _add(parent, "body", name=name, pos=_numbers(position), euler=_numbers((twist, 0.0, 0.0)))
-        _add(
-            parent,
-            "inertial",
-            pos=_triple(links.centre, i),
-            mass=repr(links.mass[i]),
-            **_inertia(links, i),
-        )
-        _add(
+    for link, joint in zip(rows(arm.carried), rows(arm.joints), strict=True):
+        twist = joint.twist
+        position = (joint.length, -math.sin(twist) * joint.offset, math.cos(twist) * joint.offset)
+        parent = add(parent, "body", name=link.name, pos=position, euler=(twist, 0.0, 0.0))
+        inertia = {"fullinertia": link.inertia + link.product} if any(link.product) else {"diaginertia": link.inertia}
+        add(parent, "inertial", pos=link.centre, mass=link.mass, **inertia)
+        add(
             parent,
             "joint",
-            name=joints.names[i],
-            range=_numbers((joints.lower[i], joints.upper[i])),
-            armature=repr(joints.armature[i]),
-            damping=repr(joints.viscous_friction[i]),
-            frictionloss=repr(joints.static_friction[i]),
+            name=joint.name,
+            range=(joint.lower, joint.upper),
+            armature=joint.armature,
+            damping=joint.viscous_friction,
+            frictionloss=joint.static_friction,
         )
-        for j, cover in enumerate(covers.names):
-            if covers.links[j] == name:
-                _add_cover(parent, arm, j, cover, folding.clearance if folding.stiffness and j else None)
-    _add(parent, "site", name="tool", pos=_numbers(arm.tool))
+        for i, cover in enumerate(rows(arm.covers)):
+            if cover.link == link.name:
+                _add_cover(parent, i, cover, folding.clearance if folding.stiffness and i else None)
+    add(parent, "site", name="tool", pos=arm.tool)
 
 
-def _inertia(links: Links, i: int) -> dict[str, str]:
-    moments, products = _triple(links.inertia, i), _triple(links.product, i)
-    if any(links.product[3 * i : 3 * i + 3]):
-        return {"fullinertia": f"{moments} {products}"}
-    return {"diaginertia": moments}
-
-
-def _add_cover(body: ElementTree.Element, arm: Arm, i: int, name: str, clearance: float | None) -> None:
-    covers = arm.covers
-    site = {"pos": _triple(covers.origin, i), "euler": _triple(covers.rotation, i)}
-    _add(body, "site", name=f"{name}_frame", **site)
-    rotation = rotation_xyz(*covers.rotation[3 * i : 3 * i + 3])
-    ends = [
-        rotation @ np.array(end[3 * i : 3 * i + 3]) + np.array(covers.origin[3 * i : 3 * i + 3])
-        for end in (covers.start, covers.end)
-    ]
-    geoms = {name: ends[0]}
+def _add_cover(body: Element, i: int, cover: Any, clearance: float | None) -> None:
+    add(body, "site", name=f"{cover.name}_frame", pos=cover.origin, euler=cover.rotation)
+    rotation = rotation_xyz(*cover.rotation)
+    start, end = (rotation @ np.array(one) + np.array(cover.origin) for one in (cover.start, cover.end))
+    geoms = {cover.name: start}
     if clearance is not None:
-        geoms[folded(name)] = ends[0] + clearance * (ends[1] - ends[0]) / float(np.linalg.norm(ends[1] - ends[0]))
-    for geom, start in geoms.items():
-        _add(
+        geoms[folded(cover.name)] = start + clearance * (end - start) / float(np.linalg.norm(end - start))
+    for geom, begin in geoms.items():
+        add(
             body,
             "geom",
             name=geom,
             type="capsule",
-            fromto=_numbers([*start, *ends[1]]),
-            size=repr(covers.radius[i]),
+            fromto=[*begin, *end],
+            size=cover.radius,
             rgba="0.25 0.25 0.28 1" if i % 2 == 0 else "0.35 0.35 0.4 1",
         )
 
@@ -222,51 +177,43 @@ def rotation_xyz(roll: float, pitch: float, yaw: float) -> np.ndarray:
     )
 
 
-def _add_obstacle(world: ElementTree.Element, obstacles: Obstacles, i: int, name: str, moves: bool) -> None:
-    shape = obstacles.shapes[i]
-    size = list(obstacles.sizes[3 * i : 3 * i + 3])
+def _add_obstacle(world: Element, obstacle: Any, moves: bool) -> None:
+    name, shape, size = obstacle.name, obstacle.shape, list(obstacle.size)
     if shape == "plane":
         size[2] = 0.1  # MuJoCo's spacing of the grid lines that it draws
-    pose = {"pos": _triple(obstacles.positions, i), "euler": _triple(obstacles.rotations, i)}
-    parent = _add(world, "body", name=name, mocap="true", **pose) if moves else world
-    _add(
-        parent,
-        "geom",
-        name=name,
-        type=shape,
-        **({} if moves else pose),
-        size=_numbers(size[: SHAPES[shape]]),
-        rgba="0.95 0.75 0.35 1",
-    )
+    pose = {"pos": obstacle.position, "euler": obstacle.rotation}
+    parent = add(world, "body", name=name, mocap="true", **pose) if moves else world
+    own = {} if moves else pose
+    add(parent, "geom", name=name, type=shape, **own, size=size[: SHAPES[shape]], rgba="0.95 0.75 0.35 1")
 
 
-def _add_pushers(world: ElementTree.Element, pushers: Pushers) -> None:
+def _add_pushers(world: Element, pushers: Pushers) -> None:
     """Bodies whose pose the plant prescribes, far away at first."""
-    for i, name in enumerate(pushers.names):
-        if pushers.force[i] == 0.0:
-            continue
-        body = _add(world, "body", name=name, mocap="true", pos=_numbers((MODEL.far_away, MODEL.far_away, float(i))))
-        size = pushers.sizes[3 * i : 3 * i + (1 if pushers.shapes[i] == "sphere" else 3)]
-        _add(body, "geom", name=name, type=pushers.shapes[i], size=_numbers(size), rgba="0.85 0.6 0.5 1")
+    for i, pusher in enumerate(rows(pushers)):
+        if pusher.force > 0.0:
+            away = (MODEL.far_away, MODEL.far_away, i)
+            body = add(world, "body", name=pusher.name, mocap="true", pos=away)
+            size = pusher.size[: PUSHER_SHAPES[pusher.shape]]
+            add(body, "geom", name=pusher.name, type=pusher.shape, size=size, rgba="0.85 0.6 0.5 1")
 
 
-def _add_pair(contact: ElementTree.Element, pair: ContactPair) -> None:
+def _add_pair(contact: Element, pair: ContactPair) -> None:
     friction = pair.friction
-    _add(
+    add(
         contact,
         "pair",
         name=pair.name,
         geom1=pair.first,
         geom2=pair.second,
         condim="3" if friction > 0.0 else "1",
-        friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
+        friction=(friction, friction, 0.0, 0.0, 0.0),
         # with so small an impedance the plant can set the force itself, see wam_driver/surfaces.py
         solimp="0.001 0.001 0.001 0.5 2",
-        solref=_numbers((-pair.stiffness, -pair.damping)),
+        solref=(-pair.stiffness, -pair.damping),
     )
 
 
-def _add_cables(tendons: ElementTree.Element, arm: Arm, effects: Effects) -> None:
+def _add_cables(tendons: Element, arm: Arm, effects: Effects) -> None:
     """Two strands per circuit, each with half the stiffness, pretensioned, unable to push.
 
     With backlash they are the two flanks of a tooth, each with the whole stiffness.
@@ -278,53 +225,45 @@ def _add_cables(tendons: ElementTree.Element, arm: Arm, effects: Effects) -> Non
         if play := effects.play(i):
             stretch, share = -0.5 * play, 1.0
         for strand, springlength in (("tight", (-MODEL.far, -stretch)), ("loose", (stretch, MODEL.far))):
-            tendon = _add(
+            tendon = add(
                 tendons,
                 "fixed",
                 name=f"{motor}_{strand}",
-                stiffness=repr(circuit.stiffness * share),
-                damping=repr(circuit.damping / 2.0),
-                springlength=_numbers(springlength),
-                springyield=repr(MODEL.never_yields),
+                stiffness=circuit.stiffness * share,
+                damping=circuit.damping / 2.0,
+                springlength=springlength,
+                springyield=MODEL.never_yields,
             )
-            _add(tendon, "joint", joint=motor, coef="1")
+            add(tendon, "joint", joint=motor, coef="1")
             for joint, ratio in zip(arm.joints.names, motor_from_joint[i], strict=True):
                 if abs(ratio) > 1e-12:
-                    _add(tendon, "joint", joint=joint, coef=repr(-float(ratio)))
+                    add(tendon, "joint", joint=joint, coef=-ratio)
 
 
-def _add_springs(tendons: ElementTree.Element, springs: Springs) -> None:
-    for i, joint in enumerate(springs.joints):
-        if springs.stiffness[i] == 0.0:
-            continue
-        lever = springs.lever[i]
-        rest = lever * springs.rest[i]
-        tendon = _add(
-            tendons,
-            "fixed",
-            name=f"spring{i}",
-            stiffness=repr(springs.stiffness[i]),
-            springlength=_numbers((rest, rest) if springs.bilateral[i] else (rest, MODEL.far)),
-        )
-        _add(tendon, "joint", joint=joint, coef=repr(lever))
+def _add_springs(tendons: Element, springs: Springs) -> None:
+    for i, spring in enumerate(springs.present):
+        rest = spring.lever * spring.rest
+        length = (rest, rest if spring.bilateral else MODEL.far)
+        tendon = add(tendons, "fixed", name=f"spring{i}", stiffness=spring.stiffness, springlength=length)
+        add(tendon, "joint", joint=spring.joint, coef=spring.lever)
 
 
-def _add_actuators(root: ElementTree.Element, arm: Arm, ripples: Ripples) -> None:
-    actuator = _add(root, "actuator")
+def _add_actuators(root: Element, arm: Arm, ripples: Ripples) -> None:
+    actuator = add(root, "actuator")
     for motor in arm.motors.names:
-        _add(actuator, "motor", name=motor, joint=motor)
-    for i, shaft in enumerate(ripples.shafts):
-        if ripples.amplitude[i] == 0.0:
+        add(actuator, "motor", name=motor, joint=motor)
+    for i, ripple in enumerate(rows(ripples)):
+        if ripple.amplitude == 0.0:
             continue
-        _add(
+        add(
             actuator,
             "dcmotor",
             name=f"ripple{i}",
-            joint=shaft,
+            joint=ripple.shaft,
             input="none",
-            gear=repr(ripples.ratio[i]),
+            gear=ripple.ratio,
             # MuJoCo needs a winding; without input it carries no current
             resistance="1",
             motorconst="0",
-            cogging=_numbers((ripples.amplitude[i], ripples.cycles[i], ripples.phase[i])),
+            cogging=(ripple.amplitude, ripple.cycles, ripple.phase),
         )

@@ -1,11 +1,12 @@
 """Free bodies and doors in the MuJoCo model."""
 
 from collections.abc import Sequence
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from wam_description.movable import BODY_SHAPES, Doors, FreeBodies, principal_inertia
 from wam_description.parameters import require
 from wam_description.world import World
+from wam_description.xml_element import add
 
 DOOR_COLOUR, BODY_COLOUR = "0.70 0.52 0.34 1", "0.36 0.56 0.72 1"
 
@@ -27,48 +28,29 @@ def require_names(world: World, taken: Sequence[str]) -> None:
         require(name not in taken, f"object '{name}' has the name of a part of the arm; rename it")
 
 
-def add_doors(parent: ElementTree.Element, doors: Doors) -> None:
+def add_doors(parent: Element, doors: Doors) -> None:
     """A body on a hinge for each door that has a mass."""
-    for i in doors.present:
-        name, size = doors.names[i], doors.sizes[3 * i : 3 * i + 3]
-        body = _element(
-            parent, "body", name=name, pos=_numbers(doors.positions[3 * i : 3 * i + 3]),
-            euler=_numbers(doors.rotations[3 * i : 3 * i + 3]),
+    for door in doors.present:
+        centre = (door.size[0], 0.0, 0.0)
+        body = add(parent, "body", name=door.name, pos=door.position, euler=door.rotation)
+        _add_inertial(body, centre, door.mass, principal_inertia("box", door.size, door.mass))
+        add(
+            body, "joint", name=hinge_name(door.name), range=(door.lower, door.upper), damping=door.hinge_damping,
+            frictionloss=door.hinge_friction, stiffness=door.spring, springref=door.rest,
         )  # fmt: skip
-        _inertial(body, (size[0], 0.0, 0.0), doors.mass[i], principal_inertia("box", size, doors.mass[i]))
-        _element(
-            body, "joint", name=hinge_name(name), range=_numbers((doors.lower[i], doors.upper[i])),
-            damping=repr(doors.hinge_damping[i]), frictionloss=repr(doors.hinge_friction[i]),
-            stiffness=repr(doors.spring[i]), springref=repr(doors.rest[i]),
-        )  # fmt: skip
-        _element(
-            body, "geom", name=name, type="box", pos=_numbers((size[0], 0.0, 0.0)), size=_numbers(size),
-            rgba=DOOR_COLOUR,
-        )  # fmt: skip
+        add(body, "geom", name=door.name, type="box", pos=centre, size=door.size, rgba=DOOR_COLOUR)
 
 
-def add_bodies(parent: ElementTree.Element, bodies: FreeBodies) -> None:
+def add_bodies(parent: Element, bodies: FreeBodies) -> None:
     """A free body for each one that has a mass."""
-    for i in bodies.present:
-        name, shape = bodies.names[i], bodies.shapes[i]
-        size = bodies.sizes[3 * i : 3 * i + BODY_SHAPES[shape]]
-        body = _element(
-            parent, "body", name=name, pos=_numbers(bodies.positions[3 * i : 3 * i + 3]),
-            euler=_numbers(bodies.rotations[3 * i : 3 * i + 3]),
-        )  # fmt: skip
-        _inertial(body, (0.0, 0.0, 0.0), bodies.mass[i], principal_inertia(shape, size, bodies.mass[i]))
-        _element(body, "freejoint", name=f"{name}_pose")
-        kind = "sphere" if shape == "ball" else shape
-        _element(body, "geom", name=name, type=kind, size=_numbers(size), rgba=BODY_COLOUR)
+    for one in bodies.present:
+        size = one.size[: BODY_SHAPES[one.shape]]
+        body = add(parent, "body", name=one.name, pos=one.position, euler=one.rotation)
+        _add_inertial(body, (0.0, 0.0, 0.0), one.mass, principal_inertia(one.shape, size, one.mass))
+        add(body, "freejoint", name=f"{one.name}_pose")
+        kind = "sphere" if one.shape == "ball" else one.shape
+        add(body, "geom", name=one.name, type=kind, size=size, rgba=BODY_COLOUR)
 
 
-def _inertial(body: ElementTree.Element, centre: Sequence[float], mass: float, inertia: Sequence[float]) -> None:
-    _element(body, "inertial", pos=_numbers(centre), mass=repr(mass), diaginertia=_numbers(inertia))
-
-
-def _element(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, attributes)
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def _add_inertial(body: Element, centre: Sequence[float], mass: float, inertia: Sequence[float]) -> None:
+    add(body, "inertial", pos=centre, mass=mass, diaginertia=inertia)

@@ -4,11 +4,10 @@ The values that a configuration does not give are those of `arm`.  ``wam identif
 their covariance.
 """
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Final
 
-from wam_description.parameters import lengths, like, parameter, require
+from wam_description.parameters import aligned, like, parameter, require
 from wam_description.parts import Joints, Links, Motors
 
 FROM_ARM: Final = "arm"  # source of a model that was not identified
@@ -100,14 +99,8 @@ class ArmModel:
     source: str = parameter("recording that the values were identified from; arm: those of arm")
 
     def __post_init__(self) -> None:
-        n = len(self.motors.inertia)
-        size = ("",) * n
-        lengths("model.links", size, {"mass": self.links.mass})
-        links = self.links
-        spatial = {"centre": links.centre, "inertia": links.inertia, "product": links.product}
-        lengths("model.links", size, spatial, width=3)
-        lengths("model.motors", size, dataclasses.asdict(self.motors))
-        lengths("model.joints", size, dataclasses.asdict(self.joints))
+        for name, part in (("links", self.links), ("motors", self.motors), ("joints", self.joints)):
+            aligned(f"model.{name}", self.motors.inertia, part)
         pairs = {
             "motors.static_positive": (self.motors.static_positive, self.motors.coulomb_positive),
             "motors.static_negative": (self.motors.static_negative, self.motors.coulomb_negative),

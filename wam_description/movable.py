@@ -1,12 +1,13 @@
 """What the arm can move, and what moves by itself: free bodies, doors, moving obstacles."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import named, parameter, require, rows
 
-BODY_SHAPES = {"box": 3, "cylinder": 2, "ball": 1}  # numbers that the size of each needs
+BOX = {"box": 3}  # numbers that the size of a shape needs
+BODY_SHAPES = {**BOX, "cylinder": 2, "ball": 1}
 
 
 @dataclass(frozen=True)
@@ -20,12 +21,13 @@ class FreeBodies:
         "m",
         low=0.0,
         high=10.0,
+        width=3,
     )
     positions: tuple[float, ...] = parameter(
-        "centre at power-up in the base frame, x y z of each", "m", low=-100.0, high=100.0
+        "centre at power-up in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3
+        "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
     )
     mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", low=0.0, high=1e3)
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
@@ -47,17 +49,12 @@ class FreeBodies:
     )
 
     def __post_init__(self) -> None:
-        three = ("sizes", "positions", "rotations")
-        _aligned("world.bodies", self.names, vars(self), three)
-        known = ", ".join(BODY_SHAPES)
-        for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
-            require(shape in BODY_SHAPES, f"{name}: world.bodies.shapes is '{shape}'; allowed: {known}")
-            _positive(name, f"world.bodies.sizes of a {shape}", self.sizes[3 * i : 3 * i + BODY_SHAPES[shape]])
+        require_solids("world.bodies", self, BODY_SHAPES)
 
     @property
-    def present(self) -> tuple[int, ...]:
-        """Indices of the bodies that have a mass."""
-        return tuple(i for i, mass in enumerate(self.mass) if mass > 0.0)
+    def present(self) -> list[Any]:
+        """The bodies that have a mass."""
+        return [body for body in rows(self) if body.mass > 0.0]
 
 
 @dataclass(frozen=True)
@@ -69,16 +66,17 @@ class Doors:
 
     names: tuple[str, ...] = parameter("names of the doors")
     positions: tuple[float, ...] = parameter(
-        "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0
+        "middle of the hinge in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
     )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", low=-6.3, high=6.3
+        "rotation from the base frame to the hinge's, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
     )
     sizes: tuple[float, ...] = parameter(
         "three half lengths each: along the panel from the hinge, across it, along the hinge",
         "m",
         low=0.0,
         high=10.0,
+        width=3,
     )
     mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no door", "kg", low=0.0, high=1e3)
     hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", low=0.0, high=1e3)
@@ -94,10 +92,8 @@ class Doors:
     )
 
     def __post_init__(self) -> None:
-        _aligned("world.doors", self.names, vars(self), ("positions", "rotations", "sizes"))
-        for i, name in enumerate(self.names):
-            _positive(name, "world.doors.sizes", self.sizes[3 * i : 3 * i + 3])
-            low, high = self.lower[i], self.upper[i]
+        require_solids("world.doors", self)
+        for name, low, high in zip(self.names, self.lower, self.upper, strict=True):
             require(
                 low <= 0.0 <= high and low < high,
                 f"{name}: world.doors.lower is {low:g} rad, upper {high:g} rad; 0, the angle at power-up, must be "
@@ -105,9 +101,9 @@ class Doors:
             )
 
     @property
-    def present(self) -> tuple[int, ...]:
-        """Indices of the doors that have a mass."""
-        return tuple(i for i, mass in enumerate(self.mass) if mass > 0.0)
+    def present(self) -> list[Any]:
+        """The doors that have a mass."""
+        return [door for door in rows(self) if door.mass > 0.0]
 
 
 @dataclass(frozen=True)
@@ -119,18 +115,18 @@ class Motions:
 
     obstacles: tuple[str, ...] = parameter("obstacles that move")
     amplitude: tuple[float, ...] = parameter(
-        "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0
+        "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0, width=3
     )
     frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", low=0.0, high=100.0)
     begin: tuple[float, ...] = parameter("start, since power-up", "s", low=0.0, high=1e6)
 
     def __post_init__(self) -> None:
-        _aligned("world.motions", self.obstacles, vars(self), ("amplitude",), "obstacles")
+        named("world.motions", self)
 
     @property
-    def present(self) -> tuple[int, ...]:
-        """Indices of the motions that have a frequency."""
-        return tuple(i for i, frequency in enumerate(self.frequency) if frequency > 0.0)
+    def present(self) -> list[Any]:
+        """The motions that have a frequency."""
+        return [motion for motion in rows(self) if motion.frequency > 0.0]
 
 
 def principal_inertia(shape: str, size: Sequence[float], mass: float) -> tuple[float, float, float]:
@@ -152,23 +148,25 @@ def principal_inertia(shape: str, size: Sequence[float], mass: float) -> tuple[f
     return across, across, 0.5 * mass * radius
 
 
-def _aligned(
-    group: str, names: tuple[str, ...], every: dict[str, tuple[float, ...]], three: Sequence[str], key: str = "names"
-) -> None:
-    """Refuse lists of wrong lengths and names that are empty or there twice."""
-    lengths(group, names, {name: array for name, array in every.items() if name not in (key, *three)})
-    lengths(group, names, {name: every[name] for name in three}, width=3)
-    require(
-        "" not in names and len(set(names)) == len(names),
-        f"parameter '{group}.{key}' is {', '.join(map(repr, names))}; give each a name of its own",
-    )
+def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> None:
+    """Refuse lists that are not `named`, unknown shapes, and sizes that are not above 0.
 
-
-def _positive(name: str, what: str, needed: Sequence[float]) -> None:
-    require(
-        all(math.isfinite(size) and size > 0.0 for size in needed),
-        f"{name}: {what} begins with {', '.join(f'{s:g}' for s in needed)} m; each must be above 0",
-    )
+    Parameters
+    ----------
+    group : dotted name of the parameter class, for the message.
+    given : solids with a size each and, apart from boxes, a shape.
+    shapes : by name, how many numbers of a size have to be above 0.
+    """
+    named(group, given)
+    for one in rows(given):
+        shape = getattr(one, "shape", "box")
+        require(shape in shapes, f"{one.name}: {group}.shapes is '{shape}'; allowed: {', '.join(shapes)}")
+        needed = one.size[: shapes[shape]]
+        require(
+            all(size > 0.0 for size in needed),
+            f"{one.name}: {group}.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
+            "each must be above 0",
+        )
 
 
 NO_BODIES = FreeBodies((), (), (), (), (), (), (), (), (), (), (), ())

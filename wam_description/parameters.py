@@ -9,13 +9,30 @@ import contextlib
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from wam_description.number_text import as_number
 
 T = TypeVar("T")
 Value = bool | int | float | str | tuple[Any, ...]
+SINGULAR = {
+    f"{name}s": name
+    for name in (
+        "name",
+        "shape",
+        "size",
+        "position",
+        "rotation",
+        "cover",
+        "angle",
+        "joint",
+        "link",
+        "obstacle",
+        "shaft",
+    )
+}  # of the names of lists
 
 
 class ParameterError(ValueError):
@@ -34,7 +51,8 @@ class Field(NamedTuple):
     high: float
     choices: tuple[str, ...]
     live: bool
-    length: int
+    width: int
+    is_common: bool
     derived: Callable[[Mapping[str, Any]], Value] | None
 
     @property
@@ -58,7 +76,8 @@ def parameter(
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     live: bool = False,
-    length: int = 0,
+    width: int = 1,
+    is_common: bool = False,
     derived: Callable[[Mapping[str, Any]], Value] | None = None,
 ) -> Any:
     """Declare a field of a parameter class.
@@ -70,14 +89,15 @@ def parameter(
     low, high : inclusive range of each number.
     choices : allowed strings.
     live : True if a running node may take a new value.
-    length : of a list, the number of values that it must have, 0 where that is checked elsewhere.
+    width : of a list, the number of values for each of what it runs over, see `aligned`.
+    is_common : of a list, whether a single value counts for all.
     derived : the value where a configuration does not give one, a function of the other parameters of its section,
         see `like`.
     """
     return dataclasses.field(
         metadata={
             "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live,
-            "length": length, "derived": derived,
+            "width": width, "is_common": is_common, "derived": derived,
         }
     )  # fmt: skip
 
@@ -102,7 +122,9 @@ def like(cls: type, name: str, doc: str = "") -> Any:
     doc : what the field is, where that is another sentence.
     """
     other = next(field for field in fields(cls) if field.name == name.rpartition(".")[2])
-    return parameter(doc or other.doc, other.unit, other.low, other.high, derived=lambda others: others[name])
+    return parameter(
+        doc or other.doc, other.unit, other.low, other.high, width=other.width, derived=lambda others: others[name]
+    )
 
 
 _FIELDS: dict[type, tuple[Field, ...]] = {}
@@ -276,8 +298,6 @@ def checked(field: Field, value: Any) -> Value:
             raise ParameterError(
                 f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}{as_number(value)}"
             )
-        if field.length and len(value) != field.length:
-            raise ParameterError(f"parameter '{field.name}' has {len(value)} values; it needs {field.length}")
         return tuple(_checked_scalar(field, element) for element in value)
     return _checked_scalar(field, value)
 
@@ -316,8 +336,10 @@ def require(condition: bool, message: str) -> None:
         raise ParameterError(message)
 
 
-def lengths(group: str, names: tuple[str, ...], arrays: Mapping[str, tuple[Any, ...]], width: int = 1) -> None:
-    """Refuse arrays that do not have `width` values for each of the names.
+def lengths(
+    group: str, names: Sequence[Any], arrays: Mapping[str, Sequence[Any]], width: int = 1, is_common: bool = False
+) -> None:
+    """Refuse arrays that do not have `width` values for each of the names, or one for all where that `is_common`.
 
     Parameters
     ----------
@@ -328,9 +350,54 @@ def lengths(group: str, names: tuple[str, ...], arrays: Mapping[str, tuple[Any, 
     for name, array in arrays.items():
         need = "1 name needs" if len(names) == 1 else f"{len(names)} names need"
         require(
-            len(array) == width * len(names),
-            f"parameter '{group}.{name}' has {len(array)} value{'s' * (len(array) != 1)}; {need} {width * len(names)}",
+            len(array) == width * len(names) or (is_common and len(array) == 1),
+            f"parameter '{group}.{name}' has {len(array)} value{'s' * (len(array) != 1)}; {need} "
+            f"{'1 or ' * is_common}{width * len(names)}",
         )
+
+
+def aligned(group: str, names: Sequence[Any], given: Any) -> None:
+    """Refuse lists of a parameter object that do not have as many values for each of the names as they declare.
+
+    Parameters
+    ----------
+    group : dotted name of its class, for the message.
+    names : what all of its lists run over.
+    given : the object.
+    """
+    for name, array, declared in _lists(given):
+        lengths(group, names, {name: array}, declared["width"], declared["is_common"])
+
+
+def named(group: str, given: Any, least: int = 0) -> None:
+    """Refuse lists that are not `aligned` with the first one, and in that one too few, empty or equal names."""
+    (key, names, _), *_ = _lists(given)
+    require(len(names) >= least, f"parameter '{group}.{key}' is empty; name at least one")
+    require(
+        "" not in names and len(set(names)) == len(names),
+        f"parameter '{group}.{key}' is {', '.join(map(repr, names))}; give each a name of its own",
+    )
+    aligned(group, names, given)
+
+
+def rows(given: Any) -> list[Any]:
+    """What the lists of a parameter object run over, each with its own values: `name` of `names`, `size` of `sizes`."""
+    lists = [(SINGULAR.get(name, name), array, declared["width"]) for name, array, declared in _lists(given)]
+    count = len(lists[0][1])
+    return [
+        SimpleNamespace(
+            **{name: array[i] if width == 1 else array[width * i : width * (i + 1)] for name, array, width in lists}
+        )
+        for i in range(count)
+    ]
+
+
+def _lists(given: Any) -> Iterator[tuple[str, tuple[Any, ...], Mapping[str, Any]]]:
+    """Name, values and declaration of each list of a parameter object."""
+    for item in dataclasses.fields(given):
+        value = getattr(given, item.name)
+        if isinstance(value, tuple):
+            yield item.name, value, item.metadata
 
 
 @dataclasses.dataclass(frozen=True)

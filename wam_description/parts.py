@@ -6,14 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import named, parameter, require
 from wam_description.thresholds import MODEL
-
-
-def distinct(group: str, names: tuple[str, ...]) -> None:
-    """Refuse no name, and a name twice."""
-    require(len(names) > 0, f"parameter '{group}.names' is empty; name at least one")
-    require(len(set(names)) == len(names), f"parameter '{group}.names' has a duplicate name: {', '.join(names)}")
 
 
 @dataclass(frozen=True)
@@ -82,8 +76,7 @@ class Joints:
 
 def _check_shafts(group: str, shafts: Motors | Joints) -> None:
     """Refuse a name twice, a list that has not one value each, and friction that grows with the motion."""
-    distinct(group, shafts.names)
-    lengths(group, shafts.names, {key: value for key, value in vars(shafts).items() if key != "names"})
+    named(group, shafts, least=1)
     for name, f_static, f_dynamic in zip(shafts.names, shafts.static_friction, shafts.dynamic_friction, strict=True):
         require(
             f_dynamic <= f_static,
@@ -98,26 +91,25 @@ class Links:
     names: tuple[str, ...] = parameter("link names, one per joint, as in frame ids")
     mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0)
     centre: tuple[float, ...] = parameter(
-        "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0
+        "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0, width=3
     )
     inertia: tuple[float, ...] = parameter(
         "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
         "kg m^2",
         low=0.0,
         high=100.0,
+        width=3,
     )
     product: tuple[float, ...] = parameter(
         "the other elements xy xz yz of the same inertia tensor; zero where the axes are principal",
         "kg m^2",
         low=-100.0,
         high=100.0,
+        width=3,
     )
 
     def __post_init__(self) -> None:
-        distinct("arm.links", self.names)
-        lengths("arm.links", self.names, {"mass": self.mass})
-        spatial = {"centre": self.centre, "inertia": self.inertia, "product": self.product}
-        lengths("arm.links", self.names, spatial, width=3)
+        named("arm.links", self, least=1)
         for i, name in enumerate(self.names):
             least = float(np.linalg.eigvalsh(self.tensor(i))[0])
             require(

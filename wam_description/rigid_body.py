@@ -137,11 +137,6 @@ class RigidBody:
         velocities = [pin.getFrameVelocity(self._model, self._data, frame, local) for frame in self._starts_and_tool]
         return [math.hypot(*velocity.linear.tolist()) for velocity in velocities]
 
-    def hand_jacobian(self, q: ArrayLike) -> Array:
-        """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""
-        local = pin.ReferenceFrame.LOCAL
-        return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, local))[:3]
-
     def gravity_torque(self, q: ArrayLike) -> Array:
         """Joint torques that carry the links at rest, (n,), N m."""
         return pin.computeGeneralizedGravity(self._model, self._data, _vector(q))

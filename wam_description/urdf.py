@@ -6,107 +6,111 @@ cylinders with spheres at both ends.
 """
 
 from collections.abc import Iterable
-from xml.etree import ElementTree as ET
-from xml.etree.ElementTree import Element, SubElement
+from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
+from wam_description.parameters import rows
 from wam_description.rigid_body import cover_placement, joint_placement
+from wam_description.signals import ZERO
 from wam_description.transmission_map import TransmissionMap
+from wam_description.xml_element import add, text, written
 
 ROOT = "base_link"
 BASE = "base"
 TOOL = "tool"
+PLUGIN = "joint_state_topic_hardware_interface/JointStateTopicSystem"
+TOPICS = {"joint_states_topic": "joint_states", "joint_commands_topic": "joint_posture_command"}
+EVERY = "-1"  # threshold from which a command is sent: below 0 each of them, as the arm drops a command that ends
 
 
-def urdf(arm: Arm) -> str:
+def urdf(arm: Arm, namespace: str = "") -> str:
     """URDF of the arm: kinematics, inertia of the links, limits and tubes.
 
     A joint's effort limit is the peak torque of the motors that drive it, its velocity limit the speed
     above which the driver faults.  Lengths in m, angles in rad, frames of (A.4).
+
+    Parameters
+    ----------
+    arm : the arm.
+    namespace : of its topics, where controllers of ros2_control are to command postures; '' for a URDF without them.
     """
     robot = Element("robot", name=arm.name)
-    SubElement(robot, "link", name=ROOT)
-    SubElement(robot, "link", name=BASE)
-    _add_fixed(robot, ROOT, BASE, _origin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    for i in range(len(arm.links.names)):
-        _add_link(robot, arm, i)
-    for i in range(len(arm.covers.names)):
-        _add_cover(robot, arm, i)
-    _add_tool(robot, arm)
+    add(robot, "link", name=ROOT)
+    add(robot, "link", name=BASE)
+    _add_fixed(robot, ROOT, BASE)
+    for i, link in enumerate(rows(arm.carried)):
+        _add_link(robot, arm, i, link)
+    for cover in rows(arm.covers):
+        add(robot, "link", name=cover.name)
+        _add_fixed(robot, cover.link, cover.name, cover.origin, cover.rotation)
+    add(robot, "link", name=TOOL)
+    _add_fixed(robot, arm.links.names[-1], TOOL, arm.tool)
     efforts = TransmissionMap.of(arm).largest_joint_torques(arm.motors.peak_torque)
-    for i, effort in enumerate(efforts):
-        _add_joint(robot, arm, i, effort)
-    ET.indent(robot)
-    return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+    for i, (joint, effort) in enumerate(zip(rows(arm.joints), efforts, strict=True)):
+        _add_joint(robot, arm, i, joint, effort)
+    if namespace:
+        _add_ros2_control(robot, arm, namespace)
+    return f'<?xml version="1.0"?>\n{text(robot)}\n'
 
 
-def _add_link(robot: Element, arm: Arm, i: int) -> None:
-    link = SubElement(robot, "link", name=arm.links.names[i])
-    inertial = SubElement(link, "inertial")
-    inertial.append(_origin(_triple(arm.carried.centre, i), (0.0, 0.0, 0.0)))
-    SubElement(inertial, "mass", value=_numbers([arm.carried.mass[i]]))
-    tensor = arm.carried.tensor(i).tolist()
+def _add_link(robot: Element, arm: Arm, i: int, link: Any) -> None:
+    element = add(robot, "link", name=link.name)
+    inertial = add(element, "inertial")
+    _add_origin(inertial, link.centre)
+    add(inertial, "mass", value=link.mass)
+    tensor = arm.carried.tensor(i)
     elements = ((a, b) for a in range(3) for b in range(a, 3))
-    SubElement(inertial, "inertia", {f"i{'xyz'[a]}{'xyz'[b]}": _numbers([tensor[a][b]]) for a, b in elements})
-    for cover, carrier in enumerate(arm.covers.links):
-        if carrier == arm.links.names[i]:
-            _add_tube(link, arm, cover)
+    add(inertial, "inertia", **{f"i{'xyz'[a]}{'xyz'[b]}": tensor[a, b] for a, b in elements})
+    for k, cover in enumerate(rows(arm.covers)):
+        if cover.link == link.name:
+            _add_tube(element, cover_placement(arm, k), cover)
 
 
-def _add_joint(robot: Element, arm: Arm, i: int, effort: float) -> None:
-    joint = SubElement(robot, "joint", name=arm.joints.names[i], type="revolute")
-    SubElement(joint, "parent", link=arm.links.names[i - 1] if i else BASE)
-    SubElement(joint, "child", link=arm.links.names[i])
-    joint.append(_origin(joint_placement(arm, i).translation, (arm.joints.twist[i], 0.0, 0.0)))
-    SubElement(joint, "axis", xyz="0 0 1")
-    SubElement(
-        joint,
-        "limit",
-        lower=_numbers([arm.joints.lower[i]]),
-        upper=_numbers([arm.joints.upper[i]]),
-        effort=_numbers([effort]),
-        velocity=_numbers([arm.joints.speed_limit[i]]),
-    )
+def _add_joint(robot: Element, arm: Arm, i: int, joint: Any, effort: float) -> None:
+    parent = arm.links.names[i - 1] if i else BASE
+    element = _add_connection(robot, joint.name, "revolute", parent, arm.links.names[i])
+    _add_origin(element, joint_placement(arm, i).translation, (joint.twist, 0.0, 0.0))
+    add(element, "axis", xyz="0 0 1")
+    add(element, "limit", lower=joint.lower, upper=joint.upper, effort=effort, velocity=joint.speed_limit)
 
 
-def _add_cover(robot: Element, arm: Arm, i: int) -> None:
-    SubElement(robot, "link", name=arm.covers.names[i])
-    origin = _origin(_triple(arm.covers.origin, i), _triple(arm.covers.rotation, i))
-    _add_fixed(robot, arm.covers.links[i], arm.covers.names[i], origin)
-
-
-def _add_tube(link: Element, arm: Arm, i: int) -> None:
-    """Draw cover i on the link that carries it: geometry on a massless frame gets a mass in MuJoCo."""
-    cover = cover_placement(arm, i)
-    start, end = (cover.act(np.array(_triple(ends, i))) for ends in (arm.covers.start, arm.covers.end))
-    turn = _along(end - start)
-    radius = _numbers([arm.covers.radius[i]])
-    length = _numbers([float(np.linalg.norm(end - start))])
+def _add_tube(link: Element, placement: pin.SE3, cover: Any) -> None:
+    """Draw a cover on the link that carries it: geometry on a massless frame gets a mass in MuJoCo."""
+    start, end = (placement.act(np.array(one)) for one in (cover.start, cover.end))
+    turn, radius = _along(end - start), cover.radius
     for tag in ("visual", "collision"):
-        _add_shape(link, tag, _origin((start + end) / 2.0, turn), "cylinder", radius=radius, length=length)
-        _add_shape(link, tag, _origin(start, turn), "sphere", radius=radius)
-        _add_shape(link, tag, _origin(end, turn), "sphere", radius=radius)
+        length = float(np.linalg.norm(end - start))
+        _add_shape(link, tag, (start + end) / 2.0, turn, "cylinder", radius=radius, length=length)
+        _add_shape(link, tag, start, turn, "sphere", radius=radius)
+        _add_shape(link, tag, end, turn, "sphere", radius=radius)
 
 
-def _add_shape(link: Element, tag: str, origin: Element, shape: str, **size: str) -> None:
-    part = SubElement(link, tag)
-    part.append(origin)
-    SubElement(SubElement(part, "geometry"), shape, size)
+def _add_shape(link: Element, tag: str, xyz: Iterable[float], rpy: Iterable[float], shape: str, **size: float) -> None:
+    part = add(link, tag)
+    _add_origin(part, xyz, rpy)
+    add(add(part, "geometry"), shape, **size)
 
 
-def _add_tool(robot: Element, arm: Arm) -> None:
-    SubElement(robot, "link", name=TOOL)
-    _add_fixed(robot, arm.links.names[-1], TOOL, _origin(arm.tool, (0.0, 0.0, 0.0)))
+def _add_fixed(
+    robot: Element, parent: str, child: str, xyz: Iterable[float] = ZERO, rpy: Iterable[float] = ZERO
+) -> None:
+    _add_origin(_add_connection(robot, f"{child}_frame", "fixed", parent, child), xyz, rpy)
 
 
-def _add_fixed(robot: Element, parent: str, child: str, origin: Element) -> None:
-    joint = SubElement(robot, "joint", name=f"{child}_frame", type="fixed")
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=child)
-    joint.append(origin)
+def _add_connection(robot: Element, name: str, kind: str, parent: str, child: str) -> Element:
+    joint = add(robot, "joint", name=name, type=kind)
+    add(joint, "parent", link=parent)
+    add(joint, "child", link=child)
+    return joint
+
+
+def _add_origin(parent: Element, xyz: Iterable[float], rpy: Iterable[float] = ZERO) -> None:
+    add(parent, "origin", xyz=xyz, rpy=rpy)
 
 
 def _along(direction: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -115,14 +119,18 @@ def _along(direction: NDArray[np.float64]) -> tuple[float, float, float]:
     return 0.0, float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))
 
 
-def _origin(xyz: Iterable[float], rpy: Iterable[float]) -> Element:
-    return Element("origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
-
-
-def _triple(values: tuple[float, ...], i: int) -> tuple[float, ...]:
-    return values[3 * i : 3 * i + 3]
-
-
-def _numbers(values: Iterable[float]) -> str:
-    """Numbers as XML text that reads back to the same floats."""
-    return " ".join(repr(float(value)) for value in values)
+def _add_ros2_control(robot: Element, arm: Arm, namespace: str) -> None:
+    """A system of position interfaces of ros2_control that listens to the arm's states and sends it postures."""
+    system = add(robot, "ros2_control", name=arm.name, type="system")
+    hardware = add(system, "hardware")
+    add(hardware, "plugin").text = PLUGIN
+    for name, topic in TOPICS.items():
+        add(hardware, "param", name=name).text = f"/{namespace.strip('/')}/{topic}"
+    add(hardware, "param", name="trigger_joint_command_threshold").text = EVERY
+    for one in rows(arm.joints):
+        joint = add(system, "joint", name=one.name)
+        command = add(joint, "command_interface", name="position")
+        for name, limit in (("min", one.lower), ("max", one.upper)):
+            add(command, "param", name=name).text = written(limit)
+        for quantity in ("position", "velocity"):
+            add(joint, "state_interface", name=quantity)

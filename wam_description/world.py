@@ -1,12 +1,13 @@
 """What the arm can touch: obstacles, springs, pushers, and what it can move."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from wam_description.movable import NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions
-from wam_description.parameters import lengths, option, parameter, require
+from wam_description.movable import BOX, NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions, require_solids
+from wam_description.parameters import aligned, option, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
+NEEDED = {**SHAPES, "plane": 0}  # of these that have to be above 0
 
 
 @dataclass(frozen=True)
@@ -15,15 +16,18 @@ class Obstacles:
 
     names: tuple[str, ...] = parameter("names of the obstacles")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
-    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m", low=-100.0, high=100.0)
+    positions: tuple[float, ...] = parameter(
+        "centre in the base frame, x y z of each", "m", low=-100.0, high=100.0, width=3
+    )
     rotations: tuple[float, ...] = parameter(
-        "rotation from the base frame, roll pitch yaw of each", "rad", low=-6.3, high=6.3
+        "rotation from the base frame, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
     )
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0",
         "m",
         low=0.0,
         high=100.0,
+        width=3,
     )
     stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
     damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0, high=1e6)
@@ -33,23 +37,7 @@ class Obstacles:
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
-        one = ("shapes", "stiffness", "damping", "hardening", "friction")
-        lengths("world.obstacles", self.names, {key: getattr(self, key) for key in one})
-        three = ("positions", "rotations", "sizes")
-        lengths("world.obstacles", self.names, {key: getattr(self, key) for key in three}, width=3)
-        require("" not in self.names, "parameter 'world.obstacles.names' has an empty name; name every obstacle")
-        require(
-            len(set(self.names)) == len(self.names),
-            f"parameter 'world.obstacles.names' has a duplicate name: {', '.join(self.names)}",
-        )
-        for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
-            require(shape in SHAPES, f"{name}: world.obstacles.shapes is '{shape}'; allowed: {', '.join(SHAPES)}")
-            needed = self.sizes[3 * i : 3 * i + SHAPES[shape]]
-            require(
-                shape == "plane" or min(needed) > 0.0,
-                f"{name}: world.obstacles.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
-                "each must be above 0",
-            )
+        require_solids("world.obstacles", self, NEEDED)
 
 
 @dataclass(frozen=True)
@@ -63,14 +51,18 @@ class Springs:
     bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
 
     def __post_init__(self) -> None:
-        keys = ("stiffness", "lever", "rest", "bilateral")
-        lengths("world.springs", self.joints, {key: getattr(self, key) for key in keys})
+        aligned("world.springs", self.joints, self)
+
+    @property
+    def present(self) -> list[Any]:
+        """The springs that have a stiffness."""
+        return [spring for spring in rows(self) if spring.stiffness > 0.0]
 
 
 NO_SPRINGS = Springs((), (), (), (), ())
 
 
-PUSHER_SHAPES = ("sphere", "box")
+PUSHER_SHAPES = {"sphere": 1, **BOX}
 
 
 @dataclass(frozen=True)
@@ -83,13 +75,14 @@ class Pushers:
     """
 
     names: tuple[str, ...] = parameter("names of the pushers")
-    shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=PUSHER_SHAPES)
+    shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=tuple(PUSHER_SHAPES))
     sizes: tuple[float, ...] = parameter(
         "three numbers each: radius of a sphere, 0, 0; or half lengths of a box along the link, across "
         "it, along the force",
         "m",
         low=0.0,
         high=10.0,
+        width=3,
     )
     covers: tuple[str, ...] = parameter("cover that each presses on")
     positions: tuple[float, ...] = parameter(
@@ -112,24 +105,19 @@ class Pushers:
     friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
-        single = {key: value for key, value in vars(self).items() if key not in ("names", "sizes")}
-        lengths("world.pushers", self.names, single)
-        lengths("world.pushers", self.names, {"sizes": self.sizes}, width=3)
-        require(
-            "" not in self.names and len(set(self.names)) == len(self.names),
-            f"parameter 'world.pushers.names' is {', '.join(self.names)}; give each pusher a name of its own",
-        )
-        for i, name in enumerate(self.names):
-            needed = self.sizes[3 * i : 3 * i + (1 if self.shapes[i] == "sphere" else 3)]
+        require_solids("world.pushers", self, PUSHER_SHAPES)
+        for one in rows(self):
+            least = one.begin + 2.0 * one.rise
             require(
-                min(needed) > 0.0,
-                f"{name}: world.pushers.sizes of a {self.shapes[i]} are {needed}; each must be above 0",
+                least <= one.end,
+                f"{one.name}: world.pushers.end is {one.end:g} s; it must be at least twice the rise after "
+                f"begin, {least:g} s",
             )
-            require(
-                self.begin[i] + 2.0 * self.rise[i] <= self.end[i],
-                f"{name}: world.pushers.end is {self.end[i]:g} s; it must be at least twice the rise after "
-                f"begin, {self.begin[i] + 2.0 * self.rise[i]:g} s",
-            )
+
+    @property
+    def present(self) -> list[Any]:
+        """The pushers that have a force."""
+        return [pusher for pusher in rows(self) if pusher.force > 0.0]
 
 
 @dataclass(frozen=True)
@@ -177,16 +165,14 @@ class World:
 
     def __post_init__(self) -> None:
         known = self.obstacles.names
-        for i, name in enumerate(self.motions.obstacles):
+        for motion in self.motions.present:
             require(
-                name in known or self.motions.frequency[i] == 0.0,
-                f"world.motions.obstacles names '{name}'; obstacles: {', '.join(known) or 'none'}",
+                motion.obstacle in known,
+                f"world.motions.obstacles names '{motion.obstacle}'; obstacles: {', '.join(known) or 'none'}",
             )
-        pushing = [name for name, force in zip(self.pushers.names, self.pushers.force, strict=True) if force > 0.0]
-        bodies = [self.bodies.names[i] for i in self.bodies.present]
-        doors = [self.doors.names[i] for i in self.doors.present]
-        named = [*known, *pushing, *bodies, *doors]
-        doubled = sorted({name for name in (*bodies, *doors) if named.count(name) > 1})
+        movable = [one.name for one in (*self.bodies.present, *self.doors.present)]
+        named = [*known, *(pusher.name for pusher in self.pushers.present), *movable]
+        doubled = sorted({name for name in movable if named.count(name) > 1})
         require(
             not doubled,
             f"several of obstacles, pushers, bodies and doors are named {', '.join(doubled)}; "
@@ -194,9 +180,9 @@ class World:
         )
 
     @property
-    def moving(self) -> dict[str, int]:
-        """Obstacles that move, each with the index of its motion."""
-        return {self.motions.obstacles[i]: i for i in self.motions.present}
+    def moving(self) -> dict[str, Any]:
+        """The motions of obstacles, by the name of the obstacle."""
+        return {motion.obstacle: motion for motion in self.motions.present}
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -206,12 +192,9 @@ class World:
     @property
     def solids(self) -> tuple[Solid, ...]:
         """The free bodies, doors and moving obstacles, in the order of `sim/objects`."""
-        bodies, doors, obstacles = self.bodies, self.doors, self.obstacles
-        free = [Solid(bodies.names[i], bodies.shapes[i], bodies.sizes[3 * i : 3 * i + 3]) for i in bodies.present]
-        hung = [(doors.names[i], doors.sizes[3 * i : 3 * i + 3]) for i in doors.present]
-        moving = [(name, obstacles.names.index(name)) for name in self.moving]
+        obstacles = {one.name: one for one in rows(self.obstacles)}
         return (
-            *free,
-            *(Solid(name, "box", size, (size[0], 0.0, 0.0)) for name, size in hung),
-            *(Solid(name, obstacles.shapes[i], obstacles.sizes[3 * i : 3 * i + 3]) for name, i in moving),
+            *(Solid(one.name, one.shape, one.size) for one in self.bodies.present),
+            *(Solid(one.name, "box", one.size, (one.size[0], 0.0, 0.0)) for one in self.doors.present),
+            *(Solid(name, obstacles[name].shape, obstacles[name].size) for name in self.moving),
         )

@@ -7,7 +7,7 @@ from operator import add, mul
 
 import numpy as np
 
-from wam_description.parameters import lengths
+from wam_description.parameters import aligned
 from wam_description.parts import Motors
 from wam_driver.imperfections import AmplifierParameters
 
@@ -38,8 +38,7 @@ class Amplifier:
         random: np.random.Generator,
         true_constant: Sequence[float] | None = None,
     ) -> None:
-        keys = ("deadband", "torque_ripple", "ripple_cycles", "current_noise", "torque_offset")
-        lengths("amplifier", motors.names, {key: getattr(parameters, key) for key in keys})
+        aligned("amplifier", motors.names, parameters)
         self.torque_constant = list(motors.torque_constant)
         self._true_constant = list(true_constant or motors.torque_constant)
         self.peak = [t / k for t, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]

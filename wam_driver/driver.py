@@ -13,7 +13,7 @@ from wam_description.effects import Effects
 from wam_description.event import Event, fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import lengths, parameter, require, rows
 from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
@@ -76,24 +76,21 @@ class DriverSample(NamedTuple):
 
 def _require_springs(arm: Arm, world: World) -> None:
     """Refuse a spring on a link without a cover, or beyond the ends of it: no message could give its force."""
-    covers, springs = arm.covers, world.springs
     links = dict(zip(arm.joints.names, arm.links.names, strict=True))
-    covered = [name for name, link in links.items() if link in covers.links]
-    for joint, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
-        if stiffness == 0.0:
-            continue
+    covers = {cover.link: cover for cover in reversed(rows(arm.covers))}
+    covered = [name for name, link in links.items() if link in covers]
+    for spring in world.springs.present:
         require(
-            joint in covered,
-            f"world.springs acts on {joint}, whose link {links[joint]} has no cover, so that sim/contact could not "
-            f"contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
+            spring.joint in covered,
+            f"world.springs acts on {spring.joint}, whose link {links[spring.joint]} has no cover, so that sim/contact "
+            f"could not contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
         )
-        i = covers.links.index(links[joint])
-        offset = np.array([lever, 0.0, 0.0]) - covers.origin[3 * i : 3 * i + 3]
-        place = float(rotation_xyz(*covers.rotation[3 * i : 3 * i + 3])[:, 0] @ offset)
+        cover = covers[links[spring.joint]]
+        place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
         require(
-            -DRIVER.rounding <= place <= covers.length[i] + DRIVER.rounding,
-            f"world.springs.lever is {lever:g} m for {joint}: the spring would push at {place:.4g} m of "
-            f"{covers.names[i]}; allowed: 0 to {covers.length[i]:g} m of it",
+            -DRIVER.rounding <= place <= cover.length + DRIVER.rounding,
+            f"world.springs.lever is {spring.lever:g} m for {spring.joint}: the spring would push at {place:.4g} m of "
+            f"{cover.name}; allowed: 0 to {cover.length:g} m of it",
         )
 
 

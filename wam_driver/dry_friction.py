@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
-from wam_description.parameters import require
+from wam_description.parameters import aligned, require
 from wam_driver.friction import LAWS, Asymmetric, FrictionLaw, FrictionParameters, LoadDependent, Presliding, each_shaft
 from wam_driver.thresholds import PLANT
 
@@ -44,7 +44,7 @@ class DryFriction:
     ) -> None:
         motors, joints = effects.dry(arm), arm.joints
         size = 2 * len(motors.names)
-        _refuse_wrong_lengths(parameters, size // 2)
+        aligned("friction", motors.names, parameters)
         static = [*motors.static_friction, *joints.static_friction]
         dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
         asymmetry = each_shaft(parameters.motor_asymmetry, parameters.joint_asymmetry, size)
@@ -168,13 +168,6 @@ class DryFriction:
 def _composed(law: FrictionLaw, load_factor: float, asymmetry: float) -> FrictionLaw:
     loaded = LoadDependent(law, load_factor) if load_factor else law
     return Asymmetric(loaded, asymmetry) if asymmetry else loaded
-
-
-def _refuse_wrong_lengths(parameters: FrictionParameters, n: int) -> None:
-    for name, value in vars(parameters).items():
-        if isinstance(value, tuple):
-            count = len(value)
-            require(count in (1, n), f"parameter 'friction.{name}' has {count} values; {n} names need 1 or {n}")
 
 
 def _refuse_too_stiff(

@@ -147,29 +147,33 @@ class FrictionParameters:
         choices=tuple(LAWS),
     )
     motor_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, high=1e3
+        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, high=1e3, is_common=True
     )
     joint_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, high=1e3
+        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, high=1e3, is_common=True
     )
     stribeck_exponent: float = parameter("delta of exp(-(v/v_s)^delta) (law stribeck)", low=0.1, high=10.0)
     motor_asymmetry: tuple[float, ...] = parameter(
         "a of each motor: friction is 1 + a times as large in positive and 1 - a in negative motion",
         low=-0.9,
         high=0.9,
+        is_common=True,
     )
-    joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9)
+    joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9, is_common=True)
     motor_load_factor: tuple[float, ...] = parameter(
-        "friction of each motor per torque that the cables transmit to it", low=0.0, high=0.9
+        "friction of each motor per torque that the cables transmit to it", low=0.0, high=0.9, is_common=True
     )
-    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", low=0.0, high=0.9)
+    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", low=0.0, high=0.9, is_common=True)
     motor_presliding_stiffness: tuple[float, ...] = parameter(
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
         low=0.0,
         high=1e9,
+        is_common=True,
     )
-    joint_presliding_stiffness: tuple[float, ...] = parameter("the same of each joint", "N m/rad", low=0.0, high=1e9)
+    joint_presliding_stiffness: tuple[float, ...] = parameter(
+        "the same of each joint", "N m/rad", low=0.0, high=1e9, is_common=True
+    )
     warm_drop: float = option(
         "part of the dry friction of a motor that is gone when its winding is at its thermal limit, in proportion to "
         "the heat below; 0: friction does not depend on temperature",

@@ -42,6 +42,7 @@ class SensorParameters:
         "rad",
         low=0.0,
         high=1.0,
+        is_common=True,
     )
     joint_encoder_noise: tuple[float, ...] = parameter(
         "standard deviation of the joint angle", "rad", low=0.0, high=1.0

@@ -221,14 +221,10 @@ def _half_thickness(geom: Any) -> float:
 
 
 def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
-    tendons = iter(range(2 * len(arm.motors.names), model.ntendon))  # after the strands of the cables
-    for i, joint in enumerate(springs.joints):
-        if springs.stiffness[i] == 0.0:
-            continue
-        tendon = next(tendons)
-        link = arm.links.names[arm.joints.names.index(joint)]
+    tendons = range(2 * len(arm.motors.names), model.ntendon)  # after the strands of the cables
+    for tendon, spring in zip(tendons, springs.present, strict=True):
+        link = arm.links.names[arm.joints.names.index(spring.joint)]
         if link in arm.covers.links:
             cover = arm.covers.names[arm.covers.links.index(link)]
-            lever = springs.lever[i]
-            rest = lever * springs.rest[i]
-            yield SpringOnCover(tendon, model.body(link).id, cover, lever, rest, springs.bilateral[i])
+            rest = spring.lever * spring.rest
+            yield SpringOnCover(tendon, model.body(link).id, cover, spring.lever, rest, spring.bilateral)

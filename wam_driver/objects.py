@@ -33,13 +33,13 @@ class MovingObstacle:
     """
 
     def __init__(self, model: Any, data: Any, world: World, name: str) -> None:
-        motions, i = world.motions, world.moving[name]
+        motion = world.moving[name]
         self.name = name
         self.velocity: Array = np.zeros(3)
         self._position = data.mocap_pos[int(model.body(name).mocapid[0])]
         self._centre = model.body(name).pos.copy()
-        self._amplitude = np.array(motions.amplitude[3 * i : 3 * i + 3])
-        self._begin, self._rate = motions.begin[i], 2.0 * math.pi * motions.frequency[i]
+        self._amplitude = np.array(motion.amplitude)
+        self._begin, self._rate = motion.begin, 2.0 * math.pi * motion.frequency
 
     def lead(self, time: float) -> None:
         """Move to the position at a time, s since power-up."""
@@ -75,7 +75,7 @@ class TrueObjects:
         self._index = {model.geom(name).id: i for i, name in enumerate(self.names)}
         self._covers = {model.geom(name).id for name in arm.covers.names}
         self._bodies = [model.body(name).id for name in self.names]
-        doors = {world.doors.names[i] for i in world.doors.present}
+        doors = (door.name for door in world.doors.present)
         self._angles = {name: int(model.joint(hinge_name(name)).qposadr[0]) for name in doors}
         self._motion, self._wrench = np.zeros(6), np.zeros(6)
 

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from wam_description.arm import Arm
+from wam_description.parameters import rows
 from wam_description.world import Pushers
 
 
@@ -20,8 +21,7 @@ class Pusher:
     ----------
     model, data : of MuJoCo.
     arm : for the cover's shape.
-    given : parameters of all pushers.
-    i : index of this one.
+    given : its parameters.
     step : of the plant, s.
 
     Attributes
@@ -33,28 +33,27 @@ class Pusher:
     velocity : (3,), m/s, of its surface in the base frame.
     """
 
-    def __init__(self, model: Any, data: Any, arm: Arm, given: Pushers, i: int, step: float) -> None:
-        self.name = given.names[i]
-        self.words, self.is_pressing = f"{given.force[i]:.4g} N on {given.covers[i]} by {self.name}", False
-        self.surface = (given.stiffness[i], given.damping[i], 0.0)
+    def __init__(self, model: Any, data: Any, arm: Arm, given: Any, step: float) -> None:
+        self.name = given.name
+        self.words, self.is_pressing = f"{given.force:.4g} N on {given.cover} by {self.name}", False
+        self.surface = (given.stiffness, given.damping, 0.0)
         self.velocity = np.zeros(3)
         self._model, self._data, self._step = model, data, step
         self._mocap = int(model.body(self.name).mocapid[0])
         self._away = model.body(self.name).pos.copy()
         self._is_away = True
-        cover = arm.covers.names.index(given.covers[i])
-        rows = slice(3 * cover, 3 * cover + 3)
-        start, end = np.array(arm.covers.start[rows]), np.array(arm.covers.end[rows])
+        cover = next(one for one in rows(arm.covers) if one.name == given.cover)
+        start, end = np.array(cover.start), np.array(cover.end)
         self._slope = (end - start) / (end[0] - start[0])  # of the tube's axis, per position along x
         self._axis = self._slope / np.linalg.norm(self._slope)
         self._origin = start - start[0] * self._slope
-        self._site = model.site(f"{given.covers[i]}_frame").id
-        self._radius = arm.covers.radius[cover]
-        self._height = given.sizes[3 * i] if given.shapes[i] == "sphere" else given.sizes[3 * i + 2]
-        self._position, self._angle = given.positions[i], given.angles[i]
-        self._slide, self._turn = given.slide[i], given.turn[i]
-        self._depth, self._clearance = given.force[i] / given.stiffness[i], given.clearance[i]
-        self._begin, self._end, self._rise = given.begin[i], given.end[i], given.rise[i]
+        self._site = model.site(f"{given.cover}_frame").id
+        self._radius = cover.radius
+        self._height = given.size[0 if given.shape == "sphere" else 2]
+        self._position, self._angle = given.position, given.angle
+        self._slide, self._turn = given.slide, given.turn
+        self._depth, self._clearance = given.force / given.stiffness, given.clearance
+        self._begin, self._end, self._rise = given.begin, given.end, given.rise
         self._motion, self._quaternion = np.zeros(6), np.zeros(4)
 
     def lead(self, time: float) -> None:
@@ -104,7 +103,7 @@ class Pusher:
 
 def pushers(model: Any, data: Any, arm: Arm, given: Pushers, step: float) -> list[Pusher]:
     """The pushers that have a force."""
-    return [Pusher(model, data, arm, given, i, step) for i, force in enumerate(given.force) if force > 0.0]
+    return [Pusher(model, data, arm, one, step) for one in given.present]
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths
+from wam_description.parameters import aligned
 from wam_description.signals import State
 from wam_driver.imperfections import SensorParameters
 
@@ -42,12 +42,12 @@ class Sensors:
     """Motor encoders, joint encoders and strain gauges of an arm."""
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
-        given = dict(vars(parameters))
-        if len(resolution := given["joint_encoder_resolution"]) == 1:
-            given["joint_encoder_resolution"] = resolution * len(arm.joints.names)
-        lengths("sensors", arm.motors.names, given)
+        aligned("sensors", arm.motors.names, parameters)
+        resolution = parameters.joint_encoder_resolution
+        if len(resolution) == 1:
+            resolution *= len(arm.joints.names)
         self._motors = Encoders(parameters.encoder_resolution, parameters.encoder_noise, random)
-        self._joints = Encoders(given["joint_encoder_resolution"], parameters.joint_encoder_noise, random)
+        self._joints = Encoders(resolution, parameters.joint_encoder_noise, random)
         self._strain_noise = parameters.strain_noise
         self._is_strain_noisy = any(parameters.strain_noise)
         self._random = random

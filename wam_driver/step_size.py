@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.mjcf_objects import hinge_name
-from wam_description.parameters import ParameterError
+from wam_description.parameters import ParameterError, rows
 from wam_description.world import World
 from wam_driver.thresholds import PLANT
 
@@ -83,12 +83,12 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     cables = np.hstack([np.eye(n), ratios, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
     damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
-    for joint, k, lever in zip(world.springs.joints, world.springs.stiffness, world.springs.lever, strict=True):
-        at = n + arm.joints.names.index(joint)
-        stiffness[at, at] += k * lever * lever
-    for i in world.doors.present:
-        at = int(model.joint(hinge_name(world.doors.names[i])).dofadr[0])
-        stiffness[at, at] += world.doors.spring[i]
+    for spring in world.springs.present:
+        at = n + arm.joints.names.index(spring.joint)
+        stiffness[at, at] += spring.stiffness * spring.lever * spring.lever
+    for door in world.doors.present:
+        at = int(model.joint(hinge_name(door.name)).dofadr[0])
+        stiffness[at, at] += door.spring
     for q in (arm.joints.start, (0.0,) * n):
         data.qpos[n : 2 * n] = q
         mujoco.mj_forward(model, data)
@@ -108,18 +108,18 @@ def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[A
             reach = loosest[one.first] - loosest.get(one.second, 0.0)
             yield reach, one.stiffness, one.damping, one.what
     jacobian = np.zeros((3, model.nv))
-    for i, (cover, link) in enumerate(zip(arm.covers.names, arm.covers.links, strict=True)):
-        site = model.site(f"{cover}_frame").id
+    for cover in rows(arm.covers):
+        site = model.site(f"{cover.name}_frame").id
         rotation, origin = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
-        for end in (arm.covers.start[3 * i : 3 * i + 3], arm.covers.end[3 * i : 3 * i + 3]):
-            mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(link).id)
+        for end in (cover.start, cover.end):
+            mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(cover.link).id)
             for axis, one in ((a, s) for a in range(3) for s in touched):
-                if cover == one.first or folded(cover) == one.second:
+                if cover.name == one.first or folded(cover.name) == one.second:
                     k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * PLANT.hardened_at / one.stiffness)
                     reach = rotation[:, axis] @ jacobian
                     if one.second in loosest:
                         reach = reach - loosest[one.second]
-                    yield reach, k, one.damping, f"{one.what} on {cover}"
+                    yield reach, k, one.damping, f"{one.what} on {cover.name}"
 
 
 def _loosest(model: Any, data: Any, name: str) -> Array:

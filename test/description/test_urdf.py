@@ -10,7 +10,6 @@ import pytest
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
-from wam_description.ros2_control import urdf_with_ros2_control
 from wam_description.topics import BY_NAME
 from wam_description.urdf import urdf
 
@@ -128,7 +127,7 @@ def test_every_link_has_one_parent_and_contact_frames_exist(arm: Arm) -> None:
 
 
 def test_the_tag_of_ros2_control_names_joints_limits_and_topics_of_the_arm(arm: Arm) -> None:
-    robot = ET.fromstring(urdf_with_ros2_control(arm, "/left/"))
+    robot = ET.fromstring(urdf(arm, "/left/"))
     (system,) = robot.findall("ros2_control")
     assert [joint.get("name") for joint in system.findall("joint")] == list(arm.joints.names)
     for i, joint in enumerate(system.findall("joint")):

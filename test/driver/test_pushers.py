@@ -119,7 +119,7 @@ def test_a_hand_that_turns_round_the_link_twists_it() -> None:
     [
         ({"end": 0.06}, "hand: world.pushers.end is 0.06 s"),
         ({"sizes": (0.0, 0.0, 0.0)}, "hand: world.pushers.sizes of a sphere"),
-        ({"names": ""}, "give each pusher a name"),
+        ({"names": ""}, "give each a name of its own"),
     ],
 )
 def test_hands_that_cannot_be_are_refused(values: dict[str, Any], message: str) -> None:

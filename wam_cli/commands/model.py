@@ -6,7 +6,6 @@ from wam_cli.options import configuration_of, namespace, take_configuration
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.ros2_control import urdf_with_ros2_control
 from wam_description.urdf import urdf
 from wam_description.world import World
 
@@ -38,7 +37,7 @@ def run(given: argparse.Namespace) -> int:
 
         print(report(configuration), end="")
     elif given.format == "urdf":
-        print(urdf_with_ros2_control(shared.arm, given.ros2_control) if given.ros2_control else urdf(shared.arm))
+        print(urdf(shared.arm, given.ros2_control))
     else:
         section = configuration.sections["driver"]
         world, effects = build_part(World, section, "world."), build_part(Effects, section, "effects.")
