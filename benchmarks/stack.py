@@ -169,11 +169,11 @@ SPEED = Benchmark(
     speed,
     "times real time",
     (
-        Row("run without ROS", FASTER, 14.0, 20.0),
-        Row("lockstep", FASTER, 4.0, 5.5),
-        Row("lockstep, recorded", FASTER, 3.0, 4.5),
+        Row("run without ROS", FASTER, 20.0, 26.0),
+        Row("lockstep", FASTER, 7.0, 10.0),
+        Row("lockstep, recorded", FASTER, 5.5, 8.0),
         Row("grouped, recorded", FASTER, 1.8, 3.0),
-        Row("one process per node, recorded", FASTER, 1.2, 1.6),
+        Row("one process per node, recorded", FASTER, 2.0, 2.5),
     ),
     rounds=5,
 )
@@ -328,9 +328,9 @@ ROUND_TRIP = Benchmark(
     round_trip,
     "state to current at 1 kHz [us]",
     (
-        Row("one process, p50", RELAY + "one process, p50", 1.3, 0.9),
+        Row("one process, p50", RELAY + "one process, p50", 1.15, 0.9),
         Row("one process, p99", RELAY + "one process, p99"),
-        Row("two processes, p50", RELAY + "two processes, p50", 1.1, 0.9),
+        Row("two processes, p50", RELAY + "two processes, p50", 1.05, 0.9),
         Row("two processes, p99", RELAY + "two processes, p99"),
     ),
     rounds=11,

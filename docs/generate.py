@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -282,7 +283,6 @@ def blocks() -> dict[str, Callable[[], str]]:
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         **{f"task {name}": partial(task_of, name) for name in tasks()},
         "claims, count": lambda: claims.count(claims.load(CLAIMS)),
-        **{f"claims, {title}": partial(claims_of, title) for title in claims.load(CLAIMS)},
         "verdict of the demonstration": partial(verdict, "demo.txt"),
         "verdict of barrett-wam7": partial(verdict, "barrett-demo.txt"),
         "joints of barrett-wam7": joints_of_today,
@@ -291,13 +291,13 @@ def blocks() -> dict[str, Callable[[], str]]:
     }
 
 
-def claims_of(chapter: str) -> str:
-    """The claims of a chapter, with the distances that were measured."""
+def every_claim() -> str:
+    """The table of claims, with the distances that were measured."""
     named = {
         f"figure {name}": max(distances(found).values(), default=math.nan) for name, found in found_figures().items()
     }
     named |= {f"effect {name}": distance for name, distance in plant_study().items()}
-    return claims.table(claims.load(CLAIMS)[chapter], {name: percent(value) for name, value in named.items()})
+    return claims.table(chain(*claims.load(CLAIMS).values()), {name: percent(value) for name, value in named.items()})
 
 
 def recorded_range(configuration: Configuration) -> str:
@@ -418,9 +418,10 @@ def filled(text: str) -> str:
 
 
 def pages() -> dict[Path, str]:
-    """Every page with generated blocks, up to date."""
+    """Every page with generated blocks, and the table of claims, up to date."""
     texts = {path: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]}
-    return {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
+    found = {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
+    return {**found, CLAIMS.with_suffix(".csv"): every_claim()}
 
 
 def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:

@@ -22,7 +22,7 @@ from wam_ros.testing import RunningArm
 ROOT = Path(__file__).resolve().parents[2]
 HANDBOOK = {
     path.name: path.read_text(encoding="utf-8")
-    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md"), ROOT / "docs" / "thesis.csv"]
 }
 
 ACTIONS = {"/wam/follow_joint_trajectory"}  # of `wam live --trajectories`, where control_msgs is installed

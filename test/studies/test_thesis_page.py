@@ -81,5 +81,7 @@ def test_the_tables_have_every_item_with_its_status_what_shows_it_and_what_is_op
     missing = Claim("5.3", "other", Status.NOT_SHOWN, open="why")
     assert "| One | 1 | 0 | 0 | 1 |\n| all | 1 | 0 | 0 | 1 |" in count({"One": [shown, missing]})
     text = table([shown, missing], {"figure a": "3 %"})
-    assert "| 5.2 text | plant [a](figures/figure-a.png) | Plant with law: 3 %. B |" in text
-    assert "| 5.3 other | not shown | Why |" in text
+    assert text.splitlines()[1:] == [
+        "5.2,text,plant,[a](figures/figure-a.png),Plant with law: 3 %. B",
+        "5.3,other,not shown,,Why",
+    ]

@@ -1,10 +1,12 @@
 """What the thesis claims and what shows it: items of docs/thesis.yaml, checked, and as tables."""
 
+import csv
 import importlib
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -123,23 +125,22 @@ def count(chapters: Mapping[str, Sequence[Claim]]) -> str:
 
 
 def table(claims: Iterable[Claim], measured: Mapping[str, str]) -> str:
-    """The items of a chapter with what shows each, as Markdown; agreement of what the plant shows.
-
-    The first item of a section has its number.
+    """The items with what shows each, as CSV whose cells are Markdown; agreement of what the plant shows.
 
     Parameters
     ----------
     measured : greatest distance of each figure and effect, by the name that an agreement has in braces.
     """
-    rows, section = [], ""
+    text = StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("section", "claim", "status", "shown by", "agreement; what is open"))
     for claim in claims:
-        number, section = "" if claim.section == section else f"{claim.section} ", claim.section
         agreement = PLACE.sub(lambda found: measured[found[0][1:-1]], claim.agreement)
         links = dict.fromkeys(filter(None, map(_link, claim.shown)))
         found = agreement if claim.status is Status.PLANT else ""
         remark = ". ".join(f"{one[0].upper()}{one[1:]}" for one in (found, claim.open) if one)
-        rows.append((f"{number}{claim.claim}", " ".join([claim.status, *links]), remark))
-    return markdown(("claim", "status", "agreement; what is open"), rows)
+        rows.writerow((claim.section, claim.claim, claim.status, " ".join(links), remark))
+    return text.getvalue()
 
 
 def _link(reference: str) -> str:
