@@ -40,7 +40,7 @@ from wam_studies.figures.catalogue import table as figures_table
 from wam_studies.figures.panels import Panels, distances
 from wam_studies.figures.style import draw_panels
 from wam_studies.force_benchmark.straight_arm import elbow_table
-from wam_studies.plant import table as plant_table
+from wam_studies.plant import effects
 from wam_studies.scorecard import measures
 from wam_studies.scorecard import report as scorecard
 from wam_studies.tasks.pictures import save as save_task
@@ -238,7 +238,7 @@ def listing(name: str) -> str:
     return f"```python\n{(ROOT / name).read_text(encoding='utf-8')}```\n"
 
 
-plant_study = cache(plant_table.errors)
+plant_study = cache(effects.errors)
 
 
 @cache
@@ -266,7 +266,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "parameters": lambda: parameters(configuration),
         "steps": lambda: steps(configuration),
         "driver contract": driver_contract,
-        "plant": lambda: plant_table.table(plant_study()),
+        "plant": lambda: effects.table(plant_study()),
         "steps of a scenario": lambda: markdown(
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
         ),

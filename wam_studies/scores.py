@@ -156,6 +156,11 @@ class Row(NamedTuple):
         return [number(self.found.value, self.scale), span, str(self.found.observed), self.verdict]
 
 
+def percent(name: str, found: Interval, required: Bound = ANY, target: Bound = ANY) -> Row:
+    """A row of a share in percent."""
+    return Row(name, found, "%", 100.0, required, target)
+
+
 class ScoreTable(NamedTuple):
     """A table of a page: its title, the cells of its head and rows, and what a reader has to know."""
 

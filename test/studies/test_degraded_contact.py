@@ -19,7 +19,6 @@ from wam_studies.contact.replay import arriving, names_payload
 from wam_studies.contact.rows import IDENTIFIED_ARM, degraded_rows, degraded_tables
 from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.study import ContactCase, ContactStudy, play_case
-from wam_studies.contact.touches import axis_of
 from wam_studies.identification.plants import MeasuredSignals
 from wam_studies.scores import Row, ScoreTable
 
@@ -121,7 +120,7 @@ def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
         estimator.observe(state, None, dt)
         for touch in recording.touches:
             if i == round(1e3 * (touch.begin + 0.2)):
-                wrench = np.concatenate(touch.wrench(i * 1e-3, axis_of(WAM, touch.cover, touch.position)))
+                wrench = touch.wrench(i * 1e-3, WAM.covers)
                 true = wrench @ body.cover_jacobian(
                     TransmissionMap.of(WAM).joint_positions(state.position), touch.cover
                 )

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from wam_studies.figures.closed_forms import resonances
 from wam_studies.figures.stability import closed_loop_map, equal_node
-from wam_studies.plant.effects import resonances
 from wam_studies.plant.force_response import force_step, loop_arm, loop_node
 from wam_studies.plant.ideal_testbed import ideal_testbed, link_inertia
 from wam_theory.friction_model import FrictionNode

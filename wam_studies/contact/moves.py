@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from wam_control.task.motion import FASTEST
+from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 
@@ -20,7 +21,6 @@ class MoveRanges:
     longest: float = 1.1  # s
     elbow_speed: float = 1.9  # m/s, well below the driver's limit, as the next
     tip_speed: float = 3.2  # m/s
-    peak: float = 1.875  # greatest speed of a minimum-jerk path over its mean speed
     share: float = 0.6  # of the range of a joint, about its middle, of an arm without poses of its own
     margin: float = 0.1  # rad, from the ends of the joints
     return_probability: float = 0.3  # of a move back to the start of the last one
@@ -29,13 +29,6 @@ class MoveRanges:
 MOVES = MoveRanges()
 # rad, middle of the poses of each joint and range each way from it, by arm
 POSES = {"wam": ((0.0, 0.0, 0.0, 0.5), (1.5, 1.8, 1.5, 1.2))}
-
-
-class Move(NamedTuple):
-    """A minimum-jerk move."""
-
-    posture: tuple[float, ...]  # rad
-    seconds: float
 
 
 class MoveGenerator:
@@ -54,7 +47,7 @@ class MoveGenerator:
 
     def moves(
         self, random: np.random.Generator, start: Sequence[float], count: int, before: Sequence[float] = ()
-    ) -> list[Move]:
+    ) -> list[ScenarioStep]:
         """Successive moves, some of them back to the last start.
 
         Parameters
@@ -62,7 +55,7 @@ class MoveGenerator:
         start : pose before the first one, rad.
         before : pose before `start`; empty if unknown.
         """
-        result: list[Move] = []
+        result: list[ScenarioStep] = []
         last, here = np.array(before), np.array(start)
         for _ in range(count):
             seconds = float(random.uniform(MOVES.shortest, MOVES.longest))
@@ -71,10 +64,10 @@ class MoveGenerator:
                 target = last
             way = target - here
             peak = float(random.uniform(MOVES.slowest, MOVES.fastest))
-            way *= min(1.0, peak * seconds / MOVES.peak / float(np.abs(way).max()))
+            way *= min(1.0, peak * seconds / FASTEST / float(np.abs(way).max()))
             way *= min(1.0, 1.0 / self._speed_ratio(here, way, seconds))
             last, here = here, here + way
-            result.append(Move(tuple(here.tolist()), round(seconds, 3)))
+            result.append(ScenarioStep("move", round(seconds, 3), tuple(here.tolist())))
         return result
 
     def _speed_ratio(self, here: np.ndarray, way: np.ndarray, seconds: float) -> float:

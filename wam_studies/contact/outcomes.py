@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,15 @@ class EvaluationLimits:
     moving: float = 0.1  # rad/s of the fastest joint
     sure: float = 0.95  # probability of a link
     outside: float = 0.1  # largest probability of what a 90 % set may lack
+
+    # of a row
+    near: float = 0.2  # of a force: 5 N are 4 to 6 N
+    small_sd: float = 0.02  # m
+    rough_force: tuple[float, float] = (12.0, 28.0)  # N, of contacts with the greatest friction
+    quiet: tuple[float, float] = (120.0, 600.0)  # s that show no false alarm, required and target
+    inner_within: float = 0.2  # s, in which a contact on the inner link is detected
+    forces: tuple[float, ...] = (0.0, 7.5, 15.0, 30.0, 80.0)  # N, between the rows by force
+    masses: tuple[float, ...] = (0.1, 0.2, 0.5, 1.0)  # kg, between the rows by mass
 
     # of a recording
     late: float = 0.45  # s after the start of a contact, until which it is detected
@@ -66,9 +76,11 @@ class TrueContact(NamedTuple):
     kind, cover : of the scenario or the drawn contact.
     position, force : at the evaluation; m, N.
     friction : coefficient.
+    begin, end : s, in which it acts.
     first, due, last : numbers of the moments of its start, of the evaluation, and until which it may be detected.
     since : s, from which on the latency counts.
     mass : kg, of a mass at the tool.
+    counts : whether it is neither too short nor too hard.
     """
 
     kind: str
@@ -76,11 +88,14 @@ class TrueContact(NamedTuple):
     position: float
     force: float
     friction: float
+    begin: float
+    end: float
     first: int
     due: int
     last: int
     since: float
     mass: float = 0.0
+    counts: bool = True
 
 
 class ContactOutcome(NamedTuple):
@@ -114,15 +129,8 @@ class ContactOutcome(NamedTuple):
     sure_and_wrong: float = 0.0
 
 
-def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length: float, acting: Mask) -> ContactOutcome:
-    """What was reported of a contact.
-
-    Parameters
-    ----------
-    moments : of the whole run.
-    length : of the cover, m.
-    acting : of each moment, whether the contact acts.
-    """
+def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length: float) -> ContactOutcome:
+    """What was reported of a contact in the moments of the whole run, on a cover of this length, m."""
     now = moments[contact.due].estimate
     best = now.hypotheses[0] if now.hypotheses else None
     carries = payload_probability(now) if contact.mass else 0.0
@@ -133,7 +141,8 @@ def outcome_of(contact: TrueContact, moments: Sequence[EstimatedMoment], length:
     times = [m.time - contact.since for m in moments[contact.first : contact.last + 1] if m.estimate.in_contact]
     already = contact.first > 0 and moments[contact.first - 1].estimate.in_contact
     place = min(contact.position, length)
-    wrong = [is_sure_and_wrong(m.estimate, contact.cover) for m, acts in zip(moments, acting, strict=True) if acts]
+    acting = compress(moments, during(moments, contact.begin, contact.end))
+    wrong = [is_sure_and_wrong(m.estimate, contact.cover) for m in acting]
     return ContactOutcome(
         *contact[:5],
         moving=moments[contact.first].is_moving and moments[contact.due].is_moving,
@@ -201,10 +210,10 @@ def _sums(squares: Array) -> tuple[float, ...]:
     return tuple(squares.sum(axis=0).tolist())
 
 
-def alarms(moments: Sequence[EstimatedMoment], busy: Mask) -> int:
+def alarms(moments: Sequence[EstimatedMoment], free: Mask) -> int:
     """Detections that start without contact; one that continues from a true contact ends late, and is no new alarm."""
     alarm = np.array([one.estimate.in_contact for one in moments])
-    return int((alarm[1:] & ~alarm[:-1] & ~busy[1:]).sum())
+    return int((alarm[1:] & ~alarm[:-1] & free[1:]).sum())
 
 
 class MassOutcome(NamedTuple):
@@ -266,28 +275,24 @@ def during(moments: Sequence[EstimatedMoment], begin: float, end: float) -> Mask
     return (time >= begin - 1e-9) & (time <= end + 1e-9)
 
 
-def score_of(
-    arm: Arm,
-    moments: Sequence[EstimatedMoment],
-    contacts: Sequence[TrueContact],
-    acting: Sequence[Mask],
-    busy: Mask,
-    **more: Any,
-) -> ContactScore:
-    """Score a run.
+def quiet(moments: Sequence[EstimatedMoment], contacts: Sequence[TrueContact]) -> Mask:
+    """Whether at each moment no contact acts, or has just acted."""
+    found: Mask = np.ones(len(moments), bool)
+    for one in contacts:
+        found &= ~during(moments, one.begin, one.end + (EVALUATION.setting_down if one.mass else EVALUATION.edge))
+    return found
 
-    Parameters
-    ----------
-    acting : of each contact, whether it acts at each moment.
-    busy : of each moment, whether a contact acts, or has just acted.
-    more : other fields of the score.
-    """
+
+def score_of(
+    arm: Arm, moments: Sequence[EstimatedMoment], contacts: Sequence[TrueContact], **more: Any
+) -> ContactScore:
+    """Score a run; `more` are other fields of the score."""
+    free = quiet(moments, contacts)
+    counted = [contact for contact in contacts if contact.counts]
     return ContactScore(
-        outcomes=[
-            outcome_of(contact, moments, arm.covers.length_of(contact.cover), acts)
-            for contact, acts in zip(contacts, acting, strict=True)
-        ],
-        free_seconds=(moments[1].time - moments[0].time) * int((~busy).sum()),
-        alarms=alarms(moments, busy),
+        outcomes=[outcome_of(one, moments, arm.covers.length_of(one.cover)) for one in counted],
+        free_seconds=(moments[1].time - moments[0].time) * int(free.sum()),
+        alarms=alarms(moments, free),
+        excluded=len(contacts) - len(counted),
         **more,
     )

@@ -1,6 +1,6 @@
 """Play one drawn arm without ROS and keep the motors' signals and the true contacts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.overlay import estimator_values, model_values
 from wam_control.task.scenario import ScenarioStep
-from wam_description.arm import seconds
+from wam_description.arm import Arm, seconds
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import Array
 from wam_driver.safety import Mode
@@ -23,7 +23,6 @@ from wam_studies.contact.touches import (
     LEVEL_KINDS,
     MASS_KINDS,
     Touch,
-    axis_of,
     touches,
 )
 from wam_studies.identification.trial import play
@@ -45,7 +44,12 @@ class RecordingTimes:
 
 
 TIMES = RecordingTimes()
-CONTACTS = {"wide": KINDS, "lasting": LASTING_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
+CONTACTS = {  # kinds of contacts, and s from one to the next
+    "wide": (KINDS, TIMES.spacing),
+    "lasting": (LASTING_KINDS, TIMES.spacing_of_lasting),
+    "level": (LEVEL_KINDS, TIMES.spacing),
+    "masses": (MASS_KINDS, TIMES.spacing_of_masses),
+}
 
 
 class Drive(NamedTuple):
@@ -86,7 +90,7 @@ class DriveRecording(NamedTuple):
     speed: Array
     touches: tuple[Touch, ...]
     failure: str
-    model: Values = ()
+    model: Mapping[str, Any] = {}
 
 
 def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], list[float]]:
@@ -98,15 +102,9 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     moves = MoveGenerator(arm)
     start = moves.pose(random)
     steps = moves_and_stops(moves, random, start, drive.seconds, (0.0, 0.0, 0.0, 0.1, 0.4))
-    longer = {"masses": TIMES.spacing_of_masses, "lasting": TIMES.spacing_of_lasting}
-    spacing = longer.get(drive.contacts, TIMES.spacing)
+    kinds, spacing = CONTACTS[drive.contacts]
     times = np.arange(TIMES.warm_up, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
-    return (
-        degradation,
-        touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
-        steps,
-        list(start),
-    )
+    return degradation, touches(arm, random, times.tolist(), kinds), steps, list(start)
 
 
 def record(drive: Drive) -> DriveRecording:
@@ -115,7 +113,7 @@ def record(drive: Drive) -> DriveRecording:
     values: dict[str, Any] = {
         **base_values(drive.configuration, False),
         "nodes": [name for name in drive.configuration.shared.nodes if name != "contact_estimator"],
-        **dict(degradation.plant),
+        **degradation.plant,
         "arm.joints.start": start,
         "driver:seed": drive.seed,
     }
@@ -138,27 +136,22 @@ def record(drive: Drive) -> DriveRecording:
         done = run.step() or run.driver.safety.mode is Mode.FAULT
     theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
     failure = run.driver.safety.fault or run.scenario.failure
-    model = _identified(configured, degradation, drive.seed) if drive.is_identified else ()
+    model = _identified(configured, degradation, drive.seed) if drive.is_identified else {}
     return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure, model)
 
 
 def _identified(configured: Configuration, degradation: Degradation, seed: int) -> Values:
     """Values of the model that `wam identify` finds for a plant from the signals that the estimator gets."""
     samples, _ = play(configured, seed, TIMES.excitation, degradation.signals)
-    known = configured.with_values(dict(degradation.model)).shared
+    known = configured.with_values(degradation.model).shared
     found = identify(known, samples)
-    values = model_values(known, found, "an exciting motion") | estimator_values(configured)
-    return tuple(values.items())
+    return model_values(known, found, "an exciting motion") | estimator_values(configured)
 
 
-def _push(run: Simulation, arm: Any, contacts: Sequence[Touch], time: float) -> None:
+def _push(run: Simulation, arm: Arm, contacts: Sequence[Touch], time: float) -> None:
     """Apply the contacts that act now, those that have just ended with no force; carry the masses."""
     run.driver.plant.carry(sum(touch.mass for touch in contacts if touch.begin <= time < touch.end))
     near = [touch for touch in contacts if not touch.mass and touch.begin - 0.01 <= time <= touch.end + 0.01]
     for cover in {touch.cover for touch in near}:
-        force, moment = np.zeros(3), np.zeros(3)
-        for touch in near:
-            if touch.cover == cover:
-                f, m = touch.wrench(time, axis_of(arm, cover, touch.place_at(time)))
-                force, moment = force + f, moment + m
-        run.driver.push(cover, force.tolist(), moment.tolist())
+        wrench = np.sum([touch.wrench(time, arm.covers) for touch in near if touch.cover == cover], axis=0).tolist()
+        run.driver.push(cover, wrench[:3], wrench[3:])

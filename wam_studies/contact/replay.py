@@ -1,6 +1,8 @@
 """Run the contact estimator on a recording, and score what it reports of each contact, and between contacts."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -16,11 +18,11 @@ from wam_studies.contact.outcomes import (
     PAYLOAD,
     ContactScore,
     EstimatedMoment,
-    Mask,
     MassOutcome,
     TrueContact,
     during,
     is_sure_and_wrong,
+    quiet,
     score_of,
     torque_errors,
 )
@@ -44,37 +46,30 @@ def arriving(recording: DriveRecording, period: float, seed: int) -> Iterator[tu
 def replay(configuration: Configuration, name: str, group: str, recording: DriveRecording, seed: int) -> ContactScore:
     """Score the estimator of a configuration on a recording."""
     configured = configuration.with_values(
-        {**base_values(configuration, False), **dict(recording.degradation.model), **dict(recording.model)}
+        {**base_values(configuration, False), **recording.degradation.model, **recording.model}
     )
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
-    estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
-    moments: list[EstimatedMoment] = []
-    singles = [
-        t
-        for t in recording.touches
-        if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= EVALUATION.start_force
-    ]
-    trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
-    started: dict[int, tuple[bool, bool]] = {}
+    new = partial(ContactEstimator, shared.model_arm, shared.timing, own, shared.model)
+    estimator, moments = new(), list[EstimatedMoment]()
+    strong = [t for t in recording.touches if np.linalg.norm(t.force) >= EVALUATION.start_force]
+    singles = [touch for touch in strong if touch.kind in ("outer", "inner")]
+    trials: dict[Touch, tuple[ContactEstimator, ContactEstimator]] = {}
+    started: dict[Touch, tuple[bool, bool]] = {}
     for i, state, dt in arriving(recording, period, seed):
         time = i * period
         estimator.observe(state, None, dt)
-        for number, touch in enumerate(singles):
-            if (
-                touch.begin + EVALUATION.start_after
-                <= time
-                < touch.begin + EVALUATION.start_after + EVALUATION.start_within
-            ):
-                if number not in trials:
-                    cold = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
-                    trials[number] = estimator.restarted_copy(), cold
-                for trial in trials[number]:
+        for touch in singles:
+            begin = touch.begin + EVALUATION.start_after
+            if begin <= time < begin + EVALUATION.start_within:
+                if touch not in trials:
+                    trials[touch] = estimator.restarted_copy(), new()
+                for trial in trials[touch]:
                     trial.observe(state, None, dt)
                 if i % outer == 0:
-                    now = [trial.estimate().in_contact for trial in trials[number]]
-                    before = started.get(number, (False, False))
-                    started[number] = before[0] or now[0], before[1] or now[1]
+                    warm, cold = (trial.estimate().in_contact for trial in trials[touch])
+                    before = started.get(touch, (False, False))
+                    started[touch] = before[0] or warm, before[1] or cold
         if i % outer == 0:
             is_moving = bool(recording.speed[i] > EVALUATION.moving)
             moments.append(EstimatedMoment(time, estimator.estimate(), is_moving))
@@ -82,24 +77,19 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
 
 
 def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: Arm, **more: Any) -> ContactScore:
-    touches = [touch for touch in recording.touches if touch.end < moments[-1].time]
-    acting = [during(moments, touch.begin, touch.end) for touch in touches]
-    busy = np.zeros(len(moments), bool)
-    for touch in touches:
-        busy |= during(moments, touch.begin, touch.end + (EVALUATION.setting_down if touch.mass else EVALUATION.edge))
-    free = ~busy & during(moments, EVALUATION.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
-    warned = [one.estimate.warning is not None for one, take in zip(moments, ~busy, strict=True) if take]
+    contacts = [_contact(touch, moments) for touch in recording.touches if touch.end < moments[-1].time]
+    free = quiet(moments, contacts)
+    settled = free & during(moments, EVALUATION.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
+    warned = [one.estimate.warning is not None for one in compress(moments, free)]
     truth = np.zeros((len(moments), len(arm.joints.names)))
     return score_of(
         arm,
         moments,
-        [_contact(touch, moments) for touch in touches],
-        acting,
-        busy,
-        torques=torque_errors(moments, truth, free),
+        contacts,
+        torques=torque_errors(moments, truth, settled),
         warnings=sum(warned) / max(1, len(warned)),
-        contact_seconds=sum(touch.end - touch.begin for touch in touches if not touch.mass),
-        masses=tuple(_mass(touch, moments, acts) for touch, acts in zip(touches, acting, strict=True) if touch.mass),
+        contact_seconds=sum(one.end - one.begin for one in contacts if not one.mass),
+        masses=tuple(_mass(one, moments) for one in contacts if one.mass),
         failure=recording.failure,
         **more,
     )
@@ -112,15 +102,15 @@ def names_payload(estimate: ContactEstimate) -> bool:
     return warned or any(Reason.PAYLOAD in h.reasons or h.cover == PAYLOAD for h in best)
 
 
-def _mass(touch: Touch, moments: Sequence[EstimatedMoment], acting: Mask) -> MassOutcome:
-    during = [one.estimate for one, acts in zip(moments, acting, strict=True) if acts]
-    linked = [one.in_contact and one.link != PAYLOAD for one in during]
-    named = [names_payload(one) for one in during]
+def _mass(contact: TrueContact, moments: Sequence[EstimatedMoment]) -> MassOutcome:
+    acting = [one.estimate for one in compress(moments, during(moments, contact.begin, contact.end))]
+    linked = [one.in_contact and one.link != PAYLOAD for one in acting]
+    named = [names_payload(one) for one in acting]
     return MassOutcome(
-        mass=touch.mass,
+        mass=contact.mass,
         detected=any(linked) or any(named),
         named=any(named),
-        wrong=any(is_sure_and_wrong(one, touch.cover) and one.link != PAYLOAD for one in during),
+        wrong=any(is_sure_and_wrong(one, contact.cover) and one.link != PAYLOAD for one in acting),
         lasting=linked[-1] and not named[-1],
     )
 
@@ -135,4 +125,7 @@ def _contact(touch: Touch, moments: Sequence[EstimatedMoment]) -> TrueContact:
     )
     force = float(np.linalg.norm(touch.force)) + STANDARD_GRAVITY * touch.mass
     place = touch.place_at(moments[due].time)
-    return TrueContact(touch.kind, touch.cover, place, force, touch.friction, first, due, late, touch.begin, touch.mass)
+    return TrueContact(
+        touch.kind, touch.cover, place, force, touch.friction, touch.begin, touch.end, first, due, late, touch.begin,
+        touch.mass,
+    )  # fmt: skip

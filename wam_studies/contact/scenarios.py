@@ -42,6 +42,7 @@ class ScenarioRanges:
 
 RANGES = ScenarioRanges()
 KINDS = ("push", "sphere", "flat")
+GROUPS = ("moving", "dither", "free")
 
 # what the estimator states of an arm that was identified to this range, as standard deviations
 IDENTIFIED = {
@@ -120,68 +121,57 @@ class ScenarioGenerator:
     """
 
     def __init__(self, configuration: Configuration, seed: int, joint_sensors: bool = False) -> None:
-        self._configuration, self._seed = configuration, seed
+        self._seed, self._dither = seed, dither_values(configuration)
         self._arm: Arm = configuration.shared.arm
         self._moves = MoveGenerator(self._arm)
         self._base = base_values(configuration, joint_sensors) | IDENTIFIED
 
     def contacts(self, count: int) -> list[BenchmarkScenario]:
         """Scenarios with `count` contacts in motion, two per scenario."""
-        return [self._moving(i) for i in range((count + 1) // 2)]
+        return [self._touched("moving", i) for i in range((count + 1) // 2)]
 
     def resting(self, count: int) -> list[BenchmarkScenario]:
         """Scenarios with `count` contacts at rest with dither, two per scenario; none without it."""
-        return [self._resting(i) for i in range((count + 1) // 2)] if dither_values(self._configuration) else []
+        return [self._touched("dither", i) for i in range((count + 1) // 2)] if self._dither else []
 
     def free(self, seconds: float) -> list[BenchmarkScenario]:
         """Motion with stops and reversals and an unmodelled payload, without contact."""
         return [self._free(i) for i in range(math.ceil(seconds / RANGES.free_seconds - 1e-9))]
 
-    def _random(self, group: int, i: int) -> np.random.Generator:
-        return np.random.default_rng((self._seed, group, i))
+    def _drawn(self, group: str, i: int) -> tuple[str, np.random.Generator, tuple[float, ...]]:
+        """Name, random numbers and start pose, rad, of a scenario."""
+        random = np.random.default_rng((self._seed, GROUPS.index(group), i))
+        return f"seed {self._seed} {group} {i}", random, self._moves.pose(random)
 
-    def _moving(self, i: int) -> BenchmarkScenario:
-        random = self._random(0, i)
-        start = self._moves.pose(random)
-        moves = self._moves.moves(random, start, 2)
-        steps, planned = _opening(), []
-        now = RANGES.release + RANGES.settle
-        for number, move in enumerate(moves):
-            begin = now + 0.3 * move.seconds
-            contact = self._contact(random, begin, begin + RANGES.hold)
+    def _touched(self, group: str, i: int) -> BenchmarkScenario:
+        """A scenario with a contact in each of two moves, or in each of two rests after a move with dither."""
+        name, random, start = self._drawn(group, i)
+        if group == "moving":
+            before, moves, after = [], self._moves.moves(random, start, 2), [ScenarioStep("end", 0.1)]
+            legs = [(move._replace(name=f"move {k}"), 0.3 * move.seconds) for k, move in enumerate(moves, 1)]
+            hold, dither = RANGES.hold, {}
+        else:
+            before, after = self._moves.moves(random, start, 1), []
+            seconds = RANGES.rest + RANGES.rest_hold + 0.2
+            legs = [(ScenarioStep(f"rest {k}", seconds), RANGES.rest) for k in (1, 2)]
+            hold, dither = RANGES.rest_hold, self._dither
+        steps, planned = [*_opening(), *before], []
+        for step, wait in legs:
+            now = sum(one.seconds for one in steps)
+            contact = self._contact(random, now + wait, now + wait + hold)
             planned.append(contact)
-            push = self._push(contact, now) if contact.kind == "push" else None
-            steps.append(ScenarioStep(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
-            now += move.seconds
-        steps.append(ScenarioStep("end", 0.1))
-        values = self._values(random, start, planned)
-        return BenchmarkScenario(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
-
-    def _resting(self, i: int) -> BenchmarkScenario:
-        random = self._random(1, i)
-        start = self._moves.pose(random)
-        (move,) = self._moves.moves(random, start, 1)
-        steps, planned = [*_opening(), ScenarioStep("move", move.seconds, posture=move.posture)], []
-        now = RANGES.release + RANGES.settle + move.seconds
-        for number in range(2):
-            begin = now + RANGES.rest
-            contact = self._contact(random, begin, begin + RANGES.rest_hold)
-            planned.append(contact)
-            push = self._push(contact, now) if contact.kind == "push" else None
-            steps.append(ScenarioStep(f"rest {number + 1}", RANGES.rest + RANGES.rest_hold + 0.2, push=push))
-            now += steps[-1].seconds
-        values = self._values(random, start, planned) | dither_values(self._configuration)
-        return BenchmarkScenario(f"seed {self._seed} dither {i}", "dither", values, tuple(steps), tuple(planned))
+            steps.append(step._replace(push=self._push(contact, now) if contact.kind == "push" else None))
+        values = self._values(random, start, planned) | dither
+        return BenchmarkScenario(name, group, values, (*steps, *after), tuple(planned))
 
     def _free(self, i: int) -> BenchmarkScenario:
-        random = self._random(2, i)
-        start = self._moves.pose(random)
+        name, random, start = self._drawn("free", i)
         steps = moves_and_stops(self._moves, random, start, RANGES.free_seconds, (0.0, 0.0, 0.1, 0.4))
         values = self._values(random, start, [])
         if i % 2:  # no payload in the others, as in the scenarios with contact
             values["driver:mismatch.payload"] = float(random.uniform(0.0, RANGES.payload))
             values["contact_estimator:observer.payload"] = [0.0, RANGES.payload]
-        return BenchmarkScenario(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
+        return BenchmarkScenario(name, "free", values, tuple(steps), ())
 
     def _contact(self, random: np.random.Generator, begin: float, end: float) -> PlannedContact:
         covers = self._arm.covers
@@ -238,7 +228,7 @@ def moves_and_stops(
     steps, left, here = _opening(), seconds - RANGES.release - RANGES.settle, start
     while left > 0.0:
         (move,) = moves.moves(random, here, 1, before=steps[-1].posture)
-        steps.append(ScenarioStep("move", move.seconds, posture=move.posture))
+        steps.append(move)
         stop = float(random.choice(stops))
         if stop:
             steps.append(ScenarioStep("stop", stop))

@@ -19,11 +19,10 @@ from wam_studies.contact.outcomes import (
     EstimatedMoment,
     Mask,
     TrueContact,
-    during,
     score_of,
     torque_errors,
 )
-from wam_studies.contact.scenarios import RANGES, BenchmarkScenario, PlannedContact
+from wam_studies.contact.scenarios import RANGES, BenchmarkScenario
 
 
 class Played(NamedTuple):
@@ -98,68 +97,50 @@ def spans(loads: Sequence[Load]) -> list[Span]:
 
 def score(played: Played, arm: Arm) -> ContactScore:
     """Score a scenario."""
-    moments, found = played.moments, spans(played.loads)
-    counted, period = [span for span in found if _counts(played, span)], moments[1].time - moments[0].time
-    busy = np.zeros(len(moments), bool)
-    for span in found:
-        busy |= _during(moments, span, EVALUATION.edge)
+    moments, contacts = played.moments, [_contact(played, span) for span in spans(played.loads)]
     return score_of(
         arm,
         moments,
-        [_contact(played, span) for span in counted],
-        [_during(moments, span) for span in counted],
-        busy,
+        contacts,
         name=played.scenario.name,
         group=played.scenario.group,
-        torques=torque_errors(moments, _truth(played, period), _settled(moments, found)),
-        excluded=len(found) - len(counted),
-        not_made=max(0, len(played.scenario.planned) - len(found)),
+        torques=torque_errors(moments, _truth(played), _settled(moments, contacts)),
+        not_made=max(0, len(played.scenario.planned) - len(contacts)),
         failure=played.failure,
     )
 
 
-def _during(moments: Sequence[EstimatedMoment], span: Span, after: float = 0.0) -> Mask:
-    return during(moments, moments[span.first].time, moments[span.last].time + after)
-
-
-def _counts(played: Played, span: Span) -> bool:
-    """Whether a contact is neither too short nor too hard."""
-    hardest = max(map(force_of, played.loads[span.first : span.last + 1]))
-    lasts = played.moments[span.last].time - played.moments[span.first].time
-    return lasts >= EVALUATION.shortest - 1e-9 and hardest <= EVALUATION.greatest_force
-
-
 def _contact(played: Played, span: Span) -> TrueContact:
-    moments, begin = played.moments, played.moments[span.first].time
-    planned = _planned(played.scenario.planned, begin)
-    kind = planned.kind if planned else ""
+    times, (cover, first, last) = [one.time for one in played.moments], span
+    begin, end = times[first], times[last]
+    planned = next((one for one in played.scenario.planned if one.begin - 0.05 <= begin <= one.end), None)
+    kind, friction = (planned.kind, planned.friction) if planned else ("", np.nan)
     wait = EVALUATION.settled if played.scenario.group == "moving" else EVALUATION.settled_at_rest
-    due = max(i for i in range(span.first, span.last) if moments[i].time - begin <= wait + 1e-9)
+    due = max((i for i in range(first, last) if times[i] - begin <= wait + 1e-9), default=first)
     load = played.loads[due] if played.loads[due].cover else played.loads[due - 1]
-    since, friction = moments[max(span.first - 1, 0)].time, planned.friction if planned else np.nan
-    return TrueContact(kind, span.cover, load.position, force_of(load), friction, span.first, due, span.last, since)
+    hardest = max(map(force_of, played.loads[first : last + 1]))
+    return TrueContact(
+        kind, cover, load.position, force_of(load), friction, begin, end, first, due, last, times[max(first - 1, 0)],
+        counts=end - begin >= EVALUATION.shortest - 1e-9 and hardest <= EVALUATION.greatest_force,
+    )  # fmt: skip
 
 
-def _planned(planned: Sequence[PlannedContact], time: float) -> PlannedContact | None:
-    return next((contact for contact in planned if contact.begin - 0.05 <= time <= contact.end), None)
-
-
-def _settled(moments: Sequence[EstimatedMoment], found: Sequence[Span]) -> Mask:
+def _settled(moments: Sequence[EstimatedMoment], contacts: Sequence[TrueContact]) -> Mask:
     """Moments away from the start and end of contacts, and from the observer's own transient."""
     times = np.array([one.time for one in moments])
     keep: Mask = times > times[0] + 0.2
-    for span in found:
-        for edge in (times[span.first], times[span.last]):
+    for contact in contacts:
+        for edge in (contact.begin, contact.end):
             keep &= ~((times > edge - 0.02) & (times < edge + EVALUATION.edge))
     return keep
 
 
-def _truth(played: Played, period: float) -> Array:
+def _truth(played: Played) -> Array:
     """True external torques, (k, n); with dither the means over its cycle, as the estimate is one."""
     rows: Array = np.array(played.torques)
     if played.scenario.group != "dither":
         return rows
-    count = round(RANGES.dither_cycle / period)
+    count = round(RANGES.dither_cycle / (played.moments[1].time - played.moments[0].time))
     before = np.concatenate((np.repeat(rows[:1], count, axis=0), rows)).cumsum(axis=0)
     mean: Array = (before[count:] - before[:-count]) / count
     return mean

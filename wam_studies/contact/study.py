@@ -14,7 +14,7 @@ from wam_studies.contact.recording import CONTACTS, TIMES, Drive, record
 from wam_studies.contact.replay import replay
 from wam_studies.contact.rows import (
     IDENTIFIED_ARM,
-    STATED,
+    MEDIANS,
     degraded_rows,
     degraded_tables,
     error_of,
@@ -139,8 +139,8 @@ def _errors(found: Sequence[ContactOutcome]) -> Panel:
         medians = {force: error_of(near(own, force)).value for force in RANGES.levels}
         known = {force: CENTIMETRES * value for force, value in medians.items() if math.isfinite(value)}
         lines.append((kind, measured(list(known), list(known.values()))))
-    required = [CENTIMETRES * allowed[0][1] for allowed in STATED.median.values()]
-    lines.append(("required", line_only(list(STATED.median), required)))
+    required = [CENTIMETRES * most for most, _ in MEDIANS.values()]
+    lines.append(("required", line_only(list(MEDIANS), required)))
     return Panel("position in motion, median error", "force [N]", "error [cm]", lines)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Covers
 
 
 @dataclass(frozen=True)
@@ -72,12 +72,13 @@ class Touch(NamedTuple):
     kind : of `KINDS`.
     cover : name of the cover.
     position : m along the cover at the start.
+    begin, end : s.
     force : (3,), N, of the world on the cover, in its frame.
     arm : (3,), m, from the axis at `position` to the point of the force.
+    friction : coefficient; tangential over normal force.
     twist : N m about the cover's x axis.
     speed : m/s, of the position.
-    begin, end, rise : s.
-    friction : coefficient; tangential over normal force.
+    rise : s.
     harder, within : factor by which the force grows, `TOUCHES.harder_after` the start, and s that this takes.
     mass : kg, picked up by the tool; its force is 0.
     """
@@ -85,17 +86,17 @@ class Touch(NamedTuple):
     kind: str
     cover: str
     position: float
-    force: tuple[float, float, float]
-    arm: tuple[float, float, float]
-    twist: float
-    speed: float
     begin: float
     end: float
-    friction: float
+    force: tuple[float, ...] = (0.0, 0.0, 0.0)
+    arm: tuple[float, ...] = (0.0, 0.0, 0.0)
+    friction: float = 0.0
+    twist: float = 0.0
+    speed: float = 0.0
+    rise: float = TOUCHES.rise
     harder: float = 1.0
     within: float = 0.1
     mass: float = 0.0
-    rise: float = TOUCHES.rise
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
@@ -108,19 +109,12 @@ class Touch(NamedTuple):
         """Contact position, m."""
         return self.position + self.speed * max(0.0, time - self.begin)
 
-    def wrench(self, time: float, axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """Force, N, and moment about the origin of the cover, N m; `axis` is the tube's axis at the contact, m."""
-        share = self.share(time)
-        force = share * np.array(self.force)
-        return force, np.cross(np.array(axis) + np.array(self.arm), force) + np.array([share * self.twist, 0.0, 0.0])
-
-
-def axis_of(arm: Arm, cover: str, place: float) -> tuple[float, float, float]:
-    """Point of the tube's axis at a position along the cover, m."""
-    i = arm.covers.names.index(cover)
-    start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (arm.covers.start, arm.covers.end))
-    x, y, z = (start + (place - start[0]) / (end[0] - start[0]) * (end - start)).tolist()
-    return x, y, z
+    def wrench(self, time: float, covers: Covers) -> np.ndarray:
+        """Force, N, and moment about the origin of the cover, N m, (6,)."""
+        share, place = self.share(time), self.place_at(time)
+        force, axis = share * np.array(self.force), (place, *covers.aside(self.cover, place))
+        twist = np.array((share * self.twist, 0.0, 0.0))
+        return np.concatenate((force, np.cross(np.add(axis, self.arm), force) + twist))
 
 
 def touches(
@@ -132,7 +126,7 @@ def touches(
         kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
         drawn = _drawn(arm, random, kind, begin, 1.0 if kinds is LEVEL_KINDS else 0.5)
         if kinds is LASTING_KINDS:
-            hold = float(np.exp(random.uniform(*np.log(TOUCHES.lasting))))
+            hold = _log_uniform(random, *TOUCHES.lasting)
             rise = TOUCHES.slow if random.random() < 0.3 else TOUCHES.rise
             drawn = drawn._replace(end=begin + hold, rise=min(rise, 0.5 * hold))
         found.append(drawn)
@@ -148,57 +142,45 @@ def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
 
 def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> Touch:
     inner, outer = _neighbours(arm, random)
-    size = _size(random, of_levels)
+    size, length = _size(random, of_levels), arm.covers.length_of(outer)
     if kind == PICKING_UP:
-        mass = float(np.exp(random.uniform(math.log(TOUCHES.lightest), math.log(TOUCHES.heaviest))))
-        none, end = (0.0, 0.0, 0.0), begin + float(random.choice(TOUCHES.holds_of_mass))
-        return Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)
+        mass, hold = _log_uniform(random, TOUCHES.lightest, TOUCHES.heaviest), random.choice(TOUCHES.holds_of_mass)
+        return Touch(kind, outer, length, begin, begin + float(hold), mass=mass)
+    end = begin + TOUCHES.hold
     if kind in ("tip along the tube", "end cap, oblique"):
         lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
         angle = float(random.uniform(-math.pi, math.pi))
-        length = _length(arm, outer)
-        force = (
-            -size * math.cos(lean),
-            size * math.sin(lean) * math.cos(angle),
-            size * math.sin(lean) * math.sin(angle),
-        )
-        return Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + TOUCHES.hold, 0.0)
+        across = size * math.sin(lean)
+        force = (-size * math.cos(lean), across * math.cos(angle), across * math.sin(angle))
+        return Touch(kind, outer, length, begin, end, force)
+    cover = str(random.choice((inner, outer))) if kind == "elbow" else inner if kind == "inner" else outer
+    touch = _side(arm, random, cover, size, begin)._replace(kind=kind)
     if kind == "elbow":
-        cover = str(random.choice((inner, outer)))
-        touch = _side(arm, random, cover, size, begin, TOUCHES.hold)
         place = float(random.uniform(0.0, TOUCHES.near_elbow))
-        return touch._replace(kind=kind, position=place if cover == outer else _length(arm, inner) - place)
+        return touch._replace(position=place if cover == outer else arm.covers.length_of(inner) - place)
     if kind == "drag along the tube":
-        touch = _side(arm, random, outer, size, begin, TOUCHES.hold)
-        along = float(random.choice((-1.0, 1.0))) * size
-        return touch._replace(kind=kind, force=(along, 0.0, 0.0), friction=math.inf)
-    touch = _side(arm, random, inner if kind == "inner" else outer, size, begin, TOUCHES.hold)
+        return touch._replace(force=(float(random.choice((-1.0, 1.0))) * size, 0.0, 0.0), friction=math.inf)
     if kind == "twist":
-        touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
+        return touch._replace(twist=float(random.choice((-0.5, 0.5))))
     if kind == "sliding":
-        middle = 0.5 * _length(arm, outer)
-        touch = touch._replace(speed=TOUCHES.slide if touch.position < middle else -TOUCHES.slide)
+        return touch._replace(speed=TOUCHES.slide if touch.position < 0.5 * length else -TOUCHES.slide)
     if kind == "harder":
-        low, high = TOUCHES.harder_within
-        factor, within = float(random.uniform(*TOUCHES.harder)), float(random.uniform(low, high))
-        x, y, z = touch.force
-        touch = touch._replace(force=(x / factor, y / factor, z / factor), harder=factor, within=within)
-    if kind == "impact":
-        touch = touch._replace(end=begin + TOUCHES.impact)
-    return touch._replace(kind=kind)
-
-
-def _length(arm: Arm, cover: str) -> float:
-    return arm.covers.length_of(cover)
+        factor, within = (float(random.uniform(*ends)) for ends in (TOUCHES.harder, TOUCHES.harder_within))
+        return touch._replace(force=tuple(x / factor for x in touch.force), harder=factor, within=within)
+    return touch._replace(end=begin + TOUCHES.impact) if kind == "impact" else touch
 
 
 def _size(random: np.random.Generator, of_levels: float) -> float:
     if random.random() < of_levels:
         return float(random.choice(TOUCHES.levels)) * float(random.uniform(0.95, 1.05))
-    return float(np.exp(random.uniform(math.log(TOUCHES.weakest), math.log(TOUCHES.strongest))))
+    return _log_uniform(random, TOUCHES.weakest, TOUCHES.strongest)
 
 
-def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin: float, hold: float) -> Touch:
+def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(random.uniform(math.log(low), math.log(high))))
+
+
+def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin: float) -> Touch:
     """A normal force with friction in any direction, at the surface of the tube."""
     i = arm.covers.names.index(cover)
     angle, way = random.uniform(-math.pi, math.pi, 2)
@@ -206,17 +188,7 @@ def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin:
     normal = np.array([0.0, math.cos(angle), math.sin(angle)])
     around = np.array([0.0, -math.sin(angle), math.cos(angle)])
     tangent = math.cos(way) * np.array([1.0, 0.0, 0.0]) + math.sin(way) * around
-    force = size * (normal + friction * tangent)
-    lever = -arm.covers.radius[i] * normal
-    return Touch(
-        kind="outer" if i else "inner",
-        cover=cover,
-        position=float(random.uniform(TOUCHES.margin, arm.covers.length[i] - TOUCHES.margin)),
-        force=(float(force[0]), float(force[1]), float(force[2])),
-        arm=(float(lever[0]), float(lever[1]), float(lever[2])),
-        twist=0.0,
-        speed=0.0,
-        begin=begin,
-        end=begin + hold,
-        friction=friction,
-    )
+    force, lever = size * (normal + friction * tangent), -arm.covers.radius[i] * normal
+    place = float(random.uniform(TOUCHES.margin, arm.covers.length[i] - TOUCHES.margin))
+    end = begin + TOUCHES.hold
+    return Touch("", cover, place, begin, end, tuple(force.tolist()), tuple(lever.tolist()), friction)

@@ -2,9 +2,19 @@
 
 import numpy as np
 
-from wam_studies.figures.panels import Mark, Panel, Panels, Series, line_only
-from wam_studies.plant.effects import efficiency_under_load, resonances
-from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, limiting_efficiency, link_inertia
+from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
+from wam_studies.plant.ideal_testbed import (
+    IMMOVABLE,
+    RATIO,
+    STEP,
+    against_spring,
+    frequencies,
+    ideal_testbed,
+    limiting_efficiency,
+    link_inertia,
+    power_ratio,
+    released_plant,
+)
 from wam_theory.requisites import largest_cylinder, secure_angle, useful_length
 from wam_theory.resonance import (
     best_contact_stiffness,
@@ -29,6 +39,12 @@ def grasp() -> Panels:
         Panel("useful length of a link (3.2)", aspect, "L'/L [-]", tuple(length), "x"),
         Panel("largest cylinder (3.3)", aspect, "D/L [-]", tuple(diameter), "x"),
     )
+
+
+def resonances(ratio: float, stiffness: Numbers) -> Numbers:
+    """Both resonances of (4.4) from the plant's own one-step map, (2, k), rad/s, over k_c at the joint, N m/rad."""
+    arm = ideal_testbed(ratio)
+    return np.array([frequencies(released_plant(arm, against_spring(k)))[[0, 2]] for k in stiffness]).T
 
 
 def breakpoints() -> Panels:
@@ -70,13 +86,26 @@ def breakpoints() -> Panels:
     )
 
 
+def plant_efficiency(torque: float) -> float:
+    """Power out over power in of the plant in slow motion under a load of a torque of the motor, N m."""
+    arm = ideal_testbed(rotor=IMMOVABLE, damping=0.02)
+    plant, load = released_plant(arm, creep=True), 14.0 * torque
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
+    plant.data.qpos[0] = load / 14.0 / arm.circuits[0].stiffness
+    plant.step([0.0], round(0.1 / STEP))
+    plant.data.qvel[:] = (5.0, 5.0 / 14.0)
+    plant.step([0.0], round(1.5 / STEP))
+    return power_ratio(plant, load, round(1.0 / STEP))
+
+
 def efficiencies() -> Panels:
     """Upper bound (6.15): the testbed over torque and the plant in slow motion; equal stages over the tension."""
-    arm, found, torques = ideal_testbed(), efficiency_under_load(), np.linspace(0.0, 7.5, 60)
+    arm, torques, some = ideal_testbed(), np.linspace(0.0, 7.5, 60), np.linspace(1.0, 6.779, 6)
     line = [limiting_efficiency(arm, torque) for torque in torques]
     strain = np.linspace(0.0, 0.03, 60)
     equal = [(f"n = {n}", line_only(1e2 * strain, equal_stages_efficiency(strain, 1.0, float(n)))) for n in range(1, 7)]
-    testbed, power = Series(torques, np.array(line), found.x, found.plant), "power out over power in [-]"
+    plant = np.array([plant_efficiency(torque) for torque in some.tolist()])
+    testbed, power = Series(torques, np.array(line), some, plant), "power out over power in [-]"
     return (
         Panel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
         Panel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),

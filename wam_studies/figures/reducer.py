@@ -57,8 +57,7 @@ def static_stiffness(arm: Arm, torque: float = 5.0) -> float:
     arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
     plant = released_plant(arm)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
-    for _ in range(round(CASE.speed_change / STEP)):
-        plant.step([0.0])
+    plant.step([0.0], round(CASE.speed_change / STEP))
     while abs(plant.qd[0]) > 1e-7:
         plant.step([0.0])
     return torque / plant.q[0]

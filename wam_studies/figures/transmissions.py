@@ -184,8 +184,7 @@ def _efficiency(it: Driven) -> float:
     plant.data.qpos[1] = -(carried / it.stiffness + 0.5 * it.effects.play(0) / it.ratio)
     plant.data.qvel[:] = (it.ratio * CASE.speed_under_load, CASE.speed_under_load)
     count = round(1.0 / it.step)
-    for _ in range(count // 2):
-        plant.step([0.0])
+    plant.step([0.0], count // 2)
     return power_ratio(plant, load, count)
 
 
@@ -193,8 +192,7 @@ def _inertia(it: Driven, torque: float = 5.0, seconds: float = 2.0) -> float:
     """Torque on the link over its acceleration, kg m^2, without friction and play."""
     plant = it._replace(friction=driven("cables").friction).plant(play=False)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
-    for _ in range(round(seconds / it.step)):
-        plant.step([0.0])
+    plant.step([0.0], round(seconds / it.step))
     return torque * seconds / (plant.thetad[0] / it.ratio)
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import unknowns
 from wam_analysis.identification.regressor import Regressor
+from wam_control.task.motion import FASTEST
+from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm, Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, build_part
@@ -34,17 +36,9 @@ class MoveLimits:
     clearance: float = 0.15  # m, from obstacles
     rate: float = 0.05  # s, between the points of a move that are checked
     torque_sd: float = 0.002  # N m, of a motor: what the parameters are worth
-    peak: float = 1.875  # peak speed of a minimum-jerk move per mean speed
 
 
 MOVES = MoveLimits()
-
-
-class ExcitingMove(NamedTuple):
-    """One step of the scenario: posture at its end, rad, and its time, s."""
-
-    posture: tuple[float, ...]
-    seconds: float
 
 
 def scenario(configuration: Configuration, seed: int, seconds: float) -> dict[str, Any]:
@@ -73,7 +67,7 @@ def scenario(configuration: Configuration, seed: int, seconds: float) -> dict[st
     return {"steps": [*steps, {"name": "brake", "seconds": 0.5, "request": "disable"}]}
 
 
-def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[ExcitingMove]:
+def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[ScenarioStep]:
     """Moves of a seed, one after the other."""
     shared = configuration.shared
     random = np.random.Generator(np.random.PCG64(seed))
@@ -111,7 +105,7 @@ class MovePoints(NamedTuple):
     qdd: Array
 
 
-def path(begin: Array, move: ExcitingMove, period: float = MOVES.rate) -> MovePoints:
+def path(begin: Array, move: ScenarioStep, period: float = MOVES.rate) -> MovePoints:
     """Points, each `period` seconds, of the minimum-jerk path that a scenario plays."""
     time = np.arange(0.5 * period, move.seconds, period)
     s = (time / move.seconds)[:, None]
@@ -136,14 +130,13 @@ class _Space:
         self._tip = MOVES.speed * float(driver["tip_speed_limit"])
         self._starts = MOVES.speed * float(driver["cover_speed_limit"])
 
-    def draw(self, random: np.random.Generator, begin: Array) -> ExcitingMove | None:
+    def draw(self, random: np.random.Generator, begin: Array) -> ScenarioStep | None:
         """A random move, None if it is not allowed."""
         joints = self._arm.joints
         posture = random.uniform(np.array(joints.lower) + MOVES.margin, np.array(joints.upper) - MOVES.margin)
         speed = self._speed * random.uniform(MOVES.slowest, 1.0)
-        move = ExcitingMove(
-            tuple(posture.tolist()), max(MOVES.quickest, MOVES.peak * float(np.abs(posture - begin).max()) / speed)
-        )
+        seconds = max(MOVES.quickest, FASTEST * float(np.abs(posture - begin).max()) / speed)
+        move = ScenarioStep("move", seconds, tuple(posture.tolist()))
         points = path(begin, move)
         allowed = all(self._allows(q, qd) for q, qd in zip(points.q, points.qd, strict=True))
         return move if allowed else None

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
@@ -90,8 +90,7 @@ def stepped_map(plant: Plant, steps: int = 1) -> tuple[Numbers, Numbers]:
 
     def after(state: Numbers, torque: float) -> Numbers:
         plant.data.qpos[:], plant.data.qvel[:] = state[:size], state[size:]
-        for _ in range(steps):
-            plant.step([torque])
+        plant.step([torque], steps)
         return np.concatenate([plant.data.qpos, plant.data.qvel])
 
     columns = [after(state, 0.0) / small for state in small * np.eye(2 * size)]
@@ -118,22 +117,6 @@ def power_ratio(plant: Plant, load: float, steps: int) -> float:
         plant.step([0.0])
         work += plant.circuit_torque[0] * (plant.theta[0] - before)
     return load * (plant.q[0] - q) / work
-
-
-def breakaway(plant: Plant, torque: float) -> float:
-    """Torque of the motor, N m, slowly increased from this one, at which the rotor begins to turn."""
-    while plant.thetad[0] < 1e-5:
-        torque *= 1.00001
-        plant.step([torque])
-    return torque
-
-
-def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
-    """Creep at the joint, rad, under a load at the joint, N m, over the motor's travel, (6.19)."""
-    cables, ratio = arm.cables, arm.joint_from_motor[0]
-    stages = zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, cables.stage_circuits, strict=True)
-    total = sum(n * cable.creep(np.asarray(travel) / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
-    return np.asarray(total) * ratio
 
 
 def limiting_efficiency(arm: Arm, torque: float) -> float:

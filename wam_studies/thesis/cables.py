@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from wam_studies.figures.panels import Panel, line_only, measured
-from wam_studies.plant.ideal_testbed import crept, limiting_efficiency
+from wam_description.arm import Arm
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
+from wam_studies.plant.ideal_testbed import limiting_efficiency
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result, near
+from wam_theory import cable
 
 
 def efficiency(runs: Mapping[str, Recording]) -> Result:
@@ -82,6 +85,14 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
     return Result(
         rows, [Panel("creep, out and back twice", "travel of the motor [rad]", "creep [mrad]", curves)], (remark,)
     )
+
+
+def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
+    """Creep at the joint, rad, under a load at the joint, N m, over the motor's travel, (6.19)."""
+    cables, ratio = arm.cables, arm.joint_from_motor[0]
+    stages = zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, cables.stage_circuits, strict=True)
+    total = sum(n * cable.creep(np.asarray(travel) / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
+    return np.asarray(total) * ratio
 
 
 def corrected(runs: Mapping[str, Recording]) -> Result:

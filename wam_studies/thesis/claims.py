@@ -14,7 +14,7 @@ import yaml
 
 from wam_analysis.table import markdown
 from wam_studies.figures.catalogue import FIGURES
-from wam_studies.plant.table import EFFECTS
+from wam_studies.plant.effects import EFFECTS
 
 PLACE = re.compile(r"\{(figure|effect) ([^}]+)\}")
 
