@@ -1,8 +1,7 @@
 """The live page: the arm, its contacts and its forces in a browser, from a running stack or from a bag.
 
 - snapshot: what the page shows at one instant
-- scene: the three-dimensional picture: links, surroundings, contact arrows, dragging a link
-- object_meshes: free bodies, doors and moving obstacles in that picture
+- scene: the three-dimensional picture: links, surroundings and objects, contact arrows, dragging a link
 - panel: status, buttons, sliders and plots
 - page: the web server that holds both, reachable from this machine alone
 - stack_source: a running stack as the source

@@ -14,7 +14,6 @@ from wam_analysis.recording import AnalysedRecording
 from wam_analysis.traces import ForceSignal
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
-from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import Controls
 from wam_live.scene import Scene
@@ -128,8 +127,7 @@ def play(
     source = BagSource(recording)
     server = serve(port)
     try:
-        scene = Scene(server, source.recorded.arm, at_rest(source.recorded.world), draggable=False)
-        objects = ObjectMeshes(server, source.recorded.world)
+        scene = Scene(server, source.recorded.arm, source.recorded.world, draggable=False)
         length = (source.end - source.begin) / 1e9
         name_page(server, recording.bag.path.name)
         place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
@@ -161,7 +159,6 @@ def play(
                 snapshot = source.snapshot(source.begin + round(place * 1e9))
                 with server.atomic():
                     scene.show(snapshot)
-                    objects.show(snapshot.objects)
                     panel.show(snapshot)
     finally:
         with quiet():

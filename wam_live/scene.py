@@ -15,18 +15,28 @@ import viser
 from numpy.typing import NDArray
 from viser.transforms import SO3
 
-from wam_analysis.drawing import BLOCK_COLOUR, COLOURS, HAND, LIKELY, PEDESTAL_COLOUR, TUBE_COLOURS, channels
+from wam_analysis.drawing import (
+    BLOCK_COLOUR,
+    COLOURS,
+    HAND,
+    LIKELY,
+    OBJECT_COLOUR,
+    PEDESTAL_COLOUR,
+    TUBE_COLOURS,
+    channels,
+)
 from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, LikelyRange, Wrench
-from wam_description.world import Obstacles
+from wam_description.world import Solid, World
 from wam_live.snapshot import Snapshot, size
 from wam_live.thresholds import LIVE
 
 ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one point
 
 Array = NDArray[np.float64]
+Quaternion = tuple[float, float, float, float]  # w x y z
 
 
 class Grip(NamedTuple):
@@ -52,11 +62,15 @@ class Scene:
     Parameters
     ----------
     server : that shows it.
-    arm, obstacles : as the driver's parameters have them.
+    arm, world : as the driver's parameters have them.
     draggable : whether links can be dragged; in a recording they cannot.
+
+    Attributes
+    ----------
+    links, objects : frames of the covers by name, and of the objects of the world in their order.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, draggable: bool) -> None:
+    def __init__(self, server: viser.ViserServer, arm: Arm, world: World, draggable: bool) -> None:
         self._scene, self._arm, self._draggable = server.scene, arm, draggable
         self._body = RigidBody(arm)
         self._q = list(arm.joints.start)
@@ -67,7 +81,8 @@ class Scene:
         self._scene.configure_environment_map(hdri=None)
         self._scene.add_light_ambient("/light", intensity=1.2)
         self.links = {name: self._add_link(i, name) for i, name in enumerate(arm.covers.names)}
-        self._add_surroundings(obstacles)
+        self.objects = [self._scene.add_frame(f"/world/{name}", show_axes=False) for name in world.objects]
+        self._add_surroundings(world)
         self._arrows = {name: self._add_arrow(name) for name in ("true", "estimated")}
         self._place = self._scene.add_icosphere(
             "/contact/place", 0.02, lit(COLOURS["estimated"]), visible=False, cast_shadow=False
@@ -91,6 +106,9 @@ class Scene:
             for name, frame in self.links.items():
                 pose = self._body.cover_pose(self._q, name)
                 frame.position, frame.wxyz = pose.position, quaternion(pose.rotation)
+        for frame, state in zip(self.objects, snapshot.objects, strict=False):
+            frame.position = (state.x, state.y, state.z)
+            frame.wxyz = (state.qw, state.qx, state.qy, state.qz)
         self._show_arrow("true", snapshot.true)
         self._show_arrow("estimated", snapshot.estimated)
         self._show_likely(snapshot.likely)
@@ -122,26 +140,34 @@ class Scene:
             tube.on_drag("left")(self._dragged(name, (start, end)))
         return frame
 
-    def _add_surroundings(self, obstacles: Obstacles) -> None:
+    def _add_surroundings(self, world: World) -> None:
+        obstacles = world.obstacles
         for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
             three = slice(3 * i, 3 * i + 3)
-            sizes = obstacles.sizes[three]
-            place = {
-                "position": obstacles.positions[three],
-                "wxyz": quaternion(pin.rpy.rpyToMatrix(*obstacles.rotations[three])),
-                "cast_shadow": False,
-            }
-            path, colour = f"/world/{name}", channels(BLOCK_COLOUR)
-            if shape == "cylinder":
-                self._scene.add_cylinder(path, sizes[0], 2.0 * sizes[1], colour, **place)
-            else:
-                thick = sizes[2] if shape == "box" else 0.002
-                self._scene.add_box(path, colour, (2.0 * sizes[0], 2.0 * sizes[1], 2.0 * thick), **place)
+            turn = quaternion(pin.rpy.rpyToMatrix(*obstacles.rotations[three]))
+            if name not in world.moving:
+                x, y, z = obstacles.positions[three]
+                solid = Solid(name, shape, obstacles.sizes[three], (x, y, z))
+                self._add_solid(f"/world/{name}", solid, BLOCK_COLOUR, turn)
+        for solid in world.solids:
+            colour = BLOCK_COLOUR if solid.name in world.moving else OBJECT_COLOUR
+            self._add_solid(f"/world/{solid.name}/mesh", solid, colour)
         self._scene.add_cylinder(
             "/world/pedestal", LAYOUT.pedestal, -LAYOUT.floor, channels(PEDESTAL_COLOUR),
             position=(0, 0, 0.5 * LAYOUT.floor), cast_shadow=False,
         )  # fmt: skip
         self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, LAYOUT.floor), cell_size=0.2)
+
+    def _add_solid(self, path: str, solid: Solid, colour: str, turn: Quaternion = (1.0, 0.0, 0.0, 0.0)) -> None:
+        look, size = channels(colour), solid.size
+        place: dict[str, Any] = {"position": solid.centre, "wxyz": turn, "cast_shadow": False}
+        if solid.shape == "ball":
+            self._scene.add_icosphere(path, size[0], look, **place)
+        elif solid.shape == "cylinder":
+            self._scene.add_cylinder(path, size[0], 2.0 * size[1], look, **place)
+        else:
+            thick = size[2] if solid.shape == "box" else 0.002
+            self._scene.add_box(path, look, (2.0 * size[0], 2.0 * size[1], 2.0 * thick), **place)
 
     def _add_arrow(self, name: str) -> Any:
         shaft, head = ARROWS[name]
@@ -241,7 +267,7 @@ def lit(colour: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def quaternion(rotation: Array) -> tuple[float, float, float, float]:
+def quaternion(rotation: Array) -> Quaternion:
     """Quaternion w x y z of a rotation matrix; pinocchio's would lose 40 bytes of memory in each call."""
     w, x, y, z = SO3.from_matrix(rotation).wxyz.tolist()
     return w, x, y, z

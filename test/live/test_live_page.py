@@ -49,7 +49,7 @@ from wam_description.signals import (
 )
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
-from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_description.world import NO_SPRINGS, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 from wam_live.page import free_port as next_free_port
 from wam_live.thresholds import LIVE
@@ -61,7 +61,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
-from wam_live.object_meshes import ObjectMeshes  # noqa: E402
 from wam_live.panel import DITHER, FORCES, NO_PRESS, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import Grip, Scene, band_push  # noqa: E402
@@ -74,7 +73,7 @@ from wam_ros.wire import encoder  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
-OBSTACLES = build_part(Obstacles, CONFIGURATION.sections["driver"], "world.obstacles.")
+WORLD = build_part(World, CONFIGURATION.sections["driver"], "world.")
 MOVED = 3e-4  # rad, by which an arm that holds its posture gives way to a push
 POSE = (0.3, -0.9, 0.2, 0.8)
 
@@ -111,9 +110,9 @@ def turned(wxyz: Any, vector: Any) -> np.ndarray[Any, Any]:
 )
 def test_links_are_drawn_where_the_simulator_has_them(server: Any, name: str, pose: tuple[float, ...]) -> None:
     arm = Configuration.load(packaged(name)).shared.arm
-    scene = Scene(server, arm, OBSTACLES, draggable=False)
+    scene = Scene(server, arm, WORLD, draggable=False)
     scene.show(Snapshot(stamp=1, q=pose))
-    model = mujoco.MjModel.from_xml_string(mjcf(arm, 0.001, World(OBSTACLES, NO_SPRINGS), no_effects(arm)))
+    model = mujoco.MjModel.from_xml_string(mjcf(arm, 0.001, World(WORLD.obstacles, NO_SPRINGS), no_effects(arm)))
     data = mujoco.MjData(model)
     for joint, angle in zip(arm.joints.names, pose, strict=True):
         data.joint(joint).qpos[0] = angle
@@ -131,7 +130,7 @@ def test_links_are_drawn_where_the_simulator_has_them(server: Any, name: str, po
 
 
 def test_contacts_are_drawn_as_arrows_along_the_force_and_vanish(server: Any) -> None:
-    scene = Scene(server, ARM, OBSTACLES, draggable=False)
+    scene = Scene(server, ARM, WORLD, draggable=False)
     contact = Contact("outer_link", 0.2, (0.0, 0.0, 10.0), 0.01)
     scene.show(Snapshot(1, POSE, true=contact, likely=(LikelyRange("outer_link", 0.1, 0.3),)))
     arrow, band = (server.scene.get_handle_by_name(f"/contact/{name}") for name in ("true", "likely0"))
@@ -180,7 +179,7 @@ def mouse(scene: Scene, phase: str, client: int = 0) -> None:
 
 
 def test_a_drag_that_ends_while_its_push_is_computed_is_over(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = Scene(server, ARM, OBSTACLES, draggable=True)
+    scene = Scene(server, ARM, WORLD, draggable=True)
     scene.show(Snapshot(1, POSE))
     assert scene.push() is None
     mouse(scene, "start")
@@ -200,7 +199,7 @@ def test_a_drag_that_ends_while_its_push_is_computed_is_over(server: Any, monkey
 
 
 def test_a_link_that_one_browser_drags_no_other_one_drags_or_releases(server: Any) -> None:
-    scene = Scene(server, ARM, OBSTACLES, draggable=True)
+    scene = Scene(server, ARM, WORLD, draggable=True)
     scene.show(Snapshot(1, POSE))
     mouse(scene, "start", 1)
     before = scene.push()
@@ -329,6 +328,12 @@ class Shown:
         self._thread = threading.Thread(target=self.page.run, args=(self._end.is_set,))
         self._thread.start()
 
+    @property
+    def panel(self) -> Controls:
+        """The panel of the page, once the stack has answered."""
+        assert self.page.shown is not None
+        return self.page.shown.panel
+
     def wait(self, holds: Callable[[], Any], spin: Callable[[], None]) -> None:
         """Let the stack run until something holds on the page."""
         end = time.monotonic() + LONG
@@ -362,15 +367,13 @@ def ready(domain_id: int, factor: float = 0.0, **values: Any) -> Iterator[tuple[
     """The same with the panel of the page, once it shows the braked arm, and what spins the stack meanwhile."""
     with running(domain_id, factor, **values) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        assert shown.page.panel is not None
-        yield composition, shown, shown.page.panel, spin
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.panel.snapshot.q, spin)
+        yield composition, shown, shown.panel, spin
 
 
 def mode_of(shown: Shown) -> str:
     """State of the driver as the page shows it."""
-    panel = shown.page.panel
-    driver = panel.snapshot.statuses.get("driver") if panel else None
+    driver = shown.panel.snapshot.statuses.get("driver") if shown.page.shown else None
     return driver.mode if driver else ""
 
 
@@ -379,18 +382,18 @@ def test_the_dither_has_a_slider_where_there_is_one(domain_id: int) -> None:
 
     with running(domain_id) as (composition, shown):
         shown.wait(lambda: mode_of(shown) == "braked", lambda: composition.executor.spin_once(timeout_sec=0.01))
-        assert DITHER not in shown.page.panel._sliders
+        assert DITHER not in shown.panel._sliders
     with running(domain_id, timing__dither_cycle=40) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
         shown.wait(lambda: mode_of(shown) == "braked", spin)
-        assert shown.page.panel._sliders[DITHER].value == 1.4
+        assert shown.panel._sliders[DITHER].value == 1.4
         loop = composition.nodes["velocity_loop"].node
         before = loop._dither.amplitude
-        shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 0.7}))
+        shown.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 0.7}))
         shown.wait(lambda: loop._dither.amplitude == pytest.approx([0.5 * each for each in before]), spin)
-        shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 4.0}))
-        shown.wait(lambda: "refused" in shown.page.panel._shown.content, spin)
-        assert shown.page.panel._sliders[DITHER].value == 0.7
+        shown.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 4.0}))
+        shown.wait(lambda: "refused" in shown.panel._shown.content, spin)
+        assert shown.panel._sliders[DITHER].value == 0.7
 
 
 def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> None:
@@ -398,10 +401,8 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
 
     with running(domain_id) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel, scene = shown.page.panel, shown.page.scene
-        assert panel is not None
-        assert scene is not None
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.panel.snapshot.q, spin)
+        panel, scene = shown.panel, shown.page.shown.scene
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         start = panel.snapshot.q
@@ -459,8 +460,7 @@ def test_a_page_changes_no_bit_of_a_run(alone: Path, domain_id: int, tmp_path: P
     shown = Shown(domain_id)
     try:
         watched = recorded(tmp_path, domain_id)
-        assert shown.page.panel is not None
-        assert shown.page.panel.snapshot.q
+        assert shown.panel.snapshot.q
     finally:
         shown.close()
     assert compare(alone, watched) == []
@@ -721,10 +721,8 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
     browser()
     with running(domain_id, 0.3) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel, scene = shown.page.panel, shown.page.scene
-        assert panel is not None
-        assert scene is not None
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.panel.snapshot.q, spin)
+        panel, scene = shown.panel, shown.page.shown.scene
         server = shown.page._server
 
         def drive() -> None:
@@ -769,11 +767,11 @@ def until(holds: Callable[[], Any]) -> None:
 def test_objects_of_the_world_are_drawn_where_the_simulator_has_them(server: Any) -> None:
     section = CONFIGURATION.sections["driver"]
     world = build_part(World, {**section, "world.doors.mass": (2.0,), "world.bodies.mass": (1.0,)}, "world.")
-    objects = ObjectMeshes(server, world)
+    scene = Scene(server, ARM, world, draggable=False)
     half = math.sqrt(0.5)
     block = ObjectState._make((0, 0.5, 0.1, 0.2, 0, 0, half, half, *[0.0] * 13))
-    objects.show([block])
-    assert objects.frames[0].position == pytest.approx((0.5, 0.1, 0.2))
-    assert turned(objects.frames[0].wxyz, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+    scene.show(Snapshot(objects=(block,)))
+    assert scene.objects[0].position == pytest.approx((0.5, 0.1, 0.2))
+    assert turned(scene.objects[0].wxyz, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
     panel = server.scene.get_handle_by_name("/world/door/mesh")
     assert panel.position == pytest.approx((0.3, 0.0, 0.0))  # half its width from the hinge
