@@ -13,8 +13,8 @@ from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycl
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.runs import without_short
-from wam_analysis.measures.stability import stability, swings
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
+from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 from wam_theory.verdicts import Verdict
 
@@ -134,7 +134,7 @@ def test_a_planted_cycle_is_recovered_from_noise_and_drift(shape, period):
 @pytest.mark.parametrize(("growth", "expected"), [(1.003, Verdict.DIVERGED), (0.992, Verdict.SETTLED)])
 def test_a_slow_trend_is_no_limit_cycle(growth, expected):
     turns = np.arange(0.0, 100.0, 0.01)
-    assert stability(growth**turns * np.cos(math.pi * turns), 1e-3).verdict is expected
+    assert swings(turns, growth**turns * np.cos(math.pi * turns), 2e-3, 1e-3).verdict is expected
 
 
 def random_walk(n: int) -> np.ndarray:
@@ -315,9 +315,6 @@ def test_impacts_do_not_spoil_the_friction():
     assert found.viscous.value == near(0.012)
 
 
-# frequency
-
-
 # stability
 
 
@@ -337,13 +334,13 @@ def response(
 ])  # fmt: skip
 def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
     error = response(gamma, step) + draws(14, len(response(gamma, step)), 0.01)
-    assert stability(error, 0.08 * step).verdict is verdict
+    assert swings(0.05 * np.arange(len(error)), error, 0.16 * step, 0.08 * step).verdict is verdict
 
 
 def test_a_limit_cycle_is_neither_settled_nor_divergent():
     time = np.arange(0.0, 30.0, 0.01)
     error = (1.0 + 3.0 * np.exp(-time / 3.0)) * np.cos(5.0 * time) + draws(15, len(time), 0.01)
-    found = stability(error, 0.1)
+    found = swings(time, error, 0.2, 0.1)
     assert found.verdict is Verdict.LIMIT_CYCLE
     assert found.growth == PRECISE(1.0, abs=0.02)
 

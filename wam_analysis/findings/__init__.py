@@ -10,7 +10,7 @@ repetition             sections about cycles and lines in a spectrum, of another
 effort                 section about friction and inertia of another robot
 stick_slip             section about rest and motion of motors and joints
 force                  sections about force and stability
-swinging               cycles of motors and joints where no force was recorded
+swinging               whether a force settles, cycles or diverges
 contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press

@@ -9,8 +9,8 @@ from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import HeldForce, Theory
 from wam_analysis.findings.prediction import LargestForce, Predicted
-from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy
+from wam_analysis.measures.swings import Swings
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import CYCLE, HOLD
 from wam_control.force.thresholds import GUARD
@@ -196,7 +196,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
         findings += [*_cycle_findings(one, theory.predicted), *_theory_findings(one.hold.name, theory)]
     if not held and not refused:
         sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
-    settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
+    settled = sum(one.swinging is not None and one.swinging.swings.verdict is Verdict.SETTLED for one in held)
     margins = [one.guarded.assessment.scale for one in recording.theories.values() if one.guarded is not None]
     margin = f", guard margin {shown(min(margins))}" if margins else ""
     if settled and not verdict:
@@ -206,22 +206,16 @@ def cycle_section(recording: AnalysedRecording) -> Section:
 
 def _fate(one: HeldForce) -> tuple[str, str]:
     """A sentence on whether the force settles or cycles, and the same for the verdict ('' where all is well)."""
-    name, cycle, verdict = one.hold.name, one.cycle, one.stability
-    if not one.is_recorded:
-        if one.swinging is not None:
-            return (swinging_words(name, one.swinging),) * 2
+    name, cycle = one.hold.name, one.cycle
+    if one.swinging is None:
         return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
-    words = {
-        Verdict.SETTLED: "settles",
-        Verdict.LIMIT_CYCLE: "oscillates with constant amplitude",
-        Verdict.DIVERGED: f"DIVERGES, by {shown(100.0 * (verdict.growth - 1.0))} % per half cycle",
-        Verdict.UNDECIDED: "is recorded too briefly to decide on its stability",
-    }
-    text = f"{name}: the force {words[verdict.verdict]}"
-    is_bad = verdict.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
-    if cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded:
-        if verdict.verdict is not Verdict.DIVERGED:
-            text = f"{name}: the force oscillates"
+    shaft, seen = one.swinging
+    is_bad = seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
+    text = f"{name}: {f'{shaft} (the force was not recorded)' if shaft else 'the force'} {_words(seen)}"
+    if shaft and is_bad:
+        what = "limit cycle of" if seen.verdict is Verdict.LIMIT_CYCLE else "last"
+        text += f"; {what} {shown(seen.peak_to_peak, 'rad')} peak to peak, period {shown(seen.period, 's')}"
+    elif cycle.confidence >= CYCLE.sure and cycle.peak_to_peak > CYCLE.seen * one.hold.commanded:
         text += (
             f"; limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, period {shown(cycle.period, 's')} "
             f"(confidence {cycle.confidence:.2f})"
@@ -230,6 +224,15 @@ def _fate(one: HeldForce) -> tuple[str, str]:
     else:
         text += "; no limit cycle detected"
     return f"{text}.", f"{text}." if is_bad else ""
+
+
+def _words(seen: Swings) -> str:
+    return {
+        Verdict.SETTLED: "settles",
+        Verdict.LIMIT_CYCLE: "oscillates with constant amplitude",
+        Verdict.DIVERGED: f"DIVERGES, by {shown(100.0 * (seen.growth - 1.0))} % per half cycle",
+        Verdict.UNDECIDED: "swings too seldom to decide on its stability",
+    }[seen.verdict]
 
 
 def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding]:
@@ -251,11 +254,7 @@ def _cycle_findings(one: HeldForce, predicted: Predicted | None) -> list[Finding
         Finding(f"{name}: limit cycle, peak to peak", "N", size, force, soft + note),
         Finding(f"{name}: period of the limit cycle", "s", time, period, slow),
         Finding(f"{name}: confidence of the limit cycle", "", sure),
-        *(
-            swinging_findings(name, one.swinging)
-            if one.swinging is not None
-            else [Finding(f"{name}: growth per half cycle", "", one.stability.growth, note=str(one.stability.verdict))]
-        ),
+        *(found._replace(name=f"{name}: {found.name}") for found in (one.swinging.findings if one.swinging else ())),
     ]
 
 

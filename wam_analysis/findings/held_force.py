@@ -16,7 +16,6 @@ from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.recorded import PredictionParameters
 from wam_analysis.task_forces import measured_force
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
@@ -29,7 +28,6 @@ from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
 
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
-UNDECIDED = Stability(Verdict.UNDECIDED, math.nan)
 
 
 class HeldForce(NamedTuple):
@@ -46,9 +44,8 @@ class HeldForce(NamedTuple):
         force was commanded until then; 0 where there is none.  Rise and overshoot are those of the measurement.
     measured_accuracy, true_accuracy, estimated_accuracy : in the steady part.
     cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
-    stability : of the error.
     cover, position : of the contact, by the simulator, else estimated, else as configured in the force loop; m.
-    swinging : of a motor or joint, where neither the measured nor the true force was recorded; None otherwise.
+    swinging : of the force, of a motor or joint where neither the measured nor the true one was recorded; None without.
     """
 
     hold: Hold
@@ -63,15 +60,9 @@ class HeldForce(NamedTuple):
     true_accuracy: ForceAccuracy = UNMEASURED
     estimated_accuracy: ForceAccuracy = UNMEASURED
     cycle: LimitCycle = NO_CYCLE
-    stability: Stability = UNDECIDED
     cover: str = ""
     position: float = math.nan
     swinging: Swinging | None = None
-
-    @property
-    def is_recorded(self) -> bool:
-        """Whether a force was recorded."""
-        return bool(len(self.measured) or len(self.true))
 
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
@@ -113,10 +104,9 @@ def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, ho
         cycle=_cycle(time_true[swings_true], true[swings_true], dither)
         or _cycle(time[swings], measured[swings], dither)
         or NO_CYCLE,
-        stability=_stability(hold, measured),
         cover=cover,
         position=position,
-        swinging=None if len(measured) or len(true) else swinging(run, hold),
+        swinging=swinging(run, hold, time, measured) if len(measured) else swinging(run, hold, time_true, true),
     )
 
 
@@ -190,12 +180,6 @@ def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
         value = np.convolve(value, np.full(width, 1.0 / width), "valid")
         time = time[: len(value)]
     return limit_cycle(time, value)
-
-
-def _stability(hold: Hold, measured: Numbers) -> Stability:
-    if len(measured) < SHAFT.fewest_samples:
-        return UNDECIDED
-    return stability(hold.commanded - measured, max(HOLD.loud * hold.commanded, 4.0 * noise(measured)))
 
 
 def _touched(traces: Traces, parameters: PredictionParameters, hold: Hold) -> tuple[str, float]:

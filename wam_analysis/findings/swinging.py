@@ -1,15 +1,15 @@
-"""Cycles of motors and joints under a force that was not recorded."""
+"""Whether the force of a hold settles, cycles or diverges; where it was not recorded, what a motor or joint does."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.findings.finding import Finding, shown
+from wam_analysis.findings.finding import Finding
 from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import Swings, swings
-from wam_analysis.thresholds import CYCLE, SHAFT
+from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns
 from wam_sim.recording import RecordedRun
@@ -17,14 +17,34 @@ from wam_theory.verdicts import Verdict
 
 
 class Swinging(NamedTuple):
-    """A shaft that swings during a hold."""
+    """What swings during a hold: a motor or joint, '' for the force."""
 
-    name: str
+    shaft: str
     swings: Swings
 
+    @property
+    def findings(self) -> list[Finding]:
+        """Growth of the swings, and size and period of those of a shaft that cycles, without the name of the hold."""
+        one = self.swings
+        growth = Finding("growth per half cycle", "", one.growth, note=f"{one.verdict}; {one.number} swings")
+        if not self.shaft:
+            return [growth]
+        if one.verdict not in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
+            return []
+        size = Finding(f"swing of {self.shaft}, peak to peak", "rad", one.peak_to_peak)
+        return [size, Finding("period", "s", one.period), growth]
 
-def swinging(run: RecordedRun, hold: Hold) -> Swinging | None:
-    """The motor, or else the joint, whose swings show most about a hold; None if none was recorded."""
+
+def swinging(run: RecordedRun, hold: Hold, time: Numbers, force: Numbers) -> Swinging | None:
+    """The swings of a force, (n,), N; without one those of the motor, or else the joint, that show most about a hold.
+
+    None if nothing was recorded.
+    """
+    good = np.isfinite(force)
+    time, force = time[good], force[good]
+    if len(force):
+        band = max(HOLD.loud * hold.commanded, 4.0 * noise(force))
+        return Swinging("", swings(time, hold.commanded - force, 2.0 * band, band))
     found = []
     for topic in ("motor_states", "joint_sensors", "joint_states"):
         columns = run.joints(topic)
@@ -55,35 +75,9 @@ def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
     )
 
 
-def swinging_words(name: str, found: Swinging) -> str:
-    """A sentence on a hold."""
-    one, where = found.swings, f"{found.name} (the force was not recorded)"
-    size = f"{shown(one.peak_to_peak, 'rad')} peak to peak, period {shown(one.period, 's')}"
-    if one.verdict is Verdict.LIMIT_CYCLE:
-        return f"{name}: limit cycle, seen on {where}: {size}."
-    if one.verdict is Verdict.DIVERGED:
-        return f"{name}: DIVERGES, seen on {where}: {shown(100.0 * (one.growth - 1.0))} % per half cycle, last {size}."
-    settled = one.verdict is Verdict.SETTLED
-    return (
-        f"{name}: {where} {'ceases to swing' if settled else 'swings too seldom to decide'}; no limit cycle detected."
-    )
-
-
-def swinging_findings(name: str, found: Swinging) -> list[Finding]:
-    """Size, period and growth of the swings of a hold."""
-    one = found.swings
-    if one.verdict not in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
-        return []
-    return [
-        Finding(f"{name}: swing of {found.name}, peak to peak", "rad", one.peak_to_peak),
-        Finding(f"{name}: period", "s", one.period),
-        Finding(f"{name}: growth per half cycle", "", one.growth, note=f"{one.verdict}; {one.number} swings"),
-    ]
-
-
 def at_the_contact(found: Swinging, motors: tuple[str, ...], motor_per_metre: Numbers) -> float:
     """Swing of a motor as a motion of the contact along the force, m; NaN for a joint."""
-    if found.name not in motors:
+    if found.shaft not in motors:
         return math.nan
-    ratio = abs(float(motor_per_metre[motors.index(found.name)]))
+    ratio = abs(float(motor_per_metre[motors.index(found.shaft)]))
     return found.swings.peak_to_peak / ratio if ratio > 0.0 else math.nan

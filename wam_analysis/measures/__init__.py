@@ -5,13 +5,10 @@ force_accuracy      accuracy of a held force
 limit_cycle         amplitude, period and confidence of a limit cycle
 episodes            limit cycles that fill a part of a recording
 lines               lines in the spectrum, above the noise
-swings              cycles of which only a few swings were recorded
-stability           whether a response settles, cycles or diverges
+swings              whether a motion settles, cycles or diverges
 stick_slip_phases   phases of rest and of motion
 friction            static, dynamic and viscous friction
-frequency           frequency response, coherence, bandwidth, poles
 efficiency          efficiency in both directions
-ripple              torque ripple by the angle of a pulley
 loop_timing         periods and jitter from stamps
 runs                intervals of a condition, noise, smoothing
 """

@@ -1,4 +1,4 @@
-"""Intervals in which a condition holds, the noise of a signal, and what signal can be evaluated."""
+"""Intervals in which a condition holds, and the noise of a signal."""
 
 import heapq
 
@@ -18,21 +18,6 @@ def after_gaps(time: Numbers | Rows) -> Mask:
     steps = np.diff(time)
     late = steps > STREAM.filled * np.median(steps) if len(steps) else np.zeros(0, np.bool_)
     return np.concatenate([np.zeros(min(1, len(time)), np.bool_), late])
-
-
-def require_usable(what: str, signal: Numbers, **threshold: float) -> None:
-    """Refuse a threshold that cannot be above the noise, and a signal that has gaps.
-
-    Raises
-    ------
-    ValueError
-        if the threshold is not above zero or the signal is not finite; names both as they are given.
-    """
-    for name, value in threshold.items():
-        if not value > 0.0:
-            raise ValueError(f"{name} is {value!r}; it must be above zero, above the noise of the {what}")
-    if not np.all(np.isfinite(signal)):
-        raise ValueError(f"the {what} has values that are not finite; leave them out")
 
 
 def runs(mask: Mask) -> Rows:

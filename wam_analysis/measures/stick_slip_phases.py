@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.measures.runs import require_usable, runs, without_short
+from wam_analysis.measures.runs import runs, without_short
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Numbers, Rows
 
@@ -39,7 +39,8 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
     ValueError
         if `rest` is not above zero or the velocity is not finite.
     """
-    require_usable("velocity", velocity, rest=rest)
+    if not (rest > 0.0 and np.all(np.isfinite(velocity))):
+        raise ValueError(f"rest is {rest!r}; it must be above the noise of the velocity, which must be finite")
     still = without_short(np.abs(velocity) <= rest, shortest)
     sticks, slips = runs(still), runs(~still)
     directions = np.array([np.sign(np.mean(velocity[a:b])) for a, b in slips], dtype=np.float64)
