@@ -4,11 +4,15 @@ import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from bag_samples import Sample, messages_of
 
-from wam_bag.bag import Raw, raw
+from wam_bag.cdr import CDR, MessageType
+from wam_bag.contents import contents
+from wam_bag.definitions import schema
+from wam_bag.message_text import definitions
 from wam_description.status import WALL_CLOCK
 
 
@@ -41,47 +45,41 @@ def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tupl
     return differences
 
 
-class _Message(NamedTuple):
-    series: Raw
-    log_time: int
-    data: bytes
-
-
-def _series(path: Path, without: tuple[str, ...]) -> dict[str, list[_Message]]:
+def _series(path: Path, without: tuple[str, ...]) -> dict[str, list[Sample]]:
     """Messages by topic, those of several publishers by topic and node."""
-    found: dict[str, list[_Message]] = {}
-    for topic, series in raw(path).items():
-        if topic in without:
-            continue
-        found[topic] = []
-        for time, data in zip(series.log_time_ns.tolist(), series.data, strict=True):
-            found.setdefault(topic + _node(series, data), []).append(_Message(series, time, data))
+    found: dict[str, list[Sample]] = {topic: [] for topic in contents(path).topics if topic not in without}
+    for one in messages_of(path):
+        if one.topic not in without:
+            found.setdefault(one.topic + _node(one), []).append(one)
     return {name: _from_start(messages) if " from " in name else messages for name, messages in found.items()}
 
 
-def _from_start(messages: list[_Message]) -> list[_Message]:
+def _decoded(one: Sample) -> Any:
+    return MessageType(one.type, CDR, definitions(one.type, schema(one.type))).decode(one.data)
+
+
+def _from_start(messages: list[Sample]) -> list[Sample]:
     """Without what a node said before time began and said otherwise later: a recorder may come too late for it."""
-    begin = messages[0].log_time
-    at_begin = sum(message.log_time == begin for message in messages)
+    at_begin = sum(message.time == messages[0].time for message in messages)
     return messages[at_begin - 1 :]
 
 
-def _node(series: Raw, data: bytes) -> str:
-    if not series.type.startswith("diagnostic_msgs/msg/Diagnostic"):
+def _node(one: Sample) -> str:
+    if not one.type.startswith("diagnostic_msgs/msg/Diagnostic"):
         return ""
-    decoded = series.decode(data)
+    decoded = _decoded(one)
     statuses = getattr(decoded, "status", [decoded])
     return f" from {statuses[0].name}" if statuses else ""
 
 
-def _first_difference(left: list[_Message], right: list[_Message], log_times: bool) -> str:
+def _first_difference(left: list[Sample], right: list[Sample], log_times: bool) -> str:
     for number, (a, b) in enumerate(zip(left, right, strict=False)):
-        if a.series.type != b.series.type:
-            return f"type {a.series.type} and {b.series.type}"
-        if log_times and a.log_time != b.log_time:
-            return f"message {number}: log time {a.log_time} and {b.log_time} ns"
+        if a.type != b.type:
+            return f"type {a.type} and {b.type}"
+        if log_times and a.time != b.time:
+            return f"message {number}: log time {a.time} and {b.time} ns"
         if a.data != b.data:  # may still be equal: padding is not initialised
-            difference = next(_fields(a.series.decode(a.data), b.series.decode(b.data), ""), "")
+            difference = next(_fields(_decoded(a), _decoded(b), ""), "")
             if difference:
                 return f"message {number}: {difference}"
     if len(left) != len(right):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -122,6 +123,17 @@ def random_samples(kinds: Sequence[str], number: int, seed: int, lengths: Sequen
             topic = "/" + kind.split("/")[-1].lower()
             samples.append(Sample(topic, kind, 1_000_000 * (k + chance.randint(0, 3)), data))
     return samples
+
+
+def messages_of(path: Path, *topics: str) -> list[Sample]:
+    """The messages of a bag, by the mcap library; of all topics where none is named."""
+    found = []
+    for file in [path] if path.is_file() else sorted(path.glob("*.mcap")):
+        with file.open("rb") as stream:
+            for schema, channel, message in make_reader(stream).iter_messages(topics or None):
+                assert schema is not None
+                found.append(Sample(channel.topic, schema.name, message.log_time, message.data))
+    return found
 
 
 def write(path: Path, samples: Sequence[Sample], way: Way = WAYS["zstd"]) -> Path:

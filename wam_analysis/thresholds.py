@@ -104,17 +104,12 @@ class CycleThresholds:
     euler_gamma: float = 0.5772  # of Euler: the mean logarithm of the power of noise is so much below that of its mean
     sure_line: float = 25.0  # power of a line over that of the noise, less the logarithm of the number of bins
     clear_line: float = 0.05  # of the largest line: smaller ones are not reported
-    # steps and stability
+    # steps
     # part of the settling band that noise may fill after smoothing, four standard deviations of it
     step_quiet: float = 0.1
     step_loudest: float = 0.5  # the same, where so much smoothing would make the rise longer
     sharp: float = 4.0  # widths of the smoothing in a rise: it is longer by 2 % then
     top: float = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
-    # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
-    transient: int = 2
-    peaks: int = 3  # further peaks that a trend needs
-    steady_growth: float = 0.002  # growth per half cycle below which the amplitude is constant
-    flattened: float = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +220,10 @@ class StreamThresholds:
     live: float = 0.1  # of the time that the stamps take: receptions in less are those of a file that was converted
     near: int = 20  # messages on both sides of a stamp that goes back, whose ages show whether the clock was set back
     faster: float = 30.0  # times the receptions: stamps that go on so fast are not in s
-    seconds: float = 1e17  # an integer time below this is in seconds or less, above it in ns since 1970
+    slowest: float = 0.5  # s from message to message: fewer messages are hardly those of a robot
+    usual: float = 0.01  # s from message to message, by which the unit of stamps is guessed
+    latest: float = 9e9  # s since 1970, beyond which no time in ns has 64 bits
+    seconds: float = 1e17  # a time below this is in seconds or less, above it in ns since 1970
     absent: float = 1.5  # periods between two messages of a frame, from which one is absent
     alternates: float = 5.0  # times the change over two messages: the change over one, where two publishers take turns
     repeated: float = 0.01  # of the stamps: more that repeat the one before are those of a coarse clock

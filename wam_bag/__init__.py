@@ -2,7 +2,7 @@
 
 For users:
 
-- `bag`: `read` makes numpy columns of a bag, `raw` returns its serialized messages; `Bag`, `BagError`.
+- `bag`: `read` makes numpy columns of a bag; `Bag`, `BagError`.
 - `contents`: `contents` lists topics, times and attachments without reading messages; `mode_of`.
 - `losses`: `losses` is what a bag lacks, from the records of the recorder and of repairs.
 - `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.

@@ -1,7 +1,7 @@
 """Bags as named numpy columns, without ROS.
 
-Reads what `wam_bag.bag_writer` and rosbag2 write, whole or in parts: MCAP of profile ros2 with messages in
-CDR, a directory of one or several files or a single file, in chunks or not, with indexes or without.
+Reads what `wam_bag.bag_writer` and rosbag2 write, whole or in parts: MCAP with messages in CDR, of ROS 1 or in
+JSON, a directory of one or several files or a single file, in chunks or not, with indexes or without.
 
 Guaranteed: a value that differs from what was written is returned only if no checksum in the file covers it.
 The checksums of chunks, attachments and the summary are checked in what is read, the one over all data if
@@ -9,17 +9,14 @@ everything is read.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy as np
 from mcap.records import Attachment, Channel
 
-from wam_bag.arrays import Times
 from wam_bag.bag_file import files, is_selected, opened, parts, type_of
-from wam_bag.cdr import Decoder
 from wam_bag.columns import (
     BoolColumns,
     ClockColumns,
@@ -36,11 +33,11 @@ from wam_bag.columns import (
 from wam_bag.contents import add_attachments, merge
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
-from wam_bag.message_search import NEVER, log_times, messages
+from wam_bag.message_search import NEVER
 
 __all__ = [
-    "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",
-    "TableColumns", "WrenchColumns", "raw", "read",
+    "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns",
+    "TableColumns", "WrenchColumns", "read",
 ]  # fmt: skip
 
 
@@ -112,15 +109,6 @@ class Bag(NamedTuple):
         return min((int(times.min()) for times in found if len(times)), default=0)
 
 
-class Raw(NamedTuple):
-    """Messages of a topic as they were serialized, in the order of the files."""
-
-    type: str
-    log_time_ns: Times
-    data: list[bytes]
-    decode: Callable[[bytes], Any]
-
-
 def read(
     path: str | Path,
     topics: Collection[str] | None = None,
@@ -176,46 +164,18 @@ def read(
     if not may_lack:
         _check_has(path, topics, counts)
     columns = _Topics({t: found.columns(f"{path}, topic {t}") for t, found in sorted(collectors.items())})
-    types = {topic: found.type for topic, found in collectors.items()}
+    types = {topic: found.kind.name for topic, found in collectors.items()}
     data = {name: item.data for name, item in attachments.items()}
     return Bag(Path(path), columns, types, data, metadata, dict(counts))
 
 
 def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channel, times: tuple[int, int]) -> Collector:
     """The collector of a topic, made for its first channel."""
-    kind, definitions = type_of(mcap, channel)
-    collector = collectors.setdefault(channel.topic, Collector(kind, definitions, *times))
-    if not collector.takes(kind, definitions):
-        raise Damage(f"topic {channel.topic} is of type {collector.type} and of another one")
+    kind = type_of(mcap, channel)
+    collector = collectors.setdefault(channel.topic, Collector(kind, *times))
+    if collector.kind != kind:
+        raise Damage(f"topic {channel.topic} is of type {collector.kind.name} and of another one")
     return collector
-
-
-def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Raw]:
-    """Serialized messages of a bag by topic; parameters and errors as those of `read`."""
-    present: set[str] = set()
-    found: dict[str, Raw] = {}
-    times: dict[str, list[Times]] = {}
-
-    def entry(mcap: McapFile, channel: Channel) -> Raw:
-        kind, definitions = type_of(mcap, channel)
-        known = found.setdefault(channel.topic, Raw(kind, np.empty(0, np.int64), [], Decoder(kind, definitions)))
-        if known.type != kind:
-            raise Damage(f"topic {channel.topic} is of type {known.type} and of {kind}")
-        return known
-
-    for file in files(Path(path)):
-        with opened(file) as mcap:
-            for part in parts(mcap, topics):
-                entry(mcap, part.channel).data.extend(messages(part.buffer, part.found))
-                times.setdefault(part.channel.topic, []).append(log_times(part.buffer, part.found))
-            for channel in mcap.channels.values():
-                present.add(channel.topic)
-                if is_selected(channel.topic, topics):
-                    entry(mcap, channel)
-    _check_has(path, topics, present)
-    for topic, some in times.items():
-        found[topic] = found[topic]._replace(log_time_ns=np.concatenate(some))
-    return found
 
 
 def _check_has(path: str | Path, selected: Collection[str] | None, present: Collection[str]) -> None:

@@ -13,15 +13,16 @@ from mcap.records import Channel
 
 from wam_bag import safe_yaml
 from wam_bag.arrays import Bytes
+from wam_bag.cdr import CDR, JSON, ROS1, MessageType
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import MAGIC
 from wam_bag.message_search import NEVER, Found, MessageBatch, together
-from wam_bag.message_text import Fields, definitions
+from wam_bag.message_text import definitions, full_name
 
-PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
 COMPRESSED = ".mcap.zstd"
+SCHEMAS = {CDR: "ros2msg", ROS1: "ros1msg"}  # encoding of the definitions by that of the messages
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
@@ -108,8 +109,6 @@ def opened(path: Path) -> Iterator[McapFile]:
     try:
         with McapFile(path) as file:
             file.open()
-            if file.profile not in PROFILES:
-                raise BagError(f"{path} has MCAP profile '{file.profile}'; only bags of ROS 2 ('ros2') are read")
             yield file
     except BagError:
         raise
@@ -206,27 +205,30 @@ def _bounded(mcap: McapFile, batches: Iterator[MessageBatch]) -> Iterator[Messag
         yield batch
 
 
-def type_of(file: McapFile, channel: Channel) -> tuple[str, dict[str, Fields]]:
-    """Type of the messages of a channel, and the fields of it and of the types it consists of.
+def type_of(file: McapFile, channel: Channel) -> MessageType:
+    """Type of the messages of a channel.
 
     Raises
     ------
     BagError
-        if it is not CDR with a ros2msg schema.
+        if it is neither JSON nor CDR or ROS 1 with a schema that can be read.
     """
     instead = "name the topics to be read, without this one"
-    encoding = channel.message_encoding
-    if encoding != "cdr":
-        raise BagError(f"{file.path} has topic {channel.topic} in encoding '{encoding}'; only 'cdr' is read; {instead}")
-    schema = file.schemas.get(channel.schema_id)
+    encoding, schema = channel.message_encoding, file.schemas.get(channel.schema_id)
+    if encoding == JSON:
+        return MessageType(full_name(schema.name) if schema else "", JSON)
+    if encoding not in SCHEMAS:
+        read = ", ".join(f"'{one}'" for one in (*SCHEMAS, JSON))
+        raise BagError(f"{file.path} has topic {channel.topic} in encoding '{encoding}'; {read} are read; {instead}")
     if schema is None:
         raise BagError(f"{file.path} has topic {channel.topic} without a schema; {instead}")
-    if schema.encoding != "ros2msg":
+    if schema.encoding != SCHEMAS[encoding]:
         raise BagError(
             f"{file.path} has the schema of topic {channel.topic} in '{schema.encoding}'; "
-            f"only 'ros2msg' is read; {instead}"
+            f"only '{SCHEMAS[encoding]}' is read; {instead}"
         )
     try:
-        return schema.name, definitions(schema.name, schema.data)
+        name = full_name(schema.name)
+        return MessageType(name, encoding, definitions(name, schema.data))
     except ValueError as error:
         raise BagError(f"{file.path} has topic {channel.topic} with a schema that cannot be read: {error}") from None

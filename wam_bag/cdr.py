@@ -4,11 +4,13 @@ A message is 4 bytes that name the byte order, then its values one after the oth
 relative to the end of those 4 bytes.
 """
 
+import json
 import keyword
 import struct
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -26,7 +28,28 @@ _STAMPS = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 
 _AFTER_STAMP: Final = ENCAPSULATION + 8
 
+CDR, ROS1, JSON = "cdr", "ros1", "json"  # encodings of messages
 Definitions = Mapping[str, Fields]
+
+
+class MessageType(NamedTuple):
+    """Type of the messages of a topic.
+
+    Attributes
+    ----------
+    name : ``package/msg/Type``, '' where it has none.
+    encoding : `CDR`, `ROS1` or `JSON`.
+    definitions : fields of it and of the types it consists of; none where each message names its fields.
+    """
+
+    name: str
+    encoding: str
+    definitions: Definitions = MappingProxyType({})
+
+    @property
+    def decode(self) -> Callable[[bytes], Any]:
+        """Makes an object of a message; raises Damage if it is not of this type."""
+        return from_json if self.encoding == JSON else Decoder(*self)
 
 
 class Leaf(NamedTuple):
@@ -85,6 +108,23 @@ class Reading:
         """A string without its terminator; bytes that are not UTF-8 are written with backslashes."""
         start = self.skip(self.count())
         return self.data[start : self.end][:-1].decode("utf-8", "backslashreplace")
+
+
+class PackedReading(Reading):
+    """A message of ROS 1: little-endian, without an encapsulation, its values not aligned, its texts not terminated."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(LITTLE_ENDIAN + data)
+
+    def numbers(self, kind: str, count: int) -> tuple[int, np.dtype[Any]]:
+        """Pass over numbers; their first byte and type."""
+        dtype = number_type(self.order, kind)
+        return self.skip(dtype.itemsize * count), dtype
+
+    def text(self) -> str:
+        """A string; bytes that are not UTF-8 are written with backslashes."""
+        start = self.skip(self.count())
+        return self.data[start : self.end].decode("utf-8", "backslashreplace")
 
 
 @cache
@@ -156,22 +196,22 @@ class Decoder:
 
     Parameters
     ----------
-    kind : ``package/msg/Type``.
-    definitions : fields of it and of the types it consists of.
+    kind, encoding, definitions : as of `MessageType`.
     """
 
-    def __init__(self, kind: str, definitions: Definitions) -> None:
-        self.kind, self.definitions = kind, definitions
+    def __init__(self, kind: str, encoding: str, definitions: Definitions) -> None:
+        self._kind, self._definitions = kind, definitions
+        self._reading = PackedReading if encoding == ROS1 else Reading
         self._classes: dict[str, Any] = {}
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
-        return self._message(Reading(data), self.kind)
+        return self._message(self._reading(data), self._kind)
 
     def _message(self, reading: Reading, kind: str) -> Any:
-        fields = self.definitions[kind]
+        fields = self._definitions[kind]
         values = [self._field(reading, inner, length) for _, inner, length in fields]
-        if not fields:
+        if not fields and self._reading is Reading:
             reading.skip(1)
         if kind not in self._classes:
             names = [name + "_" * keyword.iskeyword(name) for name, _, _ in fields]
@@ -195,6 +235,14 @@ class Decoder:
         start, _ = reading.numbers(kind, 1)
         (value,) = struct.unpack_from(reading.order + PRIMITIVES[kind], reading.data, start)
         return value != 0 if kind == "bool" else value
+
+
+def from_json(data: bytes) -> Any:
+    """A message of JSON, fields as attributes; raises Damage if it is none."""
+    try:
+        return json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+    except ValueError as error:
+        raise Damage(f"a message is no JSON: {error}") from None
 
 
 def encoded(kind: str, value: Sequence[Any]) -> bytes:

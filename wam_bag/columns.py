@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.arrays import Bytes, Index, Mask, Numbers, Texts, Times
-from wam_bag.cdr import Decoder, Definitions
+from wam_bag.cdr import CDR, MessageType
 from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.message_groups import Decoded, Group, Grouping
@@ -164,28 +164,19 @@ class Collector:
 
     Parameters
     ----------
-    kind : type, ``package/msg/Type``.
-    definitions : fields of it and of the types it consists of.
+    kind : type of the messages.
     begin, end : log times that are taken, ns, begin <= t < end.
-
-    Attributes
-    ----------
-    type : the type.
     """
 
-    def __init__(self, kind: str, definitions: Definitions, begin: int, end: int) -> None:
-        self.type = kind
-        self._definitions = definitions
+    def __init__(self, kind: MessageType, begin: int, end: int) -> None:
+        self.kind = kind
+        self._columned = _TYPES.get(kind.name) if kind.encoding == CDR else None
         self._begin, self._end = begin, end
         self._times: list[Times] = []
-        self._groups_of = Grouping(kind, definitions)
+        self._groups_of = Grouping(kind.name, kind.definitions)
         self._groups: list[tuple[Index, Any]] = []
         self._data: list[bytes] = []
         self._number = 0
-
-    def takes(self, kind: str, definitions: Definitions) -> bool:
-        """Whether messages of a type belong in these columns."""
-        return kind == self.type and definitions == self._definitions
 
     def add(self, buffer: Bytes, found: Found) -> None:
         """Take these messages of a buffer."""
@@ -194,8 +185,8 @@ class Collector:
         if not taken.all():
             found, times = Found(found.offsets[taken], found.sizes[taken]), times[taken]
         self._times.append(times)
-        if self.type in _TYPES:
-            extract, _ = _TYPES[self.type]
+        if self._columned is not None:
+            extract, _ = self._columned
             for group in self._groups_of(buffer, found.offsets + DATA, found.sizes):
                 self._groups.append((group.rows + self._number, extract(group)))
         else:
@@ -211,9 +202,9 @@ class Collector:
             times, rank = times[order], np.argsort(order)
             groups = [(rank[rows], values) for rows, values in groups]
             data = [data[i] for i in order] if data else data
-        if self.type not in _TYPES:
-            return Messages(times, Decoded(data, Decoder(self.type, self._definitions), label))
-        _, assemble = _TYPES[self.type]
+        if self._columned is None:
+            return Messages(times, Decoded(data, self.kind.decode, label))
+        _, assemble = self._columned
         groups.sort(key=lambda group: int(group[0].min()))
         try:
             return assemble(times, [(_where(rows), values) for rows, values in groups])
@@ -346,7 +337,7 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
 
 def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
     """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
-    collector = Collector(kind, definitions(kind, schema(kind)), 0, 1)
+    collector = Collector(MessageType(kind, CDR, definitions(kind, schema(kind))), 0, 1)
     sizes = np.array([len(one) for one in data], np.int64)
     starts = np.cumsum(sizes + DATA) - sizes - DATA
     head = bytes(DATA)

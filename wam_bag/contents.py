@@ -12,6 +12,7 @@ from mcap.records import Attachment
 from wam_bag import safe_yaml
 from wam_bag.bag_file import files, opened
 from wam_bag.losses import PARAMETERS, RECORDING
+from wam_bag.message_text import full_name
 
 
 class TopicContents(NamedTuple):
@@ -61,7 +62,7 @@ def contents(path: str | Path) -> Contents:
             for number, channel in mcap.channels.items():
                 counts[channel.topic] += found_in.by_channel.get(number, 0)
                 schema = mcap.schemas.get(channel.schema_id)
-                types.setdefault(channel.topic, schema.name if schema else "?")
+                types.setdefault(channel.topic, full_name(schema.name) if schema else "?")
             add_attachments(attachments, mcap.attachments())
             merge(metadata, mcap.metadata())
     topics = {topic: TopicContents(types[topic], counts[topic]) for topic in sorted(types)}

@@ -90,7 +90,6 @@ class McapFile:
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: MessageCounts | None = None
-        self.profile = ""
         with path.open("rb") as stream:
             self._data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
         self.size = len(self._data)
@@ -263,11 +262,10 @@ class McapFile:
             raise Damage(f"{Opcode(opcode).name.lower()} {record.id} is defined twice, differently")
 
     def _read_header(self) -> int:
-        """Take the header; returns where the data start."""
+        """Where the data start, behind the header."""
         header = next(walk(self._data, len(MAGIC), self.size), None)
         if header is None or header.opcode != Opcode.HEADER:
             raise Damage("it does not begin with a header")
-        self.profile = parsed(Opcode.HEADER, self.content(header)).profile
         return header.end
 
     def _read_summary(self) -> tuple[list[ChunkPlace], list[int]]:

@@ -1,13 +1,13 @@
 """Messages of one layout decoded together: their numbers as columns; others as objects."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.arrays import Bytes, Index, Mask, Numbers, Rows, Times
-from wam_bag.cdr import ENCAPSULATION, Decoder, Definitions, Layout
+from wam_bag.cdr import ENCAPSULATION, Definitions, Layout
 from wam_bag.errors import BagError, Damage
 from wam_bag.limits import READING_LIMITS
 from wam_bag.message_search import at
@@ -120,12 +120,12 @@ class Decoded(Sequence[Any]):
     Parameters
     ----------
     data : serialized messages.
-    decoder : makes objects of them.
+    decode : makes an object of one.
     label : their origin, for errors.
     """
 
-    def __init__(self, data: list[bytes], decoder: Decoder, label: str) -> None:
-        self._data, self._decoder, self._label = data, decoder, label
+    def __init__(self, data: list[bytes], decode: Callable[[bytes], Any], label: str) -> None:
+        self._data, self._decode, self._label = data, decode, label
         self._made: list[Any] | None = None
 
     def __len__(self) -> int:
@@ -138,7 +138,7 @@ class Decoded(Sequence[Any]):
     def __getitem__(self, index: int | slice) -> Any:
         if self._made is None:
             try:
-                self._made = [self._decoder(data) for data in self._data]
+                self._made = [self._decode(data) for data in self._data]
             except Damage as error:
                 raise BagError(f"{self._label}: {error}; copy the bag again") from None
         return self._made[index]

@@ -10,6 +10,7 @@ PRIMITIVES: Final = {
     "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 """The letter of each number for `struct` and numpy."""
+_TIMES = {"time": "builtin_interfaces/msg/Time", "duration": "builtin_interfaces/msg/Duration"}  # as ROS 1 has them
 _FIELD = re.compile(r"^([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(<=)?(\d*)\])?\s+([A-Za-z]\w*)\s*(=?)")
 
 
@@ -34,7 +35,7 @@ def fields(text: str, package: str) -> Fields:
         match = _FIELD.match(line.split("#")[0].strip())
         if match is None or match[5]:
             continue
-        kind = _full_name(match[1], package)
+        kind = _field_type(match[1], package)
         length = None if match[3] is None else 0 if match[2] or not match[3] else int(match[3])
         found.append(MessageField(match[4], kind, length))
     return tuple(found)
@@ -59,14 +60,13 @@ def definitions(name: str, schema: bytes) -> dict[str, Fields]:
         raise ValueError(f"type {name!r} does not have the form package/msg/Type")
     first, *others = re.split(r"^={80}\n", schema.decode("utf-8").replace("\r\n", "\n"), flags=re.MULTILINE)
     found = {
-        "builtin_interfaces/msg/Time": fields("int32 sec\nuint32 nanosec", ""),
-        "builtin_interfaces/msg/Duration": fields("int32 sec\nuint32 nanosec", ""),
+        **dict.fromkeys(_TIMES.values(), fields("int32 sec\nuint32 nanosec", "")),
         name: fields(first, parts[0]),
     }
     for other in others:
         heading, _, text = other.partition("\n")
-        package, _, kind = heading.removeprefix("MSG: ").strip().replace("/msg/", "/").partition("/")
-        found[f"{package}/msg/{kind}"] = fields(text, package)
+        kind = full_name(heading.removeprefix("MSG: ").strip())
+        found[kind] = fields(text, kind.partition("/")[0])
     _check(name, found, (), set())
     return found
 
@@ -89,11 +89,15 @@ def _check(name: str, found: dict[str, Fields], outer: tuple[str, ...], checked:
     checked.add(name)
 
 
-def _full_name(kind: str, package: str) -> str:
+def full_name(name: str) -> str:
+    """The name of a type as ROS 2 has it, package/msg/Type; one without a package stays as it is."""
+    package, slash, kind = name.partition("/")
+    return f"{package}/msg/{kind.removeprefix('msg/')}" if slash else name
+
+
+def _field_type(kind: str, package: str) -> str:
     if kind in PRIMITIVES or kind in ("string", "wstring"):
         return kind
     if kind == "Header":
         return "std_msgs/msg/Header"
-    if "/" not in kind:
-        return f"{package}/msg/{kind}"
-    return "{}/msg/{}".format(*kind.replace("/msg/", "/").split("/", 1))
+    return _TIMES.get(kind) or full_name(kind if "/" in kind else f"{package}/{kind}")

@@ -554,7 +554,7 @@ def test_a_stamp_in_another_unit_is_refused_until_the_unit_is_given(unit: str, f
     sent = joints("/state", time, ["x", "y"], position=position)
     fields = ["name=state.name", "position=state.position", "stamp=time"]
     bag = by_json(tmp_path / "bag", [one._replace(stamp=round(factor * one.stamp)) for one in sent])
-    with pytest.raises(ValueError, match=r"--unit stamp=(UNIT|ms|us)" if unit == "ns" else f"--unit stamp={unit}"):
+    with pytest.raises(ValueError, match=f"--unit stamp={unit}"):
         found((bag, topic_map(["/state"], [], [], fields, [])))
     _, numbers = found((bag, topic_map(["/state"], [], [], fields, [f"stamp={unit}"])))
     assert numbers["x: frequency"] == pytest.approx(3.1, rel=CLOSE)
@@ -572,7 +572,7 @@ def small(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_a_topic_that_is_named_as_one_of_ours_makes_no_recording_of_ours(small: Path) -> None:
     analysis, numbers = found((small, TopicMap()))
-    assert "not a recording of this stack" in " ".join(analysis.sections[1].sentences)
+    assert analysis.sections[0].sentences[0].startswith("Another robot's recording")
     assert {"/ur/joint_states: period", "/ur/motor_states: period", "/ft/wrench: period"} <= numbers.keys()
     assert "/ur/motor_states elbow_joint: at rest" in numbers
     assert page(analysis).count('<figure class="chart"') >= 3

@@ -1,5 +1,6 @@
 """Kinds of faults in other people's recordings, each at several rates and in several formats."""
 
+import csv
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -255,7 +256,45 @@ def formats() -> list[Case]:
     ]
 
 
-KINDS = (wraps, sparse, coarse, twice, names, called_as_commands, few_cycles, still, zeros, contradictions, formats)
+def unfilled() -> list[Case]:
+    def zero(sent: list[Sent]) -> list[Sent]:
+        return [s._replace(fields=s.fields | {"velocity": [0.0]}) for s in sent]
+
+    return [
+        Case("zeros", write, zero(one("/joint_states", rate, 0.7, 0.5)), sine(0.7, 0.5) | FRICTION, "the velocity is 0")
+        for write, rate in ((by_rosbags, 100.0), (sqlite, 250.0), (ros1, 125.0))
+    ]
+
+
+def other_units() -> list[Case]:
+    def scaled(quantity: str, by: float, write: Any, told: str) -> Case:
+        sent = one("/joint_states", 100.0, 0.7, 0.5)
+        sent = [s._replace(fields=s.fields | {quantity: by * s.fields[quantity]}) for s in sent]
+        return Case(quantity, write, sent, {}, f"if it is in {told}, give --unit {quantity}={told}")
+
+    degree = 180.0 / math.pi
+    return [
+        scaled("position", degree, ros1, "deg"),
+        scaled("velocity", degree, sqlite, "deg/s"),
+        scaled("effort", 1e3, by_rosbags, "mA"),
+    ]
+
+
+KINDS = (
+    unfilled,
+    other_units,
+    wraps,
+    sparse,
+    coarse,
+    twice,
+    names,
+    called_as_commands,
+    few_cycles,
+    still,
+    zeros,
+    contradictions,
+    formats,
+)
 CASES = [pytest.param(case, id=f"{kind.__name__}: {case.name}") for kind in KINDS for case in kind()]
 
 
@@ -294,19 +333,70 @@ def test_topics_that_are_not_read_and_how_to_read_them_are_said(storage: str, tm
         analyse(other_topics(tmp_path / "none", storage, 0), lambda doing: None)
 
 
-@pytest.mark.parametrize("kind", ["csv", "series", "renamed"])
-def test_a_table_is_read_as_a_recording(kind: str, tmp_path: Path) -> None:
-    time, position, velocity, effort = motion(100.0, 0.7, 0.5)
-    table = {"time": time, "position.a": position, "velocity.a": velocity, "effort.a": effort}
-    given = NOTHING
-    if kind == "renamed":
-        table = {{"time": "t", "position.a": "q.a"}.get(name, name): values for name, values in table.items()}
-        given = topic_map([], [], [], ["stamp=t", "position=q"], [])
-    source: Any = table
-    if kind == "csv":
+class Written(NamedTuple):
+    """How a table is written: titles of time, position, velocity and effort, and what its numbers are divided by."""
+
+    titles: tuple[str, ...] = ("time", "position.a", "velocity.a", "effort.a")
+    units: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+    delimiter: str = ","
+    decimal: str = "."
+    fields: tuple[str, ...] = ()
+    times: Callable[[float], Any] = float
+
+
+def date(time: float) -> str:
+    return str(np.datetime64("2024-05-01T12:00:00") + np.timedelta64(round(1e9 * time), "ns"))
+
+
+WITH_UNITS = ("time [ms]", "position.a (deg)", "velocity.a [deg/s]", "effort.a [mA]")
+OTHER_UNITS = (1e-3, math.pi / 180.0, math.pi / 180.0, 1e-3)
+TABLES = {
+    "plain": Written(),
+    "renamed": Written(("t", "q.a", "velocity.a", "effort.a"), fields=("stamp=t", "position=q")),
+    "units in the titles": Written(WITH_UNITS, OTHER_UNITS),
+    "units, renamed": Written(("t [ms]", *WITH_UNITS[1:]), OTHER_UNITS, fields=("stamp=t [ms]",)),
+    "decimal commas": Written(delimiter=";", decimal=","),
+    "decimal commas in quotes": Written(decimal=","),
+    "tabs": Written(delimiter="\t"),
+    "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
+    "dates": Written(times=date),
+    "some rows without a time": Written(times=lambda time: "" if round(100.0 * time) % 1000 == 7 else time),
+    "titles as numpy writes them": Written(("# time", " position.a", " velocity.a", " effort.a")),
+}
+
+
+def table_of(how: Written) -> tuple[list[str], list[list[Any]]]:
+    time, *others = motion(100.0, 0.7, 0.5)
+    columns = [[how.times(one / how.units[0]) for one in time.tolist()]]
+    columns += [(values / unit).tolist() for values, unit in zip(others, how.units[1:], strict=True)]
+    return list(how.titles), columns
+
+
+@pytest.mark.parametrize("how", TABLES.values(), ids=TABLES)
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: Path) -> None:
+    titles, columns = table_of(how)
+    source: Any = dict(zip(titles, columns, strict=True))
+    if is_file:
         source = tmp_path / "table.csv"
-        np.savetxt(source, np.column_stack([*table.values()]), delimiter=",", header=",".join(table), comments="")
-    analysis = analyse(source, lambda doing: None, given)
+        with source.open("w", newline="") as stream:
+            writer = csv.writer(stream, delimiter=how.delimiter)
+            writer.writerow(titles)
+            writer.writerows([str(one).replace(".", how.decimal) for one in row] for row in zip(*columns, strict=True))
+    analysis = analyse(source, lambda doing: None, topic_map([], [], [], how.fields, []))
     numbers = {one.name: one.measured for section in analysis.sections for one in section.findings}
     expected = sine(0.7, 0.5) | FRICTION
     assert {name: numbers.get(name) for name in expected} == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given(unit: str, factor: float) -> None:
+    titles, columns = table_of(Written(units=(1.0 / factor, 1.0, 1.0, 1.0)))
+    table = dict(zip(titles, columns, strict=True))
+    with pytest.raises(ValueError, match=f"'time' increases by .* so it is hardly in s; give --unit stamp={unit}"):
+        analyse(table, lambda doing: None)
+    given = topic_map([], [], [], [], [f"stamp={unit}"])
+    analysis = analyse(table, lambda doing: None, given)
+    assert analysis.recording.duration == pytest.approx(30.0, abs=0.02)
+    with pytest.raises(ValueError, match="are in rad and in m"):
+        analyse(table | {"position.b [mm]": columns[1]}, lambda doing: None, given)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from bag_samples import OURS, WAYS, Sample, Way, random_samples, write
+from bag_samples import OURS, WAYS, Sample, Way, messages_of, random_samples, write
 from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
@@ -21,7 +21,7 @@ from rosbags.highlevel import AnyReader
 
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.recording import AnalysedRecording
-from wam_bag.bag import BagError, raw, read
+from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
 from wam_bag.contents import contents
 from wam_bag.losses import losses
@@ -63,7 +63,7 @@ def killed(path: Path, samples: list[Sample], split: Split = WHOLE) -> None:
 
 
 def serialized(path: Path) -> list[bytes]:
-    return sorted(data for series in raw(path).values() for data in series.data)
+    return written(messages_of(path))
 
 
 def written(samples: list[Sample]) -> list[bytes]:

@@ -1,15 +1,16 @@
 """Recorded inputs through the same machines: bit for bit, and the first difference where there is one."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from bag_samples import Sample, messages_of
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from wam_bag.bag import BagError, raw, read
+from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.metadata import INFINITE
 from wam_cli import main as cli
@@ -74,17 +75,23 @@ def recorded(folder: Path, domain_id: int, changes: Changes = (), **values: Any)
     return stack.play().path
 
 
-def without_messages(bag: Path, to: Path, topic: str, word: bytes) -> Path:
-    """The same bag without the messages of a topic that hold a word."""
-    contents = read(bag)
-    with BagWriter(to) as writer:
-        for name, messages in raw(bag).items():
-            writer.add_topic(name, messages.type, QOS)
-            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
-                if name != topic or word not in data:
-                    writer.write(name, data, time, time, k)
+def copied(writer: BagWriter, samples: Sequence[Sample], bag: Path | None = None) -> None:
+    """Write messages, and the topics of a bag even where none of their messages is left."""
+    types = {one.topic: one.type for one in samples} | (read(bag).types if bag else {})
+    for name, kind in types.items():
+        writer.add_topic(name, kind, QOS)
+    for k, one in enumerate(samples):
+        writer.write(one.topic, one.data, one.time, one.time, k)
+    if bag:
+        contents = read(bag)
         writer.attach("parameters.yaml", "application/yaml", contents.attachments["parameters.yaml"])
         writer.metadata("recording", contents.metadata["recording"])
+
+
+def without_messages(bag: Path, to: Path, topic: str, word: bytes) -> Path:
+    """The same bag without the messages of a topic that hold a word."""
+    with BagWriter(to) as writer:
+        copied(writer, [one for one in messages_of(bag) if one.topic != topic or word not in one.data], bag)
     return to
 
 
@@ -92,19 +99,13 @@ def changed(
     bag: Path, to: Path, topic: str, number: int, change: bytes, without: tuple[str, range] = ("", range(0))
 ) -> Path:
     """The same bag with the last bytes of one message replaced, some messages of a topic left out."""
-    contents = read(bag)
+    samples = messages_of(bag)
+    left_out = [sample for sample in samples if sample.topic == without[0]]
+    left_out = [sample for k, sample in enumerate(left_out) if k in without[1]]
+    for one in [sample for sample in samples if sample.topic == topic][number : number + 1]:
+        samples[samples.index(one)] = one._replace(data=one.data[: -len(change)] + change)
     with BagWriter(to) as writer:
-        series = raw(bag)
-        for name, messages in series.items():
-            writer.add_topic(name, messages.type, QOS)
-        writer.attach("parameters.yaml", "application/yaml", contents.attachments["parameters.yaml"])
-        writer.metadata("recording", contents.metadata["recording"])
-        for name, messages in series.items():
-            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
-                if name == without[0] and k in without[1]:
-                    continue
-                new = data[: -len(change)] + change if (name, k) == (topic, number) else data
-                writer.write(name, new, time, time, k)
+        copied(writer, [sample for sample in samples if sample not in left_out], bag)
     return to
 
 
@@ -212,9 +213,7 @@ def test_the_last_bit_of_one_number_is_found(bag: Path, tmp_path: Path) -> None:
 
 def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
     with BagWriter(tmp_path / "part") as writer:
-        for name, messages in raw(bag, ["gravity_effort"]).items():
-            writer.add_topic(name, messages.type, QOS)
-            writer.write(name, messages.data[0], 1, 1, 1)
+        copied(writer, messages_of(bag, "/wam/gravity_effort")[:1])
         writer.attach("parameters.yaml", "application/yaml", read(bag).attachments["parameters.yaml"])
     with pytest.raises(BagError, match="part lacks the topic joint_states, without which gravity does nothing"):
         replay(tmp_path / "part", "gravity")
@@ -238,10 +237,7 @@ def test_a_comparison_of_nothing_is_no_success() -> None:
 
 def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bare") as writer:
-        for name, messages in raw(bag, ["joint_states", "gravity_effort"]).items():
-            writer.add_topic(name, messages.type, QOS)
-            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
-                writer.write(name, data, time, time, k)
+        copied(writer, messages_of(bag, "/wam/joint_states", "/wam/gravity_effort"))
     with pytest.raises(BagError, match=r"no parameters.yaml in the bag; give a configuration with --config"):
         replay(tmp_path / "bare", "gravity")
     assert replay(tmp_path / "bare", "gravity", Configuration.load(packaged("wam"))).is_same

@@ -18,7 +18,7 @@ from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.findings.topics import topics_section
-from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, of_other_encoding, require_messages, table_bag
+from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, require_messages
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
@@ -89,7 +89,7 @@ def analyse(
     Parameters
     ----------
     source : bag directory or file, of this stack or of another robot with JointState, WrenchStamped or mapped topics; a
-        CSV file; or a table, such as a DataFrame, see `wam_analysis.foreign.reading.table_bag`.
+        CSV file; or a table, such as a DataFrame, see `wam_analysis.foreign.tables.table_bag`.
     progress : called with each stage of the work.
     given : topics, joints, fields and units of another robot's bag.
     namespace : of an arm of this stack, '' for the one with the most topics.
@@ -101,19 +101,21 @@ def analyse(
     ValueError
         if it has not what is given.
     """
-    if not isinstance(source, (str, Path)):
-        table = source.reset_index() if hasattr(source, "reset_index") else source
-        return analyse_bag(table_bag(Path("table"), table, given), progress, given=given)
-    path = Path(source)
-    progress(f"reading {path}")
-    if not given.is_given and _is_own(path):
-        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
-    if namespace:
-        raise ValueError(
-            f"--namespace chooses an arm of this stack, but {path} is analysed as a recording of another robot"
-        )
-    progress("it is of another robot")
-    return analyse_bag(foreign_bag(path, given), progress, given=given)
+    found: Path | Mapping[str, Any]
+    if isinstance(source, (str, Path)):
+        found = Path(source)
+        progress(f"reading {found}")
+        if not given.is_given and _is_own(found):
+            return analyse_bag(read(found, TOPICS_READ, may_lack=True), progress, namespace)
+        if namespace:
+            raise ValueError(
+                f"--namespace chooses an arm of this stack, but {found} is analysed as a recording of another robot"
+            )
+        progress("it is of another robot")
+    else:
+        found = source.reset_index() if hasattr(source, "reset_index") else source
+    bag, given = foreign_bag(found, given)
+    return analyse_bag(bag, progress, given=given)
 
 
 def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
@@ -138,12 +140,7 @@ def _is_own(path: Path) -> bool:
     """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
     if path.suffix == ".csv" or needs_rosbags(path):
         return False
-    try:
-        found = contents(path)
-    except BagError:
-        if of_other_encoding(path):
-            return False
-        raise
+    found = contents(path)
     require_messages(path, (topic.messages for topic in found.topics.values()))
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True

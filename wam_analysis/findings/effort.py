@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.stick_slip import rest_speed, rests
-from wam_analysis.foreign.sources import Source, differentiated, pieces
+from wam_analysis.findings.stick_slip import rest_speed
+from wam_analysis.foreign.sources import Source, differentiated, pieces, rests
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT

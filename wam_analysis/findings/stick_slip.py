@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, rest_words, shown
-from wam_analysis.foreign.sources import Piece, Source, pieces, resolution
+from wam_analysis.foreign.sources import Piece, Source, pieces, resolution, rests
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -82,12 +82,6 @@ def sticking(source: Source, command: Source | None, least: float) -> Sticking |
     if not total:
         return None
     return Sticking(still / total, slips, disobeyed / still if command is not None and still else math.nan)
-
-
-def rests(source: Source) -> bool:
-    """Whether a joint never moved, by its position: an encoder may flicker between counts."""
-    position = source.only("position").values.get("position", np.zeros(0))
-    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
 
 
 def hidden_motion(source: Source) -> float:

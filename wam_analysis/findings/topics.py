@@ -7,22 +7,21 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
 from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of
+from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
-TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
+UNUSUAL = {  # values that few robots reach, in the unit of ROS, and many in another one
+    "position": (4.0 * math.pi, "deg"), "velocity": (4.0 * math.pi, "deg/s"), "effort": (1e3, "mA"),
+    "force": (1e4, "mN"), "torque": (1e3, "mNm"),
+}  # fmt: skip
 
 
 def topics_section(recording: AnalysedRecording) -> Section:
     """What is in another robot's recording, and what was done to its raw values."""
     bag, mixed, given, found = recording.bag, recording.mixed, recording.given, recording.analysed
-    what = (
-        "Analysed as a recording of another robot, as the options request."
-        if given.is_given
-        else "This is not a recording of this stack."
-    )
-    sentences = [what, *(line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns))]
+    sentences = [line for name, columns in sorted(bag.topics.items()) for line in _topic(name, columns)]
     clocks = [f"{name}: {clock.note}." for name, clock in clocks_of(bag).items() if clock.note]
     wrong = [*_treated(found), *clocks]
     wrong += [
@@ -33,10 +32,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
     for name, columns in bag.topics.items():
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
-            largest = float(np.nanmax(np.abs(columns.position), initial=0.0))
-            if largest > TURNS and not given.units.get("position"):
-                far = f"positions up to {shown(largest, 'rad')}, taken as radians"
-                wrong.append(f"{name}: {far}; if they are degrees, give --unit position=deg.")
+        wrong += _unusual(name, columns, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     sentences += [*wrong, *_alike(found), *_unread(bag)]
@@ -60,6 +56,16 @@ def _topic(name: str, columns: Columns) -> Iterator[str]:
         yield f"{name}: {len(columns.stamp_ns)} forces, {what}."
 
 
+def _unusual(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
+    """Which values may be in another unit than that of ROS."""
+    for quantity, (most, other) in UNUSUAL.items():
+        values = np.abs(getattr(columns, quantity, np.empty(0)))
+        largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+        if largest > most and quantity not in given.units:
+            taken = f"{quantity} up to {shown(largest, QUANTITIES[quantity])}, as ROS has it"
+            yield f"{name}: {taken}; if it is in {other}, give --unit {quantity}={other}."
+
+
 DONE_TO = {
     Treatment.COARSE: "{number} of {of} stamps repeat the one before; reception times are used",
     Treatment.ROUNDED: "the stamps are rounded to {size}; reception times are used",
@@ -67,6 +73,7 @@ DONE_TO = {
     Treatment.TWICE: "{number} of {of} stamps came twice; the first message of each is used",
     Treatment.WRAPPED: "the {quantity} jumps {times} by {size}; it is unwrapped",
     Treatment.MOVED_ZERO: "the zero of the {quantity} moves {times}, by up to {size}; this is removed",
+    Treatment.UNFILLED: "the {quantity} is 0 in every message although the position moves; the rate of that is used",
     Treatment.SPARSE: "{quantity} in only {share:.0f} % of the messages",
 }
 

@@ -1,15 +1,20 @@
 """Times of messages on one clock: stamps of a clock that was set, never set, or is not that of other topics."""
 
+import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
+from wam_analysis.findings.finding import shown
+from wam_analysis.foreign.topic_map import UNITS, TopicMap
 from wam_analysis.thresholds import STREAM
 from wam_bag.arrays import Times
 from wam_bag.bag import JointColumns, WrenchColumns
 
+BILLION = 1_000_000_000
 CLOCK_SET = "stamps of a clock that was set or never set; reception times are used"
 
 
@@ -24,6 +29,35 @@ class Clock(NamedTuple):
 
     times: Times
     note: str
+
+
+def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Times | None = None) -> Times:
+    """Times, ns, of numbers in s, in the unit that is given, or in ns since 1970.
+
+    Parameters
+    ----------
+    label : of the numbers, in errors.
+    numbers : (n,).
+    received : (n,), ns; None where the messages are in a table.
+
+    Raises
+    ------
+    ValueError
+        if the numbers cannot be in s; it names the unit that is likely.
+    """
+    if "stamp" not in given.units:
+        if np.min(numbers) > STREAM.seconds:
+            return numbers.astype(np.int64)
+        step = float(np.median(np.diff(np.sort(numbers)))) if len(numbers) > 1 else 0.0
+        took = 0.0 if received is None else float(np.ptp(received)) / 1e9
+        is_slower = step >= STREAM.slowest and float(np.ptp(numbers)) > STREAM.faster * took
+        if is_slower or np.max(numbers) > STREAM.latest:
+            likely = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * step / STREAM.usual)))
+            raise ValueError(
+                f"{label} increases by {shown(step)} from message to message, so it is hardly in s; give --unit "
+                f"stamp={likely}, or another one of s, ms, us, ns or a factor"
+            )
+    return np.asarray(np.rint(BILLION * given.scaled("stamp")[0] * numbers), np.int64)
 
 
 def clocks(topics: Mapping[str, JointColumns | WrenchColumns]) -> dict[str, Clock]:

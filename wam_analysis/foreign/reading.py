@@ -1,28 +1,19 @@
 """Bags of other robots as columns of joints and wrenches: by `wam_bag`, or by rosbags where the format is another."""
 
-import csv
 import importlib
-import json
-import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from functools import cache, partial
-from numbers import Integral
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mcap.reader import make_reader
 
-from wam_analysis.findings.finding import shown
-from wam_analysis.foreign.topic_map import NOTHING_GIVEN, UNITS, TopicMap
-from wam_analysis.thresholds import STREAM
+from wam_analysis.foreign.clocks import BILLION, nanoseconds
+from wam_analysis.foreign.tables import series_of_csv, table_bag
+from wam_analysis.foreign.topic_map import TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
-from wam_bag.columns import UNNAMED, joint_columns, joint_names
+from wam_bag.columns import UNNAMED, joint_columns
 from wam_bag.contents import contents
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
@@ -31,9 +22,9 @@ WRENCH_FIELDS = {"force": "wrench.force", "torque": "wrench.torque"}
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 CONTROLLER_PARTS = {"": ("feedback", "actual"), " command": ("reference", "desired")}  # suffix of the topic: names
 COMMAND = "command"
+PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
 ROSBAGS = (".bag", ".db3")
-BILLION = 1_000_000_000
 
 
 def needs_rosbags(path: Path) -> bool:
@@ -43,8 +34,17 @@ def needs_rosbags(path: Path) -> bool:
     return any(path.glob("*.db3*"))
 
 
-def foreign_bag(path: Path, given: TopicMap) -> Bag:
+def foreign_bag(source: Path | Mapping[str, Any], given: TopicMap) -> tuple[Bag, TopicMap]:
     """The joints and wrenches of a recording, in the units of the map; the type of a command is `COMMAND`.
+
+    Parameters
+    ----------
+    source : bag, CSV file, or table, see `table_bag`.
+
+    Returns
+    -------
+    tuple
+        the recording, and the map with the units that a table names.
 
     Raises
     ------
@@ -53,19 +53,19 @@ def foreign_bag(path: Path, given: TopicMap) -> Bag:
     ValueError
         if a topic, joint or field of the map is not there.
     """
-    if path.suffix == ".csv":
-        return table_bag(path, series_of_csv(path), given)
-    if needs_rosbags(path):
-        bag = _by_rosbags(path, given)
-    elif encoded := of_other_encoding(path):
-        bag = _by_mcap(path, encoded, given)
+    if not isinstance(source, Path):
+        return table_bag(Path("table"), source, given)
+    if source.suffix == ".csv":
+        return table_bag(source, series_of_csv(source), given)
+    if needs_rosbags(source):
+        bag = _by_rosbags(source, given)
     else:
-        listed = contents(path).topics
+        listed = contents(source).topics
         chosen = [name for name, topic in listed.items() if _is_wanted(name, topic.type, given)]
-        bag = read(path, chosen)
+        bag = read(source, chosen)
         bag = bag._replace(types={name: topic.type for name, topic in listed.items()})
-    require_messages(path, bag.counts.values())
-    return _analysed(bag, given)
+    require_messages(source, bag.counts.values())
+    return _analysed(bag, given), given
 
 
 def require_messages(path: Path, counts: Iterable[int]) -> None:
@@ -105,70 +105,6 @@ def _is_wanted(topic: str, kind: str, given: TopicMap) -> bool:
     return kind in (JOINTS, WRENCH, CONTROLLER) or topic in given.commands
 
 
-# tables
-
-
-def series_of_csv(path: Path) -> dict[str, Numbers]:
-    """Columns of a CSV file by their titles; what is no number is NaN.
-
-    Raises
-    ------
-    BagError
-        if it has no column or no row.
-    """
-    with path.open(newline="", encoding="utf-8-sig") as stream:
-        head, *rows = csv.reader(stream)
-    if not rows:
-        raise BagError(f"{path} has no row below the names of its columns")
-    table = np.genfromtxt([",".join(row) for row in rows], delimiter=",", dtype=np.float64, ndmin=2)
-    return {name.strip(): table[:, i] for i, name in enumerate(head)}
-
-
-def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> Bag:
-    """A recording of a table with 'time', s, and columns as position.JOINT, velocity.JOINT, effort.JOINT or force.x.
-
-    Parameters
-    ----------
-    series : columns by title, (k,), such as a DataFrame; a map gives other titles of a quantity, and of the time as its
-        stamp.
-
-    Raises
-    ------
-    ValueError
-        if it has no time, or nothing that can be analysed.
-    """
-    found = {str(name): np.asarray(series[name], np.float64) for name in series}
-    clock = given.fields.get("stamp", "time")
-    if clock not in found:
-        raise ValueError(f"{path} has no column '{clock}'; name the column of the time with --map stamp=COLUMN")
-    seconds = given.scaled("stamp")[0] * found[clock]
-    times = np.rint(BILLION * seconds).astype(np.int64)
-    parts: dict[str, dict[str, Numbers]] = {}
-    for quantity in (*IN_JOINTS, "force", "torque"):
-        title, factor = given.fields.get(quantity, quantity), given.scaled(quantity)[0]
-        named = {n.removeprefix(title).removeprefix("."): n for n in found if f"{n}.".startswith(f"{title}.")}
-        parts[quantity] = {name: factor * found[column] for name, column in named.items()}
-    nothing = np.full(len(times), "", object)
-    topics: dict[str, Any] = {}
-    joints = tuple(dict.fromkeys(name for q in IN_JOINTS for name in parts[q]))
-    if joints:
-        blank = np.full(len(times), math.nan)
-        p, v, e = (np.column_stack([parts[q].get(n, blank) for n in joints]) for q in IN_JOINTS)
-        topics["joints"] = JointColumns(times, times, nothing, joint_names(joints, 0), p, v, e)
-    if parts["force"] or parts["torque"]:
-        vectors = [np.column_stack([parts[q].get(axis, 0.0 * times) for axis in "xyz"]) for q in ("force", "torque")]
-        topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
-    if not topics:
-        raise ValueError(
-            f"{path} has the columns {', '.join(found)}; rename them, for example position.JOINT, or use --map"
-        )
-    counts = dict.fromkeys(topics, len(times))
-    return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts)
-
-
-# other formats
-
-
 def _by_rosbags(path: Path, given: TopicMap) -> Bag:
     try:
         highlevel: Any = importlib.import_module("rosbags.highlevel")
@@ -176,83 +112,18 @@ def _by_rosbags(path: Path, given: TopicMap) -> Bag:
     except ImportError:
         raise BagError(f"{path} is not an MCAP file; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
+    times: dict[str, list[int]] = {}
+    found: dict[str, list[Any]] = {}
     try:
         with highlevel.AnyReader([path], default_typestore=store) as reader:
             kinds = {one.topic: one.msgtype for one in reader.connections}
             counts = {topic: found.msgcount for topic, found in reader.topics.items()}
             some = [one for one in reader.connections if _is_wanted(one.topic, one.msgtype, given)]
-            read = reader.messages(some) if some else ()
-            decoded = ((one.topic, time, reader.deserialize(data, one.msgtype)) for one, time, data in read)
-            return _bag_of(path, kinds, counts, decoded)
+            for one, time, data in reader.messages(some) if some else ():
+                times.setdefault(one.topic, []).append(time)
+                found.setdefault(one.topic, []).append(reader.deserialize(data, one.msgtype))
     except highlevel.AnyReaderError as error:
         raise BagError(f"{path} cannot be read by rosbags: {error}") from None
-
-
-def of_other_encoding(path: Path) -> list[Path]:
-    """The MCAP files with messages that are not CDR, JSON or those of ROS 1; none where all are CDR."""
-    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path] if path.suffix == ".mcap" else []
-    return files if any(_has_other_encoding(file) for file in files) else []
-
-
-def _has_other_encoding(file: Path) -> bool:
-    try:
-        with file.open("rb") as stream:
-            summary = make_reader(stream).get_summary()
-    except Exception:  # a broken file is explained by the reader of the stack
-        return False
-    return summary is not None and any(one.message_encoding in ("json", "ros1") for one in summary.channels.values())
-
-
-def _by_mcap(path: Path, files: Sequence[Path], given: TopicMap) -> Bag:
-    with ExitStack() as stack:
-        readers = [make_reader(stack.enter_context(file.open("rb"))) for file in files]
-        kinds: dict[str, str] = {}
-        counts = Counter[str]()
-        for summary in (one for reader in readers if (one := reader.get_summary()) is not None):
-            numbers = summary.statistics.channel_message_counts if summary.statistics else {}
-            for channel in summary.channels.values():
-                schema = summary.schemas.get(channel.schema_id)
-                kinds[channel.topic] = _ros2_name(schema.name) if schema else ""
-                counts[channel.topic] += numbers.get(channel.id, 0)
-        wanted = [topic for topic, kind in kinds.items() if _is_wanted(topic, kind, given)]
-        decoder = cache(partial(_decoder, path))
-
-        def decoded() -> Iterator[tuple[str, int, Any]]:
-            for schema, channel, message in (one for each in readers for one in each.iter_messages(topics=wanted)):
-                decode = decoder(channel.message_encoding, kinds[channel.topic], schema.data if schema else b"")
-                yield channel.topic, message.log_time, decode(message.data)
-
-        return _bag_of(path, kinds, counts, decoded())
-
-
-def _decoder(path: Path, encoding: str, kind: str, schema: bytes) -> Callable[[bytes], Any]:
-    if encoding == "json":
-        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
-    try:
-        typesys: Any = importlib.import_module("rosbags.typesys")
-    except ImportError:
-        raise BagError(
-            f"{path} has messages in '{encoding}'; rosbags reads them: pip install 'wam_stack[rosbags]'"
-        ) from (None)
-    store = typesys.get_typestore(typesys.Stores.EMPTY)
-    store.register(typesys.get_types_from_msg(schema.decode(), kind))
-    take = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
-    return lambda data: take(data, kind)
-
-
-def _ros2_name(kind: str) -> str:
-    """The name of a type of ROS 1 as ROS 2 has it."""
-    package, slash, name = kind.partition("/")
-    return f"{package}/msg/{name}" if slash and "/" not in name else kind
-
-
-def _bag_of(path: Path, kinds: dict[str, str], counts: dict[str, int], read: Iterable[tuple[str, int, Any]]) -> Bag:
-    """A bag of topic, time and message of each message that another reader yields."""
-    times: dict[str, list[int]] = {}
-    found: dict[str, list[Any]] = {}
-    for topic, time, message in read:
-        times.setdefault(topic, []).append(time)
-        found.setdefault(topic, []).append(message)
     topics: dict[str, Any] = {name: Messages(np.array(times[name], np.int64), found[name]) for name in found}
     return Bag(path, topics, kinds, {}, {}, counts)
 
@@ -323,37 +194,21 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
         seconds, parts = (np.array(_integers(topic, columns, field), np.int64) for field in path.split(",", 1))
         return BILLION * seconds + parts
     stamps = [_at(topic, message, path) for message in columns.messages]
-    has_unit = "stamp" in given.units
-    if hasattr(stamps[0], "sec"):
-        if has_unit:
-            raise ValueError(TIME_OF_ROS.format(topic))
-        nanoseconds = [getattr(one, "nanosec", getattr(one, "nsec", 0)) for one in stamps]
-        return np.array([int(one.sec) * BILLION + int(ns) for one, ns in zip(stamps, nanoseconds, strict=True)])
+    for whole, rest in PARTS_OF_TIME:
+        if hasattr(stamps[0], whole):
+            if "stamp" in given.units:
+                raise ValueError(TIME_OF_ROS.format(topic))
+            return np.array([getattr(one, whole) * BILLION + getattr(one, rest, 0) for one in stamps], np.int64)
+    numbers = np.array(stamps)
     try:
-        is_ns = not has_unit and all(isinstance(one, Integral) for one in stamps) and min(stamps) > STREAM.seconds
-        factor = BILLION * given.scaled("stamp")[0]
-        found = np.array([one if is_ns else round(float(one) * factor) for one in stamps], np.int64)
-    except (TypeError, ValueError, OverflowError):
-        unit = "" if has_unit else "; if it is a number not in s, give --unit stamp=UNIT: ms, us, ns or a factor"
-        raise ValueError(f"{topic}: the field '{path}' has no times{unit}") from None
-    if not (has_unit or is_ns):
-        _refuse_other_pace(topic, path, found, columns.log_time_ns)
-    return found
+        numbers = numbers if numbers.dtype.kind in "iu" else numbers.astype(np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{topic}: the field '{path}' has no times") from None
+    return nanoseconds(f"{topic}: the field '{path}'", numbers, given, columns.log_time_ns)
 
 
 def _integers(topic: str, columns: Messages, path: str) -> list[int]:
     return [int(row[0]) for row in _numbers(topic, columns, path)]
-
-
-def _refuse_other_pace(topic: str, path: str, stamps: Times, received: Times) -> None:
-    """Refuse numbers as seconds where the receptions show that they are others."""
-    took, numbers = np.ptp(received) / 1e9, np.ptp(stamps) / 1e9
-    if took > 0.0 and numbers > STREAM.faster * took:
-        nearest = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * numbers / took)))
-        raise ValueError(
-            f"{topic}: the field '{path}' increases by {shown(numbers)} within {shown(took, 's')}, so it is "
-            f"not in s; give --unit stamp={nearest}, or another one of s, ms, us, ns or a factor"
-        )
 
 
 def _frames(columns: Messages) -> Texts:

@@ -29,6 +29,7 @@ class Treatment(StrEnum):
     TWICE = "messages that came twice"  # the second was left out
     WRAPPED = "wraps of the angle"  # were unwrapped
     MOVED_ZERO = "jumps of the zero"  # were taken off
+    UNFILLED = "zeros"  # although the joint moves: were left out
     SPARSE = "messages without"  # the others were used
 
 
@@ -292,6 +293,10 @@ def _received(rows: Index, stamps: Times, received: Times, treated: Treated) -> 
 def _treated(one: Source) -> Source:
     """The source without wraps and jumps of the zero, and with what is known of its gaps."""
     values, treated = dict(one.values), list(one.treated)
+    is_measured = {"position", "velocity"} <= values.keys() and not one.is_command
+    if is_measured and not np.any(np.nan_to_num(values["velocity"])) and not rests(one):
+        del values["velocity"]
+        treated.append(Treated(Treatment.UNFILLED, "velocity", len(one.time), len(one.time)))
     for quantity, value in values.items():
         if lacking := int(np.sum(~np.isfinite(value))):
             treated.append(Treated(Treatment.SPARSE, quantity, lacking, len(value)))
@@ -449,6 +454,12 @@ def resolution(value: Numbers) -> float:
     if len(value) > SHAFT.fewest_samples:
         sd = min(sd, float(noise(np.diff(value, n=2))) * math.sqrt(6.0 / 70.0))
     return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
+
+
+def rests(source: Source) -> bool:
+    """Whether a joint never moved, by its position: an encoder may flicker between counts."""
+    position = source.only("position").values.get("position", np.zeros(0))
+    return len(position) > 0 and float(np.ptp(position)) <= SHAFT.far * resolution(position)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:

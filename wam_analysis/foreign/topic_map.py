@@ -17,8 +17,9 @@ SHOWN = {q: (unit,) for q, unit in QUANTITIES.items()} | {
 }  # fmt: skip
 MAPPED = (*QUANTITIES, "name")
 UNITS = {  # as given: factor, unit that is shown
-    "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
-    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180.0, "rad/s"), "rpm": (math.pi / 30.0, "rad/s"),
+    "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "°": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
+    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180.0, "rad/s"), "°/s": (math.pi / 180.0, "rad/s"),
+    "rpm": (math.pi / 30.0, "rad/s"),
     "m": (1.0, "m"), "mm": (1e-3, "m"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"),
     "N": (1.0, "N"), "mN": (1e-3, "N"), "kN": (1e3, "N"),
     "Nm": (1.0, "N m"), "N m": (1.0, "N m"), "mNm": (1e-3, "N m"), "mN m": (1e-3, "N m"),
@@ -88,11 +89,12 @@ def topic_map(
             raise ValueError(f"--unit is '{option}'; write QUANTITY=UNIT, with a quantity of {', '.join(QUANTITIES)}")
         if quantity in factors:
             raise ValueError(f"--unit {quantity} is given twice; the second is '{unit}'")
-        factors[quantity] = _unit(quantity, unit)
+        factors[quantity] = unit_of(quantity, unit)
     return TopicMap(tuple(topics), tuple(joints), tuple(commands), found, factors)
 
 
-def _unit(quantity: str, text: str) -> tuple[float, str]:
+def unit_of(quantity: str, text: str) -> tuple[float, str]:
+    """Factor and shown unit of a unit, or of a factor, as it is written; raises ValueError with what is allowed."""
     if text in UNITS:
         if UNITS[text][1] not in SHOWN[quantity]:
             fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in SHOWN[quantity])

@@ -1,0 +1,153 @@
+"""Tables as recordings: CSV files and maps of columns, with the times and units that they have."""
+
+import csv
+import re
+from collections.abc import Mapping
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_analysis.foreign.clocks import nanoseconds
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap, unit_of
+from wam_bag.arrays import Mask, Numbers, Times
+from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns
+from wam_bag.columns import JOINT_FIELDS, joint_names
+
+TITLE = re.compile(r"[#\s]*(.*?)\s*(?:[\[(](.*)[\])]\s*)?")  # and the unit behind it
+DELIMITERS = ",;\t"
+
+
+def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
+    """Columns of a CSV file, as text, by their titles; the delimiter is the one that the titles have.
+
+    Raises
+    ------
+    BagError
+        if it has no row.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as stream:
+        lines = [line for line in stream if line.strip()]
+    head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
+    if not rows:
+        raise BagError(f"{path} has no row below the names of its columns")
+    return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
+
+
+def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_GIVEN) -> tuple[Bag, TopicMap]:
+    """A recording of a table with 'time', s, and columns as position.JOINT, velocity.JOINT, effort.JOINT or force.x.
+
+    Parameters
+    ----------
+    series : columns by title, (k,), such as a DataFrame; a map gives other titles of a quantity, and of the time as its
+        stamp.  A title may end in a unit, as 'time [ms]'.
+
+    Returns
+    -------
+    tuple
+        the recording, and the map with the units that the titles have.
+
+    Raises
+    ------
+    ValueError
+        if it has no time, or nothing that can be analysed.
+    """
+    parts: dict[str, dict[str, Numbers]] = {}
+    units = dict(given.units)
+    for quantity in (*JOINT_FIELDS, "force", "torque"):
+        columns = _columns(series, quantity, given)
+        parts[quantity] = {one.name: one.factor * _numbers(one.values) for one in columns}
+        if any(one.has_unit for one in columns):
+            units[quantity] = columns[0][:2]
+    clock = next((one for one in _columns(series, "stamp", given) if not one.name), None)
+    title = given.fields.get("stamp", "time")
+    if clock is None:
+        raise ValueError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
+    given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
+    times, known = _times(f"{path}: the column '{title}'", clock.values, given)
+    nothing = np.full(len(times), "", object)
+    topics: dict[str, Any] = {}
+    joints = tuple(dict.fromkeys(name for q in JOINT_FIELDS for name in parts[q]))
+    blank = np.full(len(known), np.nan)
+    if joints:
+        p, v, e = (np.column_stack([parts[q].get(n, blank) for n in joints])[known] for q in JOINT_FIELDS)
+        topics["joints"] = JointColumns(times, times, nothing, joint_names(joints, 0), p, v, e)
+    if parts["force"] or parts["torque"]:
+        vectors = (np.column_stack([parts[q].get(n, 0.0 * known) for n in "xyz"])[known] for q in ("force", "torque"))
+        topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
+    if not topics:
+        raise ValueError(
+            f"{path} has the columns {', '.join(map(str, series))}; rename them, for example position.JOINT, or use "
+            "--map"
+        )
+    counts = dict.fromkeys(topics, len(times))
+    return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts), given
+
+
+class _Column(NamedTuple):
+    """A column: factor and shown unit, whether its title has them, the joint or axis in its title, its cells."""
+
+    factor: float
+    shown: str
+    has_unit: bool
+    name: str
+    values: Any
+
+
+def _columns(series: Mapping[str, Any], quantity: str, given: TopicMap) -> list[_Column]:
+    """The columns of a quantity: those whose title is its own, or begins with it and a dot.
+
+    Raises
+    ------
+    ValueError
+        if they are in units of different kinds.
+    """
+    wanted, _ = _split(given.fields.get(quantity, "time" if quantity == "stamp" else quantity))
+    found = []
+    for title in series:
+        name, unit = _split(str(title))
+        if f"{name}.".startswith(f"{wanted}."):
+            has_unit = bool(unit) and quantity not in given.units
+            factor, shown = unit_of(quantity, unit) if has_unit else given.scaled(quantity)
+            found.append(_Column(factor, shown, has_unit, name[len(wanted) + 1 :], series[title]))
+    if len(shown_in := dict.fromkeys(one.shown for one in found)) > 1:
+        raise ValueError(f"the columns of {quantity} are in {' and in '.join(shown_in)}; leave out those of one unit")
+    return found
+
+
+def _split(title: str) -> tuple[str, str]:
+    """A title without its unit, and the unit, '' for none."""
+    match = TITLE.fullmatch(title)
+    return (match[1], match[2] or "") if match else (title, "")
+
+
+def _numbers(column: Any) -> Numbers:
+    """The numbers of a column, also with a decimal comma; NaN for what is none."""
+    try:
+        return np.asarray(column, np.float64)
+    except (TypeError, ValueError):
+        return np.array([_number(str(one)) for one in column])
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        return np.nan
+
+
+def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
+    """Times of the rows that have one, ns, and which these are: of numbers, or of dates."""
+    dates = np.asarray(column)
+    if dates.dtype.kind in "mM":
+        known = ~np.isnat(dates)
+        return dates[known].astype(f"{dates.dtype.kind}8[ns]").astype(np.int64), known
+    numbers = _numbers(column)
+    known = np.isfinite(numbers)
+    if np.any(known):
+        return nanoseconds(label, numbers[known], given), known
+    try:
+        return _times(label, np.array([str(one).removesuffix("Z") for one in column], "M8[ns]"), given)
+    except ValueError:
+        raise ValueError(f"{label} has no times") from None
