@@ -17,6 +17,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.patches import Polygon
+
+from wam_analysis.drawing import INK, SHAFTS
 from wam_analysis.table import markdown
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.task.scenario import STEP_KEYS
@@ -33,15 +37,14 @@ from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
 from wam_sim.batch import processes
 from wam_sim.pieces import default_file
-from wam_studies import design_choices
 from wam_studies.figures import backdrivability, open_loop, transmissions
 from wam_studies.figures.catalogue import FIGURES, file_of, numbers, percent
 from wam_studies.figures.catalogue import table as figures_table
 from wam_studies.figures.panels import Panels, distances
-from wam_studies.figures.style import draw_panels
+from wam_studies.figures.style import GREY, draw_panels, picture
 from wam_studies.force_benchmark.straight_arm import elbow_table
 from wam_studies.plant import effects
-from wam_studies.scorecard import measures
+from wam_studies.scorecard import measures, stiffness_table
 from wam_studies.scorecard import report as scorecard
 from wam_studies.tasks.pictures import save as save_task
 from wam_studies.thesis import claims
@@ -280,7 +283,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "transmissions": transmissions.table,
         "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
         "backdrivability": lambda: backdrivability.table(found_figures()["3.2.6"]),
-        "stiffness rule": lambda: design_choices.stiffness_table(configuration),
+        "stiffness rule": lambda: stiffness_table(configuration),
         **{f"task {name}": partial(task_of, name) for name in tasks()},
         "claims, count": lambda: claims.count(claims.load(CLAIMS)),
         "verdict of the demonstration": partial(verdict, "demo.txt"),
@@ -443,11 +446,33 @@ def demonstrate(name: str, kept: str, is_moving: bool = False) -> None:
     print(*(f"docs/{kept}{ending}" for ending in (".txt", *[".webp"] * is_moving)), sep="\n", flush=True)
 
 
-def draw_and_run_examples() -> None:
-    """Draw the pictures of the concepts, run the notebooks and the sweep."""
+def draw_motor_space() -> None:
+    """What the two motors of the differential can give, at the motors and at joints 2 and 3."""
+    arm = Configuration.load(CONFIGURATION).shared.arm
+    change = TransmissionMap.of(arm).motor_from_joint[1:3, 1:3].T  # joint torques from motor torques
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    peak, friction = (np.array(values[1:3]) for values in (arm.motors.peak_torque, arm.motors.static_friction))
+    with picture(ROOT / "docs" / "concepts" / "motor-space.png", 7.2, 3.4) as figure:
+        left, right = figure.subplots(1, 2)
+        for axes, limits, name in ((left, peak, "peak torque"), (right, friction, "static friction")):
+            colour = SHAFTS[axes is right]
+            corners = square * limits @ change.T
+            axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.15, edgecolor="none"))
+            axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.6))
+            box = np.abs(corners).max(axis=0)
+            axes.add_patch(Polygon(square * box, fill=False, edgecolor=GREY, linewidth=0.9, linestyle="--"))
+            for i, side in ((0, "right"), (1, "left")):
+                tip = change @ (np.eye(2)[i] * limits[i])
+                axes.annotate("", tip, (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "color": INK})
+                axes.annotate(f"motor {i + 2}", tip, (0, -12), textcoords="offset points", fontsize=8, ha=side)
+            axes.set(xlim=(-1.35 * box[0], 1.35 * box[0]), ylim=(-1.35 * box[1], 1.35 * box[1]), title=name)
+            axes.set(xlabel="torque at joint 2 [N m]", ylabel="torque at joint 3 [N m]")
+
+
+def run_examples() -> None:
+    """Run the notebooks and the sweep."""
     notebooks = sorted(str(path) for path in (ROOT / "docs" / "notebooks").glob("*.ipynb"))
     for command in (
-        ["docs/concept_pictures.py"],
         ["docs/notebook.py", *notebooks],
         ["examples/sweep.py", "--picture", "docs/sweep.png"],
     ):
@@ -458,7 +483,8 @@ DRAWN = {
     "demonstration": partial(demonstrate, "wam.yaml", "demo", is_moving=True),
     "barrett": partial(demonstrate, "barrett-wam7.yaml", "barrett-demo"),
     "tasks": draw_tasks,
-    "examples": draw_and_run_examples,
+    "concepts": draw_motor_space,
+    "examples": run_examples,
 }
 
 

@@ -1,6 +1,7 @@
 """A running stack as a program next to it sees it: requests, parameters, statuses, topics."""
 
 import importlib
+import math
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -162,7 +163,7 @@ class StackClient(Closing):
         return requested.found[node]
 
     def read_shared(self) -> Shared:
-        """The shared parameters of the stack, as the first node has them that answers; all have the same.
+        """The shared parameters of the stack, as its driver has them; of another node next to a driver without them.
 
         Raises
         ------
@@ -172,12 +173,19 @@ class StackClient(Closing):
             where they are those of another version.
         """
         requested = RemoteParameters(self.node, NODES)
+        first = math.inf
 
         def found() -> list[dict[str, Any]]:
-            requested.ask()
-            return [values for values in requested.found.values() if MODE in values]
+            return [requested.found[name] for name in NODES if MODE in requested.found.get(name, {})]
 
-        self._require(found, f"no node of a stack in {self.node.get_namespace()} answers")
+        def is_answered() -> bool:
+            nonlocal first
+            requested.ask()
+            if found():
+                first = min(first, time.monotonic())
+            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > CALL_LIMITS.discovery
+
+        self._require(is_answered, f"no node of a stack in {self.node.get_namespace()} answers")
         return build_part(Shared, found()[0])
 
     def await_driver(self, until: Callable[[], bool], others: Iterable[str] = ()) -> Mapping[str, Mapping[str, Any]]:
@@ -276,19 +284,23 @@ class StackClient(Closing):
             self._encoders[topic] = encoder(self.topics[topic], self.shared)
         self.publisher(topic).publish(self._encoders[topic](stamp, value))
 
-    def messages(self, topic: str, check: Callable[[float], object] = lambda silent: None) -> Iterator[Any]:
+    def messages(
+        self, topic: str, silence: float = math.inf, check: Callable[[], object] = lambda: None
+    ) -> Iterator[Any]:
         """Messages of a topic as they come, without end; a run is not delayed by it.
 
         Parameters
         ----------
         topic : name in the namespace of the arm, or a full one.
-        check : called with the time without a message, s, also while there is no such topic; it may raise what is to
-            end the waiting.
+        silence : s, in which a message must come.
+        check : called while none comes, and while there is no such topic; it may raise what is to end the waiting.
 
         Raises
         ------
         NoAnswerError
             where there is no such topic.
+        TimeoutError
+            where no message came for so long.
         """
         name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
 
@@ -300,8 +312,7 @@ class StackClient(Closing):
             visible = (name for name in found if "/_" not in name)  # others are hidden
             return [name.removeprefix(own) for name in visible if self._is_of_others(name)]
 
-        last = time.monotonic()
-        self._require(kinds, f"no topic {name}", topics, lambda: check(time.monotonic() - last))
+        self._require(kinds, f"no topic {name}", topics, check)
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
         profile = QoSProfile(depth=CALL_LIMITS.waiting, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -313,6 +324,7 @@ class StackClient(Closing):
         subscription = self.node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
         )
+        last = time.monotonic()
         try:
             while True:
                 self.spin_once(0.1)
@@ -320,8 +332,10 @@ class StackClient(Closing):
                     yield from taken
                     taken.clear()
                     last = time.monotonic()
+                elif time.monotonic() - last > silence:
+                    raise TimeoutError(f"no {topic} for {silence:g} s")
                 else:
-                    check(time.monotonic() - last)
+                    check()
         finally:
             self.node.destroy_subscription(subscription)
 

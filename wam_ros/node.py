@@ -19,7 +19,7 @@ from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
 from wam_description.event import Event, Level, fault
 from wam_description.event_text import sentence
-from wam_description.interface import Feed, declared
+from wam_description.interface import Feed, declared, is_packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
@@ -27,6 +27,7 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
+from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.parameters import Follower, follow_together
@@ -167,6 +168,8 @@ class AdaptedNode(StackNode):
             self._failing.add(feed.work)
             raise
         self._failing.discard(feed.work)
+        if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
+            self._warn_of_slow_step(taken)
         if feed.essential and self._is_realtime:
             self._watch(feed)
 
@@ -208,19 +211,30 @@ class AdaptedNode(StackNode):
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 
+    def _warn_of_slow_step(self, taken: float) -> None:
+        is_own = not is_packaged(self._declaration)
+        self.get_logger().warning(
+            f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
+            "brakes if they wait too long: "
+            f"{'make its steps faster' if is_own else 'the machine is busy, end other programs'}",
+            throttle_duration_sec=NODE_LIMITS.slow_step_reports,
+        )
+
     def _watch(self, feed: Feed) -> None:
         """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""
         health, needed = self.health, feed.essential & getattr(self.node, "needs", feed.essential)
         ages = {topic: age for topic, age in feed.synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
             health.set_problem("inputs", None)
-        elif "inputs" not in health.problems:
+        elif (is_new := "inputs" not in health.problems) or health.counts["steps"] % NODE_LIMITS.loss_repeated == 0:
             lost, stopped = self.interface.silent(ages)  # on a busy machine another node may just have been late
             topics = " and ".join(lost)
             problem = fault("stopped", nodes=", ".join(stopped), topics=topics)
             if step := self.peers.held_up(stopped):
                 problem = fault("long_step", step=step, topics=topics)
             health.set_problem("inputs", problem)
+            if not is_new:
+                health.repeat()
 
     # what the other nodes report, live parameters, requests
 

@@ -99,14 +99,17 @@ def follow_together(
         try:
             for i, (_, take, prefix) in enumerate(parts):
                 present[i] = _updated(present[i], given, prefix, take)
-        except Exception as error:
-            is_refused = isinstance(error, ParameterError)  # else of a node of one's own, which may have taken a part
+        except ParameterError as error:
             for i, (_, take, _) in enumerate(parts):
-                if present[i] is not before[i] or not is_refused:
+                if present[i] is not before[i]:
+                    present[i] = before[i]
                     take(before[i])
+            return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:  # of a node of one's own: it must not go on with a part of the set
             present[:] = before
-            reason = str(error) if is_refused else f"the node failed on it: {raised(error)}"
-            return SetParametersResult(successful=False, reason=reason)
+            for own, (_, take, _) in zip(before, parts, strict=True):
+                take(own)
+            return SetParametersResult(successful=False, reason=f"the node failed on it: {raised(error)}")
         if present != before:
             report(given)
         return SetParametersResult(successful=True)

@@ -9,7 +9,6 @@ identification      a motion that shows the arm's parameters; identified against
 faults              broken messages, lost nodes, full disks, Ctrl-C, a long run, on watched nodes; docs/safety.md
 plant               the plant's effects, each measured alone and compared with theory
 force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
-stability           the stability guard validated by Monte Carlo simulation; the stability map of figure 5.8
-design_choices      4.4 with numbers: stiffness of the arm
-scorecard           the arm of a configuration compared with the requisites of chapter 3
+guard_validation    the stability guard validated by Monte Carlo simulation
+scorecard           the arm of a configuration compared with the requisites of chapter 3, and with the rule of 4.4
 """

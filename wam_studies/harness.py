@@ -6,11 +6,10 @@ runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
 
 import hashlib
 import importlib
-import shlex
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -31,7 +30,7 @@ STUDIES: Final = {
     "contact": "wam_studies.contact.study:ContactStudy",
     "faults": "wam_studies.faults.study:FaultStudy",
     "force": "wam_studies.force_benchmark.study:ForceStudy",
-    "guard": "wam_studies.stability.guard_validation:GuardStudy",
+    "guard": "wam_studies.guard_validation:GuardStudy",
     "identify": "wam_studies.identification.study:IdentificationStudy",
     "soak": "wam_studies.faults.soak:SoakStudy",
 }
@@ -65,22 +64,6 @@ class Study(ABC, Generic[Case, Record]):
     over_topics: ClassVar[bool] = False
 
     configuration: Configuration
-
-    def __post_init__(self) -> None:
-        """Refuse an option that is too small, or a name that there is not.
-
-        Raises
-        ------
-        ValueError
-            which names the option, its value and what is allowed.
-        """
-        for one in fields(self):
-            value, least, name = getattr(self, one.name), one.metadata.get("least"), one.name.replace("_", "-")
-            if least is not None and not value >= least:
-                raise ValueError(f"--{name} is {value:g}; it must be at least {least:g}")
-            choices = one.metadata.get("choices")
-            if choices and (wrong := [each for each in value if each not in choices]):
-                raise ValueError(f"--{name} is '{wrong[0]}'; choose from {', '.join(map(shlex.quote, choices))}")
 
     @abstractmethod
     def cases(self, seed: int) -> Iterable[Case]:

@@ -37,7 +37,7 @@ from wam_description.world import NO_SPRINGS, World
 from wam_driver.friction import COULOMB_STICTION
 from wam_driver.plant import Plant
 from wam_sim.recording import recorded_run
-from wam_studies.identification.trial import IdentificationTrial, run_trial
+from wam_studies.identification.study import IdentificationTrial, run_trial
 
 ROOT = Path(__file__).parents[2]
 SHARED = CONFIGURATION.shared

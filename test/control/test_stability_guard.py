@@ -21,7 +21,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_sim.simulation import Simulation
-from wam_studies.stability.guard_validation import DIVERGES, GuardStudy, validate
+from wam_studies.guard_validation import DIVERGES, GuardStudy, validate
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))

@@ -1,16 +1,17 @@
 """Lockstep: the same scenario gives the same numbers, bit for bit, wherever and however it runs."""
 
 import dataclasses
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from bag_comparison import compare
 
-from wam_bag.bag import Bag, TableColumns, read
+from wam_bag.bag import Bag, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_control.task.scenario import load
 from wam_description.arm import Timing
 from wam_description.configuration import Configuration, packaged
@@ -34,9 +35,6 @@ STEPS = [
 ]
 
 
-NUMBERS = ("position", "velocity", "effort", "force", "torque", "point")
-
-
 def record_in_processes(configured: Configuration, how: str = EACH) -> None:
     from wam_ros.bring_up import Processes
 
@@ -55,14 +53,19 @@ def differences(rows: Rows, bag: Bag) -> list[str]:
     """Topics of a direct run whose numbers are not those of the bag, bit for bit."""
     found = []
     for topic, published in rows.items():
-        columns: Any = bag.topics[f"/wam/{topic}"]
-        if isinstance(columns, TableColumns):
-            tabled = [[number for row in table.rows for number in row] for table in tables(columns)]
-            if repr([list(row.values) for row in published]) != repr(tabled):
+        columns = bag.topics[f"/wam/{topic}"]
+        if isinstance(columns, JointColumns):
+            numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        elif isinstance(columns, WrenchColumns):
+            numbers = np.hstack([columns.force, columns.torque])
+        elif isinstance(columns, TableColumns):
+            rows = [[number for row in table.rows for number in row] for table in tables(columns)]
+            if repr([list(row.values) for row in published]) != repr(rows):
                 found.append(topic)
             continue
-        fields = [getattr(columns, name, None) for name in NUMBERS]
-        numbers = np.hstack([field for field in fields if field is not None])
+        else:
+            assert isinstance(columns, PointColumns)
+            numbers = columns.point
         here = np.array([row.values for row in published])
         if here.shape != numbers.shape or here.tobytes() != np.ascontiguousarray(numbers).tobytes():
             found.append(f"{topic}: {here.shape} and {numbers.shape}")
@@ -127,6 +130,31 @@ def test_a_node_of_another_name_has_a_process_of_its_own(tmp_path: Path, monkeyp
     monkeypatch.syspath_prepend(tmp_path)
     slow, another = "own_nodes:Slow", "own_nodes:Another"
     assert process_groups(["force_loop", slow, another], GROUPED) == [["force_loop", another], [slow]]
+
+
+@pytest.mark.slow
+def test_direct_runs_are_equal_in_every_bit_across_processes(tmp_path: Path) -> None:
+    script = playing(STEPS, tmp_path).sections["scenario"]["script"]
+    code = (
+        "import sys, json, hashlib\n"
+        "from pathlib import Path\n"
+        "from wam_sim.simulation import Simulation\n"
+        "from wam_control.task.scenario import load\n"
+        "from wam_description.configuration import Configuration, packaged\n"
+        "c = Configuration.load(packaged('wam'))\n"
+        "run = Simulation(c, load(Path(sys.argv[1]), c.shared))\n"
+        "run.play()\n"
+        "print(json.dumps({t: hashlib.sha256(repr(r).encode()).hexdigest() for t, r in run.rows.items()}))\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    outputs = []
+    for seed in ("1", "2"):
+        environment["PYTHONHASHSEED"] = seed
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(script)], capture_output=True, text=True, check=True, env=environment
+        )
+        outputs.append(json.loads(done.stdout))
+    assert outputs[0] == outputs[1]
 
 
 TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)

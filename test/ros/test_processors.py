@@ -22,8 +22,11 @@ OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
 
 
-def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest_if_there_is_any() -> None:
+def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest() -> None:
     assert divided({0: 0.1, 3: 0.9, 5: 0.4}) == ({3}, {0, 5})
+
+
+def test_where_only_one_is_permitted_all_have_it() -> None:
     assert divided({2: 0.0}) == ({2}, {2})
 
 
@@ -65,7 +68,7 @@ def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
             (os.sched_getscheduler(int(thread.name)), frozenset(os.sched_getaffinity(int(thread.name))))
             for thread in Path("/proc", str(process.pid), "task").iterdir()
         }
-        for name, process in processes.processes.items()
+        for name, process in processes._processes.items()
     }
 
 
@@ -140,7 +143,7 @@ def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_i
         expected = expected_priorities()
         while any(
             is_apart == (permitted in {where for _, where in of}) for of in placed(processes).values()
-        ) or expected != {name: priority(processes.processes[name].pid) for name in ENTRIES}:
+        ) or expected != {name: priority(processes._processes[name].pid) for name in ENTRIES}:
             assert time.monotonic() < end, "some threads are elsewhere, or have another priority"
             time.sleep(0.02)
         found = placed(processes)
@@ -171,6 +174,6 @@ def expected_priorities() -> dict[str, tuple[int, int]]:
 
 
 def environment_of(processes: Processes, name: str) -> bytes:
-    environment = Path("/proc", str(processes.processes[name].pid), "environ").read_bytes()
+    environment = Path("/proc", str(processes._processes[name].pid), "environ").read_bytes()
     assert PARENT.encode() in environment
     return environment

@@ -13,9 +13,8 @@ from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_studies.contact.degradations import NAMES, drawn
+from wam_studies.contact.drives import Drive, arriving, names_payload, record
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, TorqueErrors, payload_probability
-from wam_studies.contact.recording import Drive, record
-from wam_studies.contact.replay import arriving, names_payload
 from wam_studies.contact.rows import IDENTIFIED_ARM, degraded_rows, degraded_tables
 from wam_studies.contact.scenarios import base_values
 from wam_studies.contact.study import ContactCase, ContactStudy, play_case
@@ -41,11 +40,6 @@ def test_a_degradation_is_drawn_from_its_seed_and_changes_the_arm_or_its_signals
     first, again = (drawn(name, WAM, np.random.default_rng(5)) for _ in range(2))
     assert first == again
     assert (drawn(STATED, WAM, np.random.default_rng(5)) == first) is (name == STATED)
-
-
-def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> None:
-    with pytest.raises(ValueError, match=r"--degradations is 'wind'; choose from all, 'as stated', 'friction 0\.8"):
-        ContactStudy(CONFIGURATION, degradations=("wind",))
 
 
 def test_drives_are_of_each_degradation_and_the_mix_is_identified_too() -> None:

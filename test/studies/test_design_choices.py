@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from wam_description.configuration import Configuration, packaged
-from wam_studies.design_choices import stiffness_rule
-from wam_studies.scorecard import measures
+from wam_studies.scorecard import measures, stiffness_rule
 from wam_theory.linear_loop import routh_gain
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, Verdict, assess, simulate
 

@@ -46,6 +46,14 @@ def pressed(time, force):  # the sensors of a testbed that presses with this for
     return joints(time, -np.asarray(force) * LEVER / STIFFNESS)
 
 
+def pressing_run(folder: Path, run: tuple[str, int], time, force, steps=PRESS, desired=0.0, **topics):
+    """A run of an experiment's testbed that presses with this force, N, of a motor at rest unless it is given."""
+    given = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
+    if desired:
+        given["force_command"] = forces(time, (0.0, -desired, 0.0))
+    return recorded(load(run[0]), run[1], given | topics, steps, folder)
+
+
 # definition
 
 
@@ -116,15 +124,12 @@ def test_growth_of_a_growing_and_of_a_decaying_oscillation() -> None:
 
 
 def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> None:
-    experiment = load("testbed-5.6")
-    time = np.arange(0.0, 2.5, 5e-4)
-    runs = {}
-    for number, name, gain, rate in ((0, "below", 0.010, -0.6), (1, "above", 0.014, 0.2)):
+    time, runs = np.arange(0.0, 2.5, 5e-4), []
+    for number, gain, rate in ((0, 0.010, -0.6), (1, 0.014, 0.2)):
         steps = (Step("raise the gain", 0.0, 2.5, {"force_loop:force_gain": [gain]}),)
         force = 44.0 + 0.5 * np.exp(rate * time) * np.sin(75.0 * time)
-        topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
-        runs[name] = recorded(experiment, number, topics, steps, tmp_path)
-    gain, frequency, low, high = testbed.margin(runs["below"], runs["above"], "now")
+        runs.append(pressing_run(tmp_path, ("testbed-5.6", number), time, force, steps))
+    gain, frequency, low, high = testbed.margin(*runs, "now")
     assert gain.measured == pytest.approx(0.013, rel=2e-3)  # three quarters of the way
     assert gain.predicted == pytest.approx(1.73e-3 * LEVER**2 / si(1.0, "lb-in"), rel=2e-3)  # of errata and thesis
     assert frequency.measured == pytest.approx(75.0, rel=2e-3)
@@ -143,7 +148,6 @@ def test_margin_with_the_velocity_loop_tends_to_that_of_a_velocity_source_as_it_
 
 
 def test_verdict_on_a_step_follows_from_its_last_windows(tmp_path: Path) -> None:
-    experiment = load("testbed-5.6")
     time = np.arange(0.0, 3.0, 5e-4)
     step = Step("press", 0.0, 3.0, {})
     swing = np.sin(78.0 * time)
@@ -153,8 +157,7 @@ def test_verdict_on_a_step_follows_from_its_last_windows(tmp_path: Path) -> None
         "diverged": 10.0 + np.exp(1.5 * time) * swing,
     }
     for verdict, force in shapes.items():
-        topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
-        run = recorded(experiment, 2, topics, (step,), tmp_path)
+        run = pressing_run(tmp_path, ("testbed-5.6", 2), time, force, (step,))
         shown = played(run, step)
         assert shown.verdict == verdict
         stopped = run._replace(fault="cable", fault_time=2.0)
@@ -177,19 +180,15 @@ def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Pa
 
 
 def test_stiction_cycle_of_a_square_wave(tmp_path: Path) -> None:
-    experiment = load("stiction-limit-cycle")
-    time = np.arange(0.0, 9.0, 1e-3)
+    time, steps = np.arange(0.0, 9.0, 1e-3), (Step("press", 0.0, 9.0, {}),)
     square = 10.9 + 1.2 * np.sign(np.sin(2.0 * np.pi * time / 1.9))
     calm = np.where(time < 2.0, square, 10.0)
-    runs = {}
-    for number, force in enumerate((square, calm, square)):
-        topics = {
-            "joint_sensors": pressed(time, force),
-            "motor_states": joints(time, 0.0),
-            "force_command": forces(time, (0.0, -10.936, 0.0)),
-        }
-        run = recorded(experiment, number, topics, (Step("press", 0.0, 9.0, {}),), tmp_path)
-        runs[experiment.runs[number].name] = run
+    runs = {
+        run.name: pressing_run(tmp_path, ("stiction-limit-cycle", number), time, force, steps, 10.936)
+        for number, (run, force) in enumerate(
+            zip(load("stiction-limit-cycle").runs, (square, calm, square), strict=True)
+        )
+    }
     rows = {row.quantity: row for row in limit_cycles.stiction(runs).rows}
     assert rows["F_c peak to peak"].measured == pytest.approx(2.4, rel=1e-4)
     assert rows["period"].measured == pytest.approx(1.9, rel=1e-3)
@@ -201,18 +200,13 @@ def test_stiction_cycle_of_a_square_wave(tmp_path: Path) -> None:
 
 
 def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: Path) -> None:
-    experiment = load("actuator-limit-cycle")
     time = np.arange(0.0, 8.0, 1e-3)
     stiffness, swing = 14.0**2 * 8.33, 0.007
     motor = 0.03 + swing * (np.abs((time / 2.0) % 2.0 - 1.0) - 0.5)  # at the joint, up and down in 4 s
     pull = stiffness * (motor - 0.03) + 20.0  # of the cable, the force of the contact and friction
-    topics = {
-        "joint_sensors": pressed(time, np.full(len(time), 20.0 / LEVER)),
-        "motor_states": joints(time, -14.0 * motor),
-        "sim/joint_states": joints(time, 0.0, effort=-pull),
-        "force_command": forces(time, (0.0, -21.9, 0.0)),
-    }
-    run = recorded(experiment, 0, topics, (Step("press", 0.0, 8.0, {}),), tmp_path)
+    topics = {"motor_states": joints(time, -14.0 * motor), "sim/joint_states": joints(time, 0.0, effort=-pull)}
+    force, steps = np.full(len(time), 20.0 / LEVER), (Step("press", 0.0, 8.0, {}),)
+    run = pressing_run(tmp_path, ("actuator-limit-cycle", 0), time, force, steps, 21.9, **topics)
     result = limit_cycles.actuator({"press": run})
     rows = {row.quantity: row for row in result.rows}
     assert rows["motor at the joint, peak to peak"].measured == pytest.approx(swing, rel=1e-3)
@@ -229,15 +223,9 @@ def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: P
 
 
 def test_step_response_of_an_exponential(tmp_path: Path) -> None:
-    experiment = load("step-response")
     time = np.arange(0.0, 2.5, 1e-3)
-    force = 21.87 * (1.0 - np.exp(-time / 0.5))
-    topics = {
-        "joint_sensors": pressed(time, force),
-        "motor_states": joints(time, 0.0),
-        "force_command": forces(time, (0.0, -21.87, 0.0)),
-    }
-    run = recorded(experiment, 0, topics, (Step("press", 0.0, 2.5, {}),), tmp_path)
+    force, steps = 21.87 * (1.0 - np.exp(-time / 0.5)), (Step("press", 0.0, 2.5, {}),)
+    run = pressing_run(tmp_path, ("step-response", 0), time, force, steps, 21.87)
     constant, largest = step_response.responses({"no_friction": run}).rows
     assert constant.measured == pytest.approx(0.5, rel=1e-4)
     assert constant.predicted == pytest.approx(1.0 / (0.002 * 772.0), rel=2e-3)  # (5.2), G_I 0.002, K 772 N m/rad
@@ -250,12 +238,8 @@ def test_errors_at_rest_are_those_of_the_standstills(tmp_path: Path) -> None:
     time = np.arange(0.0, 1.0, 1e-3)
     speed = np.where((time % 0.25) < 0.1, 0.0, 0.3)
     force = np.select([time < 0.25, time < 0.5, time < 0.75], [0.0, 8.0, 9.5], 9.9)
-    topics = {
-        "joint_sensors": joints(time, -force * LEVER / STIFFNESS, -speed),
-        "motor_states": joints(time, 0.0),
-        "force_command": forces(time, (0.0, -10.0, 0.0)),
-    }
-    shown = played(recorded(load("step-response"), 0, topics, PRESS, tmp_path))
+    sensors = joints(time, -force * LEVER / STIFFNESS, -speed)
+    shown = played(pressing_run(tmp_path, ("step-response", 0), time, force, desired=10.0, joint_sensors=sensors))
     assert step_response.errors_at_rest(shown) == pytest.approx([2.0, 0.5, 0.1], rel=1e-3)
 
 
@@ -513,18 +497,15 @@ def test_force_without_feedback_is_measured_as_a_play_of_its_friction(tmp_path: 
     desired = 5.0 * np.minimum(time, 8.0 - time)  # N, up to 20
     friction = 4.0 / LEVER
     force = np.where(time < 4.0, np.maximum(desired - friction, 0.0), np.minimum(20.0 - friction, desired + friction))
-    topics = {
-        "joint_sensors": pressed(time, force),
-        "motor_states": joints(time, 0.0 * time, effort=-desired * LEVER / 14.0),
-    }
     steps = (Step("more", 0.0, 4.0, {}), Step("less", 4.0, 8.0, {}))
-    run = recorded(load("force-accuracy"), 0, topics, steps, tmp_path)
-    rows, _ = force_accuracy.open_loop(run)
-    assert all(row.agrees for row in rows)
-    assert [row.measured for row in rows[1:3]] == pytest.approx([20.0 - friction, friction], abs=0.03)
-    topics["joint_sensors"] = pressed(time, np.maximum(desired - friction, 0.0))  # a deadband without memory
-    rows, _ = force_accuracy.open_loop(recorded(load("force-accuracy"), 0, topics, steps, tmp_path))
-    assert not rows[2].agrees
+    motors, found = joints(time, 0.0 * time, effort=-desired * LEVER / 14.0), []
+    for each in (force, np.maximum(desired - friction, 0.0)):  # the second is a deadband without memory
+        run = pressing_run(tmp_path, ("force-accuracy", 0), time, each, steps, motor_states=motors)
+        found.append(force_accuracy.open_loop(run)[0])
+    of_play, forgotten = found
+    assert all(row.agrees for row in of_play)
+    assert [row.measured for row in of_play[1:3]] == pytest.approx([20.0 - friction, friction], abs=0.03)
+    assert not forgotten[2].agrees
 
 
 @pytest.mark.parametrize(("stretched", "agrees"), [(1.0, True), (1.15, False)])
@@ -563,12 +544,8 @@ def test_a_strand_that_stays_tight_under_a_low_pretension_is_not_what_is_predict
     steps = (Step("delicate", 0.0, 2.0, {}), Step("strong", 2.0, 9.5, {}))
     for stretch, agrees in ((np.maximum(torque, 2.0 * torque - slack) / k, True), (torque / k, False)):
         motor = -(14.0 * force * LEVER / STIFFNESS + stretch)
-        topics = {
-            "joint_sensors": pressed(time, force),
-            "motor_states": joints(time, motor, effort=-desired * LEVER / 14.0),
-            "force_command": forces(time, (0.0, -25.0, 0.0)),
-        }
-        run = recorded(load("active-pretension"), 1, topics, steps, tmp_path)
+        motors = joints(time, motor, effort=-desired * LEVER / 14.0)
+        run = pressing_run(tmp_path, ("active-pretension", 1), time, force, steps, 25.0, motor_states=motors)
         deadband, found = force_accuracy.active_pretension({"a_fifth_of_it": run}).rows
         assert deadband.agrees
         assert found.agrees == agrees
@@ -584,12 +561,8 @@ def test_friction_that_an_inner_loop_leaves_is_half_of_the_loop_of_force_over_co
     desired = np.interp(time, [0.0, 2.8, 3.0, 5.5], [0.0, 18.0, 18.0, 2.0])
     steps = (Step("out", 0.0, 3.0, {}), Step("back", 3.0, 5.8, {}))
     for part, agrees in ((left, True), (0.9 * left, False)):
-        topics = {
-            "motor_effort_command": joints(time, 0.0, effort=-desired * LEVER / 14.0),
-            "motor_states": joints(time, 0.0),
-            "joint_sensors": pressed(time, play(desired, part * 0.2 * 14.0 / LEVER)),
-        }
-        run = recorded(load("inner-loops"), number, topics, steps, tmp_path)
+        force, command = play(desired, part * 0.2 * 14.0 / LEVER), joints(time, 0.0, effort=-desired * LEVER / 14.0)
+        run = pressing_run(tmp_path, ("inner-loops", number), time, force, steps, motor_effort_command=command)
         (row,) = inner_loops.friction_left({"run": run}).rows
         assert row.agrees == agrees, row
 

@@ -133,13 +133,6 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
     assert "## Numbers" not in text
 
 
-def test_an_option_that_is_too_small_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"--limit is 0.5; it must be at least 1"):
-        SquareStudy(CONFIGURATION, 0.5)
-    with pytest.raises(ValueError, match=r"--limit is nan"):
-        SquareStudy(CONFIGURATION, math.nan)
-
-
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_study_names_a_page_that_has_its_section(name: str) -> None:
     kind = load(name)

@@ -22,17 +22,6 @@ def test_friction_is_a_deadband_from_rest_and_a_play_of_twice_its_width_on_the_w
     assert play(up, 0.0) == pytest.approx(up)
 
 
-def test_play_is_where_a_friction_node_between_two_springs_comes_to_rest() -> None:
-    """By relaxation: the node moves while springs pull it with more than its friction."""
-    desired, friction, x, found = 8.0 * np.sin(np.linspace(0.0, 9.0, 400)) ** 2, 1.5, 0.0, []
-    for wanted in desired:  # the motor is a torque source: the node feels F_des and the contact spring, k_c = 2
-        net = wanted - 2.0 * x
-        if abs(net) > friction:
-            x += (net - np.sign(net) * friction) / 2.0
-        found.append(2.0 * x)
-    np.testing.assert_allclose(play(desired, friction), found, atol=1e-12)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("quiet", [True, False])
 def test_no_error_is_beyond_that_of_statics_and_some_are_near_it(quiet: bool) -> None:

@@ -4,14 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION
 
 from wam_control.task import scenario
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import ObjectState
 from wam_driver.driver import Driver, DriverParameters
-from wam_live.object_meshes import at_rest
-from wam_studies.tasks.object_traces import object_states, object_traces, world_of
 from wam_studies.tasks.pictures import save
 from wam_studies.thesis.definition import load, tasks, with_run
 from wam_studies.thesis.evaluation import evaluate, function_of
@@ -63,10 +60,10 @@ def test_every_number_of_a_task_with_a_bound_is_within_it(name: str) -> None:
 
 def test_a_recording_holds_the_objects_by_name() -> None:
     run = recording(SAMPLES / "sweep-objects")
-    traces = object_traces(run)
-    assert tuple(traces) == world_of(run).objects == ("block", "can", "tin")
+    traces = run.objects
+    assert tuple(traces) == run.world.objects == ("block", "can", "tin")
     at = float(traces["can"].time[200])
-    can = object_states(run, at)[1]
+    can = run.object_states(at)[1]
     assert isinstance(can, ObjectState)
     assert (can.x, can.y, can.z) == pytest.approx(traces["can"].position[200])
 
@@ -86,13 +83,3 @@ def test_the_documentation_shows_every_task() -> None:
         assert f"tasks/{name}.png" in page
         assert (ROOT / "docs" / "tasks" / f"{name}.png").is_file()
     assert "MISSED" not in page
-
-
-def test_obstacles_that_move_are_not_drawn_as_obstacles_at_rest() -> None:
-    values = load("hold-tube").runs[0].values
-    configuration = CONFIGURATION.with_values({k: v for k, v in values.items() if k.startswith("driver:")})
-    world = configuration.node("driver", DriverParameters).world
-    fixed = at_rest(world)
-    assert fixed.names == ("torso",)
-    assert fixed.positions == world.obstacles.positions[:3]
-    assert fixed.stiffness == world.obstacles.stiffness[:1]

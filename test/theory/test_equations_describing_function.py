@@ -11,13 +11,6 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, Verdict, ass
 QUARTER = (1.0, 1.0, 2.0, 2.0)  # J, b, k_tr, k_c: zeta = 0.25 and gamma = G_I
 
 
-def test_describing_function_is_the_fundamental_of_the_friction_of_a_swinging_node() -> None:
-    angle = (np.arange(20_000) + 0.5) * 2.0 * math.pi / 20_000
-    friction = 0.7 * np.sign(np.sin(angle))
-    fundamental = 2.0 * np.mean(friction * np.sin(angle))
-    assert describing_function.coulomb_describing_function(0.7, 0.3) == pytest.approx(fundamental / 0.3, rel=1e-6)
-
-
 def test_linear_block_is_that_of_the_state_matrices() -> None:
     gain, j, b, ktr, kc = 0.8, 0.7, 0.4, 2.0, 5.0
     a = np.array([[0.0, 1.0, 0.0], [-(ktr + kc) / j, -b / j, ktr / j], [-gain * kc, 0.0, 0.0]])

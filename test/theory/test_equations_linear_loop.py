@@ -73,23 +73,6 @@ def test_testbed_gains_of_section_5_6() -> None:
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [0, 1, 5])
-@pytest.mark.parametrize("period", [0.02, 2.0])
-def test_sampled_margin_is_where_the_exact_response_begins_to_grow(delay: int, period: float) -> None:
-    values = (1.3, 0.8, 2.0, 3.0)
-    margin = linear_loop.sampled_margin(*values, period, delay)
-    node = FrictionNode(*values, 0.0, 0.0)
-    sizes = []
-    for factor in (0.97, 1.03):
-        loop = IntegralLoop(factor * margin.gain, sample_period=period, delay_samples=delay)
-        times = np.arange(0.0, 300.0 * math.pi / margin.frequency, 0.1 / margin.frequency)
-        error = np.abs(1.0 - simulate(node, loop, 1.0, times[-1] + 1.0).at(times).contact_force)
-        third = len(times) // 3
-        sizes.append(error[-third:].max() / error[third : 2 * third].max())
-    assert sizes[0] < 1.0 < sizes[1]
-
-
 def test_sampled_margin_has_a_pole_on_the_circle_at_its_frequency() -> None:
     margin = linear_loop.sampled_margin(1.0, 1.0, 2.0, 2.0, 0.2, 1)
     # the held loop's states x, v, x_m and the command under way, over one period by small steps
@@ -160,14 +143,6 @@ def verdict(gain: float, step: float, delay: int) -> Verdict:
     """Of the testbed with 8.4 lb-in of friction at 50 Hz."""
     loop = IntegralLoop(gain, sample_period=0.02, delay_samples=delay)
     return assess(FrictionNode(*TESTBED, 8.4, 8.4), loop, step).verdict
-
-
-def test_one_sample_of_delay_raises_the_frictionless_limit_and_friction_then_lowers_it() -> None:
-    limit = linear_loop.sampled_margin(*TESTBED, 0.02, 1).gain
-    assert limit == pytest.approx(4.89e-3, rel=1e-3)
-    assert limit > 2.8 * linear_loop.sampled_margin(*TESTBED, 0.02).gain
-    assert verdict(0.8 * limit, 4.0, 1) is Verdict.SETTLED
-    assert verdict(0.9 * limit, 4.0, 1) is Verdict.LIMIT_CYCLE
 
 
 def test_at_one_and_a_half_times_the_margin_8_06_lb_settle_and_8_19_diverge() -> None:

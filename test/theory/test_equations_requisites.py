@@ -46,16 +46,6 @@ def test_contact_without_force_has_no_position_and_arguments_broadcast() -> None
     assert found.position[1, 2] == pytest.approx(0.5)
 
 
-def test_impact_force_is_the_greatest_of_a_mass_that_runs_into_a_spring() -> None:
-    x, v, greatest, h = 0.0, 1.5, 0.0, 1e-5
-    while v > 0.0:  # 0.8 kg on 4000 N/m, leapfrog
-        v -= h * 4000.0 * x / 0.8
-        x += h * v
-        greatest = max(greatest, 4000.0 * x)
-    assert impact_force(1.5, 0.8, 4000.0) == pytest.approx(greatest, rel=1e-3)
-    assert impact_force([0.0, 3.0], 0.8, 4000.0) == pytest.approx([0.0, 2.0 * greatest], rel=1e-3)
-
-
 def test_impact_of_a_driven_link_is_that_of_its_effective_mass_and_not_of_the_link() -> None:
     """Link 0.5 kg m^2 and a rotor of 4e-5 behind 1:60 meet 2000 N/m at 0.7 m and 1.2 m/s, all rigid."""
     total, lever = 0.5 + 60.0**2 * 4e-5, 0.7

@@ -5,8 +5,7 @@ import pytest
 
 from wam_studies.figures.closed_forms import resonances
 from wam_studies.figures.stability import closed_loop_map, equal_node
-from wam_studies.plant.force_response import force_step, loop_arm, loop_node
-from wam_studies.plant.ideal_testbed import ideal_testbed, link_inertia
+from wam_studies.plant.ideal_testbed import force_step, ideal_testbed, link_inertia, loop_arm, loop_node
 from wam_theory.friction_model import FrictionNode
 from wam_theory.linear_loop import routh_gain
 from wam_theory.regimes import gamma_3, psi

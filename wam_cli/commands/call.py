@@ -5,6 +5,7 @@ import difflib
 import math
 import re
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any, Final
@@ -171,10 +172,11 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     """Print messages; report once that none comes and why, and end after a silence that is too long."""
     stack.follow_statuses()
-    taken, is_reported = 0, False
+    taken, since, is_reported = 0, time.monotonic(), False
 
-    def check(silent: float) -> None:
+    def check() -> None:
         nonlocal is_reported
+        silent = time.monotonic() - since
         of = f" of {given.count}" if given.count is not None else ""
         waits = f"waits for message {taken + 1}{of} of {given.topic}"
         if given.timeout is not None and silent > given.timeout:
@@ -188,7 +190,7 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
 
     try:
         for message in islice(stack.messages(given.topic, check=check), given.count):
-            taken, is_reported = taken + 1, False
+            taken, since, is_reported = taken + 1, time.monotonic(), False
             print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
             sys.stdout.flush()
     except TimeoutError as error:

@@ -8,7 +8,7 @@ from wam_control.force.loop_design import loop_design
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import require_parameters
 from wam_stack import guard
-from wam_studies.stability.map_picture import draw
+from wam_studies.figures.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 PLANT = {  # option: what it is
@@ -21,6 +21,7 @@ PLANT = {  # option: what it is
 }
 LOOP = {  # option: default, what it is
     "limit": (math.inf, "saturation of the error; default: none"),
+    "deadband": (0.0, "deadband of the error; default: 0"),
     "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
@@ -82,7 +83,7 @@ def _assess(given: argparse.Namespace) -> int:
         name: default if getattr(given, name) is None else getattr(given, name) for name, (default, _) in LOOP.items()
     }
     stiction = value["friction"] if given.stiction is None else given.stiction
-    loop = IntegralLoop(value["gain"], error_limit=value["limit"])
+    loop = IntegralLoop(value["gain"], error_limit=value["limit"], deadband=value["deadband"])
     plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
     design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
     print(design.text())

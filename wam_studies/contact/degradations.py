@@ -4,16 +4,13 @@ Nothing here is read by the estimator, and nothing is read from its parameters: 
 `contact_estimator` of the configuration, what is drawn is this table.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_studies.identification.plants import EXACT, MeasuredSignals
-
-Values = dict[str, Any]  # of a configuration, by name
+from wam_studies.identification.plants import EXACT, DrawnArm, MeasuredSignals, Values
 
 
 class Degradation(NamedTuple):
@@ -31,64 +28,6 @@ class Degradation(NamedTuple):
     model: Mapping[str, Any] = {}
     signals: MeasuredSignals = EXACT
     drift: float = 0.0
-
-
-class _DrawnArm(NamedTuple):
-    """Random values of one arm, by parameter."""
-
-    random: np.random.Generator
-    arm: Arm
-
-    def around(self, low: float, high: float, count: int) -> list[float]:
-        return self.random.uniform(low, high, count).tolist()
-
-    def each_motor(self, low: float, high: float) -> list[float]:
-        return self.around(low, high, len(self.arm.motors.names))
-
-    def level(self, low: float, high: float) -> Values:
-        """Levels of friction over those configured."""
-        return {
-            "driver:mismatch.motor_friction": self.each_motor(low, high),
-            "driver:mismatch.joint_friction": self.around(low, high, len(self.arm.joints.names)),
-        }
-
-    def stribeck(self, excess: float) -> Values:
-        return {
-            "driver:friction.law": "stribeck",
-            "arm.motors.static_friction": [excess * f for f in self.arm.motors.static_friction],
-            "arm.joints.static_friction": [excess * f for f in self.arm.joints.static_friction],
-        }
-
-    def asymmetric(self, size: float) -> Values:
-        """Friction that differs by direction."""
-        keys, shafts = ("motor_asymmetry", "joint_asymmetry"), len(self.arm.motors.names)
-        return {f"driver:friction.{key}": (size * self.random.choice((-1.0, 1.0), shafts)).tolist() for key in keys}
-
-    def encoder(self, counts: int) -> Values:
-        return {"driver:sensors.encoder_resolution": [2.0 * math.pi / counts] * len(self.arm.motors.names)}
-
-    def cogging(self, amplitude: float) -> Values:
-        return {
-            "driver:effects.ripples.amplitude": [amplitude] * len(self.arm.motors.names),
-            "driver:effects.ripples.phase": self.each_motor(-math.pi, math.pi),
-        }
-
-    def masses(self, width: float) -> Values:
-        return {"driver:mismatch.mass": self.around(1.0 - width, 1.0 + width, len(self.arm.links.names))}
-
-    def centre(self, metres: float) -> Values:
-        """Centres of mass of the model."""
-        centre = self.arm.links.centre
-        return {"arm.links.centre": np.add(centre, self.around(-metres, metres, len(centre))).tolist()}
-
-    def constant(self, width: float) -> tuple[float, ...]:
-        """Measured over true torques."""
-        return tuple(self.each_motor(1.0 - width, 1.0 + width))
-
-    def noise(self, level: float) -> Values:
-        """Ripple of the torque and noise of the current."""
-        each = [level] * len(self.arm.motors.names)
-        return {"driver:amplifier.torque_ripple": each, "driver:amplifier.current_noise": each}
 
 
 def _load(factor: float) -> Values:
@@ -126,7 +65,7 @@ def drawn(name: str, arm: Arm, random: np.random.Generator) -> Degradation:
 
     `as stated` draws friction within 10 % and masses within 2 %, which is what the configured estimator states.
     """
-    arms, motors = _DrawnArm(random, arm), len(arm.motors.names)
+    arms, motors = DrawnArm(random, arm), len(arm.motors.names)
     stated = arms.level(0.9, 1.1) | arms.masses(0.02)
     signs = random.choice((-1.0, 1.0), motors + len(arm.joints.names))
     forty = {

@@ -15,6 +15,7 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.world import Obstacles
 from wam_studies.contact.moves import MoveGenerator
+from wam_studies.identification.plants import mismatch
 
 
 @dataclass(frozen=True)
@@ -204,10 +205,11 @@ class ScenarioGenerator:
     def _values(
         self, random: np.random.Generator, start: Sequence[float], planned: list[PlannedContact]
     ) -> dict[str, Any]:
+        drawn = mismatch(random, self._arm, RANGES.mass, RANGES.friction, RANGES.stiffness)
         return {
             **self._base,
             "arm.joints.start": list(start),
-            **_mismatch(random, self._arm),
+            **{f"driver:mismatch.{name}": factors for name, factors in drawn.items()},
             **_pushers(random, [contact for contact in planned if contact.kind in ("sphere", "flat")]),
         }
 
@@ -235,19 +237,6 @@ def moves_and_stops(
         left -= move.seconds + stop
         here = move.posture
     return steps
-
-
-def _mismatch(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
-    def factors(width: float, count: int) -> list[float]:
-        return (1.0 + width * random.uniform(-1.0, 1.0, count)).tolist()
-
-    motors, joints = len(arm.motors.names), len(arm.joints.names)
-    return {
-        "driver:mismatch.mass": factors(RANGES.mass, len(arm.links.names)),
-        "driver:mismatch.motor_friction": factors(RANGES.friction, motors),
-        "driver:mismatch.joint_friction": factors(RANGES.friction, joints),
-        "driver:mismatch.stiffness": factors(RANGES.stiffness, motors),
-    }
 
 
 def _pushers(random: np.random.Generator, contacts: list[PlannedContact]) -> dict[str, Any]:

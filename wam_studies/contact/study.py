@@ -3,15 +3,14 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from wam_description.configuration import Configuration
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
+from wam_studies.contact.drives import CONTACTS, TIMES, Drive, record, replay
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore
-from wam_studies.contact.recording import CONTACTS, TIMES, Drive, record
-from wam_studies.contact.replay import replay
 from wam_studies.contact.rows import (
     IDENTIFIED_ARM,
     MEDIANS,
@@ -57,8 +56,8 @@ def play_case(case: ContactCase) -> ContactScore:
 class ContactStudy(Study[ContactCase, ContactScore]):
     """Scenarios of an arm as stated; and drives of arms and signals with degradations, one at a time and mixed."""
 
-    title: ClassVar[str] = "contact estimation on the whole arm, ideal or with degradations"
-    page: ClassVar[str] = "docs/contact.md"
+    title = "contact estimation on the whole arm, ideal or with degradations"
+    page = "docs/contact.md"
 
     contacts: int = option(200, "contacts in motion per seed", 1)
     resting: int = option(30, "contacts at rest, with dither, per seed", 0)

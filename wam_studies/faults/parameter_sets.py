@@ -70,37 +70,38 @@ def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: R
     way = chance.randrange(8)
     if way == 0 and live:
         many = chance.sample(live, chance.randrange(1, len(live) + 1))
-        return ParameterSet(
-            "values near the present ones", tuple(_scaled(f, present[f.name], chance) for f in many), False
-        )
+        near = tuple(_scaled(one, present[one.name], chance) for one in many)
+        return ParameterSet("values near the present ones", near, False)
     if way == 1:
         return ParameterSet("no parameter", (), False)
+    value = present[field.name]
+    if way == 6:
+        twice = tuple(_scaled(field, value, chance) for _ in range(2))
+        return ParameterSet("one name twice", twice, False)
+    name, bad, is_wrong = _bad(way, field, value, chance)
+    others = [one for one in good if one.name != bad.name]
+    others.insert(chance.randrange(len(others) + 1), bad)
+    return ParameterSet(name, tuple(others), is_wrong)
+
+
+def _bad(way: int, field: Field, value: Any, chance: Random) -> tuple[str, Assignment, bool]:
+    """What is wrong with an assignment, in words; the assignment; whether it has to be refused."""
     if way == 2:
-        bad = Assignment(field.name, chance.choice(UNKNOWN_CODES), present[field.name])
-        return ParameterSet("an unknown type code", _mixed(good, bad, chance), True)
+        return "an unknown type code", Assignment(field.name, chance.choice(UNKNOWN_CODES), value), True
     if way == 3:
         kind = chance.choice([kind for kind in CODES.values() if kind != CODES[field.kind]])
         code = ARRAYS[kind] if chance.random() < 0.5 else kind
-        value = chance.choice(EXTREMES[kind])
-        bad = Assignment(field.name, code, [value] if code != kind else value)
-        return ParameterSet("another type", _mixed(good, bad, chance), True)
+        other = chance.choice(EXTREMES[kind])
+        return "another type", Assignment(field.name, code, [other] if code != kind else other), True
     if way == 4:
-        bad = Assignment(chance.choice(["x", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"]), DOUBLE, 1.0)
-        return ParameterSet("an unknown name", _mixed(good, bad, chance), True)
+        name = chance.choice(["x", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"])
+        return "an unknown name", Assignment(name, DOUBLE, 1.0), True
     if way == 5 and field.is_array:
-        values = list(present[field.name])
+        values = list(value)
         values = chance.choice([[], values[:-1], [*values, *values[:1]], values * 1000])
-        code = ARRAYS[CODES[field.kind]]
-        return ParameterSet(
-            "an array of another length", _mixed(good, Assignment(field.name, code, values), chance), False
-        )
-    if way == 6:
-        return ParameterSet(
-            "one name twice", tuple(_scaled(field, present[field.name], chance) for _ in range(2)), False
-        )
-    bad = _extreme(field, present[field.name], chance)
-    is_wrong = not field.live or _is_outside(field, bad.value)
-    return ParameterSet("an extreme value", _mixed(good, bad, chance), is_wrong)
+        return "an array of another length", Assignment(field.name, ARRAYS[CODES[field.kind]], values), False
+    extreme = _extreme(field, value, chance)
+    return "an extreme value", extreme, not field.live or _is_outside(field, extreme.value)
 
 
 def _code(field: Field) -> int:
@@ -136,26 +137,16 @@ def _is_outside(field: Field, value: Any) -> bool:
     return field.kind in (int, float) and any(not field.low <= one <= field.high or math.isinf(one) for one in values)
 
 
-def _mixed(good: Sequence[Assignment], bad: Assignment, chance: Random) -> tuple[Assignment, ...]:
-    """Good assignments around a bad one."""
-    others = [one for one in good if one.name != bad.name]
-    others.insert(chance.randrange(len(others) + 1), bad)
-    return tuple(others)
-
-
 # tried on the nodes
 
-FIELDS: Final = {
-    BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",
-    6: "bool_array_value", 7: "integer_array_value", 8: "double_array_value", 9: "string_array_value",
-}  # fmt: skip
+FIELDS: Final = list(ParameterValue.get_fields_and_field_types())  # of values, by type code
 
 
 def message(assignment: Assignment) -> Parameter:
     """A parameter as ROS sends it."""
     value = ParameterValue(type=assignment.code)
-    if field := FIELDS.get(assignment.code):
-        setattr(value, field, assignment.value)
+    if assignment.code < len(FIELDS):
+        setattr(value, FIELDS[assignment.code], assignment.value)
     return Parameter(name=assignment.name, value=value)
 
 

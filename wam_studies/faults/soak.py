@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import yaml
@@ -65,7 +65,7 @@ def soak(case: SoakCase) -> SoakRecord:
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
         with Composition(configuration.with_values(own)) as composition:
             samples: list[_MemorySample] = []
-            failure = composition.play(partial(_sample, samples))
+            failure = composition.play(partial(_sample, samples)).failure
         found = contents(Path(folder, "soak"))
     first, last, early = samples[0], samples[-1], samples[len(samples) // 10].memory
     factor = (last.seconds - first.seconds) / max(last.wall - first.wall, 1e-9)
@@ -77,10 +77,10 @@ def soak(case: SoakCase) -> SoakRecord:
 class SoakStudy(Study[SoakCase, SoakRecord]):
     """One run of each seed, which draws the postures."""
 
-    title: ClassVar[str] = "a long run: memory and lost messages"
-    page: ClassVar[str] = "docs/safety.md"
-    seeds: ClassVar[tuple[int, ...]] = (1,)
-    over_topics: ClassVar[bool] = True
+    title = "a long run: memory and lost messages"
+    page = "docs/safety.md"
+    seeds = (1,)
+    over_topics = True
 
     seconds: float = option(600.0, "of the arm's time", 2.0)
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from wam_studies.faults import bags, disks, interruptions, losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
@@ -56,10 +56,10 @@ def run_fault(case: FaultCase) -> FaultTrial:
 class FaultStudy(Study[FaultCase, FaultTrial]):
     """Trials of each kind."""
 
-    title: ClassVar[str] = "wrong messages, lost nodes, full disks, Ctrl-C"
-    page: ClassVar[str] = "docs/safety.md"
-    seeds: ClassVar[tuple[int, ...]] = (1,)
-    over_topics: ClassVar[bool] = True
+    title = "wrong messages, lost nodes, full disks, Ctrl-C"
+    page = "docs/safety.md"
+    seeds = (1,)
+    over_topics = True
 
     kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
     trials: int = option(0, "trials of each kind; 0: as many as on the page", 0)

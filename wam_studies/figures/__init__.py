@@ -10,7 +10,7 @@ backdrivability   figure 3.2.6
 reducer           figures 4.3 to 4.7
 closed_forms      figures 3.1 and 4.9, those of chapter 6
 responses         figures 5.3, 5.5, 5.9, 5.10, 5.11
-stability         figures 5.7 and 5.8
+stability         figures 5.7 and 5.8; map_picture: the bound of 5.8 with a loop on it
 sweeps            results of `wam sweep` over each parameter
 style             colours and sizes
 """

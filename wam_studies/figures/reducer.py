@@ -7,7 +7,6 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Numbers, Panel, Panels, Series
-from wam_studies.plant.force_response import loop_plant
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     RATIO,
@@ -16,6 +15,7 @@ from wam_studies.plant.ideal_testbed import (
     frequencies,
     ideal_testbed,
     link_inertia,
+    loop_plant,
     released_plant,
     stepped_map,
 )

@@ -12,8 +12,7 @@ import numpy as np
 
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series
-from wam_studies.plant.force_response import PlantResponse, force_step
-from wam_studies.plant.ideal_testbed import RATIO, ideal_testbed, link_inertia
+from wam_studies.plant.ideal_testbed import RATIO, PlantResponse, force_step, ideal_testbed, link_inertia
 from wam_theory.friction_model import IntegralLoop
 from wam_theory.linear_loop import integral_time_constant, proportional_error, routh_gain, series_stiffness
 from wam_theory.regimes import gamma_3

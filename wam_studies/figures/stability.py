@@ -8,8 +8,7 @@ import numpy as np
 
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
-from wam_studies.plant.force_response import force_step, loop_arm, loop_node, loop_plant
-from wam_studies.plant.ideal_testbed import RATIO
+from wam_studies.plant.ideal_testbed import RATIO, force_step, loop_arm, loop_node, loop_plant
 from wam_theory.describing_function import friction_to_velocity
 from wam_theory.friction_model import FrictionNode
 from wam_theory.linear_loop import routh_gain

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -105,10 +105,10 @@ KNOWN = 0.05  # error of a force, per force, up to which it can be known
 class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     """Tasks, each drawn from the seed and its number alone."""
 
-    title: ClassVar[str] = "force control on random surfaces in random poses"
-    page: ClassVar[str] = "docs/force.md"
-    seeds: ClassVar[tuple[int, ...]] = (1,)
-    count: ClassVar[int | None] = 100
+    title = "force control on random surfaces in random poses"
+    page = "docs/force.md"
+    seeds = (1,)
+    count = 100
 
     seconds: float = option(RANGES.seconds, "time at the full force in each task, s", 1.0)
     compare: bool = option(False, "also run each task with other controllers; takes four times as long")

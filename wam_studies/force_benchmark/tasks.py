@@ -18,6 +18,7 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
+from wam_studies.identification.plants import mismatch
 
 Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
@@ -116,7 +117,7 @@ class TaskConditions(NamedTuple):
     is_pinned: bool
     is_tared: bool
     ramp: float
-    mismatch: Mapping[str, tuple[float, ...]] = {}
+    mismatch: Mapping[str, Sequence[float]] = {}
     payload: float = 0.0
     asymmetry: float = 0.0
     centres: tuple[float, ...] = ()
@@ -250,21 +251,16 @@ def _with_errors(conditions: TaskConditions, arm: Arm, random: np.random.Generat
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
-    def factors(width: float, count: int) -> tuple[float, ...]:
-        return tuple((1.0 + width * random.uniform(-1.0, 1.0, count)).tolist())
-
-    motors, joints = len(arm.motors.names), len(arm.joints.names)
     return TaskConditions(
         is_dithered=bool(random.random() < RANGES.dithered) or not arm.joint_sensors,
         is_pinned=bool(random.random() < RANGES.pinned),
         is_tared=bool(random.random() < RANGES.tared),
         ramp=float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
         mismatch={
-            "mass": factors(RANGES.mass, len(arm.links.names)),
-            "motor_friction": factors(RANGES.motor_friction, motors),
-            "joint_friction": factors(RANGES.motor_friction, joints),
-            "stiffness": factors(RANGES.cables, motors),
-            "torque_constant": factors(RANGES.torque_constant, motors),
+            **mismatch(random, arm, RANGES.mass, RANGES.motor_friction, RANGES.cables),
+            "torque_constant": (
+                1.0 + RANGES.torque_constant * random.uniform(-1.0, 1.0, len(arm.motors.names))
+            ).tolist(),
         },
     )
 
@@ -352,7 +348,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
         "contact_estimator:observer.mass_scale": [1.0] * n,
         "contact_estimator:observer.friction_scale": 1.0,
         **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
-        **{f"driver:mismatch.{name}": list(factors) for name, factors in conditions.mismatch.items()},
+        **{f"driver:mismatch.{name}": each for name, each in conditions.mismatch.items()},
     }
     if conditions.payload:
         values["driver:mismatch.payload"] = conditions.payload

@@ -2,6 +2,5 @@
 
 excitation  a scenario that moves the arm so that the parameters show
 plants      plants that differ from the model, how their torques are measured, and their true parameters
-trial       one identification on one plant
 study       identified against true friction over plants and seeds (`wam evaluate identify`)
 """

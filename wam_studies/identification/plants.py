@@ -1,5 +1,7 @@
 """Plants that differ from the model, and what an identification has to find of them."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -7,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.identification.parameters import shared_joints
+from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import Array
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 
+Values = dict[str, Any]  # of a configuration, by name
 KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors", "all, real signals")
 
 
@@ -66,6 +70,86 @@ RANGES = PlantRanges()
 SIGNALS = MeasuredSignals(noise=0.005, delay=1, dropped=0.02)
 
 
+class DrawnArm(NamedTuple):
+    """Random values of one arm, by parameter."""
+
+    random: np.random.Generator
+    arm: Arm
+
+    def around(self, low: float, high: float, count: int) -> list[float]:
+        """Numbers between two ends."""
+        return self.random.uniform(low, high, count).tolist()
+
+    def each_motor(self, low: float, high: float) -> list[float]:
+        """One for each motor."""
+        return self.around(low, high, len(self.arm.motors.names))
+
+    def level(self, low: float, high: float) -> Values:
+        """Levels of friction over those configured."""
+        return {
+            "driver:mismatch.motor_friction": self.each_motor(low, high),
+            "driver:mismatch.joint_friction": self.around(low, high, len(self.arm.joints.names)),
+        }
+
+    def stribeck(self, excess: float) -> Values:
+        """Stribeck friction with so many times the static friction."""
+        return {
+            "driver:friction.law": "stribeck",
+            "arm.motors.static_friction": [excess * f for f in self.arm.motors.static_friction],
+            "arm.joints.static_friction": [excess * f for f in self.arm.joints.static_friction],
+        }
+
+    def asymmetric(self, size: float) -> Values:
+        """Friction that differs by direction."""
+        keys, shafts = ("motor_asymmetry", "joint_asymmetry"), len(self.arm.motors.names)
+        return {f"driver:friction.{key}": (size * self.random.choice((-1.0, 1.0), shafts)).tolist() for key in keys}
+
+    def encoder(self, counts: int) -> Values:
+        """So many counts per turn."""
+        return {"driver:sensors.encoder_resolution": [2.0 * math.pi / counts] * len(self.arm.motors.names)}
+
+    def cogging(self, amplitude: float) -> Values:
+        """Cogging of this amplitude, N m, in any phase."""
+        return {
+            "driver:effects.ripples.amplitude": [amplitude] * len(self.arm.motors.names),
+            "driver:effects.ripples.phase": self.each_motor(-math.pi, math.pi),
+        }
+
+    def masses(self, width: float) -> Values:
+        """Masses within this share of those configured."""
+        return {"driver:mismatch.mass": self.around(1.0 - width, 1.0 + width, len(self.arm.links.names))}
+
+    def centre(self, metres: float) -> Values:
+        """Centres of mass of the model."""
+        centre = self.arm.links.centre
+        return {"arm.links.centre": np.add(centre, self.around(-metres, metres, len(centre))).tolist()}
+
+    def constant(self, width: float) -> tuple[float, ...]:
+        """Measured over true torques."""
+        return tuple(self.each_motor(1.0 - width, 1.0 + width))
+
+    def noise(self, level: float) -> Values:
+        """Ripple of the torque and noise of the current."""
+        each = [level] * len(self.arm.motors.names)
+        return {"driver:amplifier.torque_ripple": each, "driver:amplifier.current_noise": each}
+
+
+def factors(random: np.random.Generator, width: float, names: Sequence[str]) -> list[float]:
+    """Factors about 1 within a largest error, one for each name."""
+    found: list[float] = (1.0 + width * random.uniform(-1.0, 1.0, len(names))).tolist()
+    return found
+
+
+def mismatch(random: np.random.Generator, arm: Arm, mass: float, friction: float, stiffness: float) -> Values:
+    """Factors of a true arm, by parameter of `driver:mismatch`, each within a largest error."""
+    return {
+        "mass": factors(random, mass, arm.links.names),
+        "motor_friction": factors(random, friction, arm.motors.names),
+        "joint_friction": factors(random, friction, arm.joints.names),
+        "stiffness": factors(random, stiffness, arm.motors.names),
+    }
+
+
 class TrueFriction(NamedTuple):
     """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
 
@@ -95,40 +179,32 @@ class TrueFriction(NamedTuple):
 
 def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
     """A plant of a kind, drawn from a seed; the controllers' model stays as it is."""
-    n = len(configuration.shared.arm.motors.names)
-    random = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
-    values: dict[str, Any] = {
-        "arm.joint_sensors": False,  # not used here
-        "driver:mismatch.motor_friction": random.uniform(*RANGES.factor, n).tolist(),
-        "driver:mismatch.joint_friction": random.uniform(*RANGES.factor, n).tolist(),
-    }
+    shared, random = configuration.shared, np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
+    arms, n = DrawnArm(random, shared.arm), len(shared.arm.motors.names)
+    values = {"arm.joint_sensors": False, **arms.level(*RANGES.factor)}  # the sensors are not used here
     every = kind.startswith("all")
     if every or kind == "Stribeck":
         values["driver:friction.law"] = "stribeck"
-        values["driver:friction.motor_stribeck_velocity"] = random.uniform(*RANGES.stribeck_velocity, n).tolist()
-    if every or kind == "asymmetry":
-        values["driver:friction.motor_asymmetry"] = random.uniform(-RANGES.asymmetry, RANGES.asymmetry, n).tolist()
-        values["driver:friction.joint_asymmetry"] = random.uniform(-RANGES.asymmetry, RANGES.asymmetry, n).tolist()
-    if every or kind == "load":
-        values["driver:friction.motor_load_factor"] = random.uniform(0.0, RANGES.load, n).tolist()
-        values["driver:friction.joint_load_factor"] = random.uniform(0.0, RANGES.load, n).tolist()
+        values["driver:friction.motor_stribeck_velocity"] = arms.each_motor(*RANGES.stribeck_velocity)
+    for name, low, high in (("asymmetry", -RANGES.asymmetry, RANGES.asymmetry), ("load_factor", 0.0, RANGES.load)):
+        if every or name.startswith(kind):
+            values |= {f"driver:friction.{shaft}_{name}": arms.each_motor(low, high) for shaft in ("motor", "joint")}
     if every:
-        values["driver:mismatch.mass"] = random.uniform(1.0 - RANGES.mass, 1.0 + RANGES.mass, n).tolist()
+        values |= arms.masses(RANGES.mass)
     if kind == "all, presliding":
         stiffness = zip(("motor", "joint"), RANGES.presliding, strict=True)
         values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
     if kind in ("all, real sensors", "all, real signals"):
-        values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / RANGES.counts] * n
+        values |= arms.encoder(RANGES.counts)
         values["driver:amplifier.current_noise"] = [RANGES.current_noise] * n
-        values["driver:amplifier.torque_offset"] = random.uniform(-RANGES.offset, RANGES.offset, n).tolist()
+        values["driver:amplifier.torque_offset"] = arms.each_motor(-RANGES.offset, RANGES.offset)
     if kind == "all, real signals":
-        centre, constant = np.array(configuration.shared.model.links.centre), RANGES.torque_constant
+        centre = shared.model.links.centre
         values |= {
-            "driver:mismatch.torque_constant": random.uniform(1.0 - constant, 1.0 + constant, n).tolist(),
+            "driver:mismatch.torque_constant": list(arms.constant(RANGES.torque_constant)),
             "driver:amplifier.torque_ripple": [RANGES.ripple] * n,
-            "driver:effects.ripples.amplitude": [RANGES.cogging] * n,
-            "driver:effects.ripples.phase": random.uniform(-np.pi, np.pi, n).tolist(),
-            "model.links.centre": (centre + random.uniform(-RANGES.centre, RANGES.centre, len(centre))).tolist(),
+            **arms.cogging(RANGES.cogging),
+            "model.links.centre": np.add(centre, arms.around(-RANGES.centre, RANGES.centre, len(centre))).tolist(),
         }
     return configuration.with_values(values)
 

@@ -3,15 +3,172 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import NamedTuple
 
 import numpy as np
 
-from wam_description.rigid_body import Array
+from wam_analysis.identification.fit import Identification, identify
+from wam_analysis.identification.motion import MotionSamples, evenly, motion
+from wam_analysis.identification.overlay import model_values
+from wam_analysis.identification.parameters import DIRECTIONS
+from wam_analysis.identification.regressor import Regressor
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration
+from wam_description.mismatch import true_arm
+from wam_description.rigid_body import Array, RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import Driver, DriverParameters
 from wam_studies.harness import Study, option
-from wam_studies.identification.plants import KINDS
-from wam_studies.identification.trial import IdentificationResult, IdentificationTrial, run_trial
+from wam_studies.identification.excitation import moves, path
+from wam_studies.identification.plants import EXACT, KINDS, MeasuredSignals, measured_signals, plant, true_friction
 from wam_studies.scores import Row, Scores, ScoreTable, exact
+
+
+@dataclass(frozen=True)
+class ComparedAt:
+    """Where identified and true friction and gravity are compared."""
+
+    speed: float = 10.0  # rad/s of a motor
+    poses: int = 50  # drawn, in which the gravity torque is compared
+    signals: int = 1  # stream of random numbers of the measured signals
+
+
+AT = ComparedAt()
+
+
+class IdentificationTrial(NamedTuple):
+    """One identification.
+
+    Attributes
+    ----------
+    kind, seed : of the plant; the seed also draws the motion.
+    seconds : of motion.
+    """
+
+    configuration: Configuration
+    kind: str
+    seed: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.kind}, seed {self.seed}"
+
+
+class IdentificationResult(NamedTuple):
+    """Errors of one identification.
+
+    Attributes
+    ----------
+    level : (2 n,), friction of each motor and direction at `AT.speed` and its mean load: error per true friction.
+    level_sd : (2 n,), stated standard error per true friction.
+    coulomb, coulomb_sd : (2 n,), the same of Coulomb friction alone.
+    before : (2 n,), error of the present model's friction.
+    gravity, gravity_before : rms error of the joints' gravity torque in random poses, N m.
+    failure : why the motion ended early, ''.
+    """
+
+    kind: str
+    seed: int
+    level: Array
+    level_sd: Array
+    coulomb: Array
+    coulomb_sd: Array
+    before: Array
+    gravity: float
+    gravity_before: float
+    failure: str
+
+
+def run_trial(trial: IdentificationTrial) -> IdentificationResult:
+    """Play the motion on a plant of its own and identify the model from it."""
+    configuration = plant(trial.configuration, trial.kind, trial.seed)
+    samples, failure = play(configuration, trial.seed, trial.seconds, measured_signals(trial.kind))
+    shared = configuration.shared
+    found = identify(shared, samples)
+    truth = true_friction(configuration)
+    load = link_load(shared, samples, found)
+    errors: dict[str, list[Array]] = {name: [] for name in ("level", "level_sd", "coulomb", "coulomb_sd", "before")}
+    for way, direction in enumerate(DIRECTIONS):
+        moves = (samples.velocities * (1.0 - 2.0 * way) > 0.0).reshape(load.shape)
+        rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
+        true = truth.level(way, AT.speed, load, moves)
+        errors["level"].append((rows @ found.values - true) / true)
+        errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
+        errors["before"].append((rows @ found.unknowns.present - true) / true)
+        at = found.unknowns.places(f"motors.coulomb_{direction}")
+        errors["coulomb"].append((found.values[at] - truth.coulomb[way]) / truth.coulomb[way])
+        errors["coulomb_sd"].append(found.sd[at] / truth.coulomb[way])
+    gravity = _gravity_errors(configuration, found)
+    joined = {name: np.concatenate(each) for name, each in errors.items()}
+    return IdentificationResult(
+        trial.kind, trial.seed, **joined, gravity=gravity[0], gravity_before=gravity[1], failure=failure
+    )
+
+
+def play(
+    configuration: Configuration, seed: int, seconds: float, signals: MeasuredSignals = EXACT
+) -> tuple[MotionSamples, str]:
+    """Samples of the exciting motion on the plant of a configuration, as measured, and why it ended early, ''.
+
+    The motors follow the moves with the gains of the velocity loop, without the nodes, which take most of the time.
+    """
+    shared = configuration.shared
+    driver = Driver(shared, configuration.node("driver", DriverParameters))
+    driver.enable("")
+    period, matrix = shared.timing.period, TransmissionMap.of(shared.arm).joint_from_motor
+    k_p, k_i = (np.array(gain) for gain in (shared.servo.proportional_gain, shared.servo.integral_gain))
+    body, inverse = RigidBody(shared.model_arm), np.linalg.inv(matrix)
+    stamps, rows = [], []
+    posture = np.array(shared.arm.joints.start)
+    for move in moves(configuration, seed, seconds):
+        points = path(posture, move, period)
+        posture = np.array(move.posture)
+        desired = zip(points.q @ inverse.T, points.qd @ inverse.T, points.q, strict=True)
+        for theta, thetad, q in desired:
+            at, velocity, effort = driver.motor_state
+            stamps.append(driver.stamp / 1e9)
+            rows.append((*at, *effort))
+            torque = k_p * (thetad - velocity) + k_i * (theta - at) + body.gravity_torque(q) @ matrix
+            driver.command(driver.stamp, (torque / shared.arm.motors.torque_constant).tolist())
+            driver.advance(0.0)
+            if driver.safety.fault:
+                break
+    n, values = len(matrix), np.array(rows)
+    torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, AT.signals])))
+    return motion(evenly(np.array(stamps)[arrives], values[arrives, :n], torque[arrives])), driver.safety.fault
+
+
+def link_load(shared: Shared, samples: MotionSamples, found: Identification) -> Array:
+    """Torque that the cables transmit to each motor apart from friction, at each state, (k, n), N m."""
+    regressor = Regressor(shared, found.unknowns, samples, found.stribeck_velocity)
+    load = regressor.load(found.values)
+    return load.reshape(-1, load.shape[2])
+
+
+def friction_row(found: Identification, direction: str, load: Array) -> Array:
+    """(n, p), friction of each motor at `AT.speed` and these loads, N m, per parameter."""
+    unknowns, n = found.unknowns, len(load)
+    rows = np.zeros((n, len(unknowns.names)))
+    rows[range(n), unknowns.places(f"motors.coulomb_{direction}")] = 1.0
+    rows[range(n), unknowns.places(f"motors.load_{direction}")] = load
+    rows[range(n), unknowns.places("motors.viscous")] = AT.speed
+    return rows
+
+
+def _gravity_errors(configuration: Configuration, found: Identification) -> tuple[float, float]:
+    """Rms error of the gravity torque by the identified and by the present model, N m."""
+    shared = configuration.shared
+    truth = RigidBody(true_arm(shared.arm, configuration.node("driver", DriverParameters).mismatch))
+    identified = configuration.with_values(model_values(shared, found, "evaluation")).shared
+    joints = shared.arm.joints
+    random = np.random.Generator(np.random.PCG64(1))
+    poses = random.uniform(joints.lower, joints.upper, (AT.poses, len(joints.names)))
+
+    def error(body: RigidBody) -> float:
+        left = [body.gravity_torque(q) - truth.gravity_torque(q) for q in poses]
+        return float(np.sqrt(np.mean(np.square(left))))
+
+    return error(RigidBody(identified.model_arm)), error(RigidBody(shared.model_arm))
 
 
 @dataclass(frozen=True)
@@ -30,8 +187,8 @@ LIMITS = IdentificationLimits()
 class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     """Every kind of plant with every seed."""
 
-    title: ClassVar[str] = "identified and true friction of many plants"
-    page: ClassVar[str] = "docs/identify.md"
+    title = "identified and true friction of many plants"
+    page = "docs/identify.md"
 
     seconds: float = option(60.0, "length of each motion", 20.0)
 

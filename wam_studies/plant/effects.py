@@ -17,12 +17,12 @@ from wam_analysis.table import markdown
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_sim.batch import processes, results
 from wam_sim.pieces import default_file
-from wam_studies.plant.force_response import force_step
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     LEVER,
     STEP,
     Numbers,
+    force_step,
     ideal_testbed,
     link_inertia,
     released_plant,

@@ -2,7 +2,6 @@
 
 A task is `config/tasks/NAME.yaml`, of the form of an experiment; `wam demo --task NAME` plays it.
 
-object_traces   the objects of a recording over time, from `sim/objects`
 evaluations     each task's numbers
 pictures        the arm and the objects at moments of a task
 """

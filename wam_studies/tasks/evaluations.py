@@ -8,14 +8,11 @@ from typing import Final
 import numpy as np
 
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
-from wam_studies.tasks.object_traces import ObjectTrace, object_traces, world_of
-from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.recording import ObjectTrace, Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, below, near, noted
 
 NO_CLAIM = math.nan
 TRUE, ESTIMATED = "sim/contact/wrench", "contact/wrench"
-
-Runs = Mapping[str, Recording]
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ BOUNDS: Final = TaskBounds()
 def pushing(runs: Runs) -> Result:
     """The task `push-box`: a force below the friction, then a push that moves the box."""
     (run,) = runs.values()
-    box, bodies = object_traces(run)["box"], world_of(run).bodies
+    box, bodies = run.objects["box"], run.world.bodies
     friction, weight = bodies.ground_friction[0], bodies.mass[0] * _gravity(run)
     press, push = run.step("press 4 N"), run.step("push the box")
     pressed, pushed = box.late(press, BOUNDS.steady), box.during(push.begin, push.end)
@@ -59,7 +56,7 @@ def pushing(runs: Runs) -> Result:
 def sweeping(runs: Runs) -> Result:
     """The task `sweep-objects`: how close together the objects are, and what it takes."""
     (run,) = runs.values()
-    objects, sweep, rest = object_traces(run), run.step("sweep"), run.step("rest")
+    objects, sweep, rest = run.objects, run.step("sweep"), run.step("rest")
     swept = {name: trace.during(sweep.begin, rest.end) for name, trace in objects.items()}
     before, after = (float(np.ptp(_angles(swept, at))) for at in (0, -1))
     moved = sum(_moved(trace) > BOUNDS.moved for trace in swept.values())
@@ -78,7 +75,7 @@ def sweeping(runs: Runs) -> Result:
 def holding(runs: Runs) -> Result:
     """The task `hold-tube`: the shelf is lowered, and friction carries the tube."""
     (run,) = runs.values()
-    objects, bodies = object_traces(run), world_of(run).bodies
+    objects, bodies = run.objects, run.world.bodies
     press = run.step("press 15 N")
     tube, shelf = objects["tube"], objects["shelf"].late(press, BOUNDS.steady)
     held = tube.late(press, BOUNDS.steady)
@@ -103,7 +100,7 @@ def holding(runs: Runs) -> Result:
 def opening(runs: Runs) -> Result:
     """The task `open-door`: torque of the arm on the door against the door's equation of motion."""
     (run,) = runs.values()
-    door, step, hold = object_traces(run)["door"], run.step("open the door"), run.step("hold it open")
+    door, step, hold = run.objects["door"], run.step("open the door"), run.step("hold it open")
     open_ = door.during(step.begin, step.end)
     predicted, torque = _hinge_torque(run, open_), open_.arm_torque[:, 2]
     turning = np.gradient(open_.angle, open_.time) > 0.02
@@ -138,7 +135,7 @@ def following(runs: Runs) -> Result:
     """The task `follow-surface`: 10 N on a surface that moves up and down."""
     (run,) = runs.values()
     press, follow = run.step("press 10 N"), run.step("follow the surface")
-    surface = object_traces(run)["foam_box"].during(follow.begin + 1.0, follow.end)
+    surface = run.objects["foam_box"].during(follow.begin + 1.0, follow.end)
     force = run.forces(TRUE).during(follow.begin + 1.0, follow.end).across
     speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
     rows = [
@@ -187,7 +184,7 @@ def _angles(traces: Mapping[str, ObjectTrace], at: int) -> Numbers:
 
 def _hinge_torque(run: Recording, door: ObjectTrace) -> Numbers:
     """Torque that turns the door as it was turned: I phi'' + d phi' + k (phi - phi_0) + friction, N m."""
-    doors = world_of(run).doors
+    doors = run.world.doors
     length, thickness = doors.sizes[0], doors.sizes[1]
     inertia = doors.mass[0] * (4.0 * length**2 + thickness**2) / 3.0  # about the hinge
     rate = np.gradient(door.angle, door.time)

@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 
 from wam_analysis import arm_picture
 from wam_studies.figures.style import draw_panel, panels
-from wam_studies.tasks.object_traces import object_states, world_of
 from wam_studies.thesis.definition import Experiment
 from wam_studies.thesis.recording import Recording, recording
 from wam_studies.thesis.rows import Result
@@ -39,10 +38,10 @@ def save(task: Experiment, bag: Path, result: Result, file: Path) -> None:
 
 def _draw_arm(axes: Axes, run: Recording, time: float) -> None:
     """The arm and the objects at a time, s."""
-    arm, world = run.shared.arm, world_of(run)
+    arm, world = run.shared.arm, run.world
     joints = run.joints("sim/joint_states")
     q = joints.position[int(np.searchsorted(joints.time, time).clip(0, len(joints.time) - 1))].tolist()
-    states = object_states(run, time)
+    states = run.object_states(time)
     seen = [np.array((state.x, state.y, state.z)) for state in states]
     shown = arm_picture.scene(arm, q, world, states)
     view = arm_picture.side_view(shown, 4.4 / 2.9, MARGIN, AZIMUTH, ELEVATION, seen)

@@ -1,7 +1,7 @@
 """The arm on foam: commanded, true and estimated force; pressing, sliding, and a push."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.recording import Forces, Recording, Step
+from wam_studies.thesis.recording import Forces, Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, below, near
 
 NO_CONTACT = "base"  # frame of a contact wrench without contact
@@ -24,7 +24,7 @@ class Along(NamedTuple):
     estimated: Numbers
 
 
-def pressing(runs: Mapping[str, Recording]) -> Result:
+def pressing(runs: Runs) -> Result:
     """The experiment `wam-press`."""
     run = runs["press"]
     found = along(run)
@@ -39,7 +39,7 @@ def pressing(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, [_panel(found, _named(run, "press"))])
 
 
-def sliding(runs: Mapping[str, Recording]) -> Result:
+def sliding(runs: Runs) -> Result:
     """The experiment `wam-slide`."""
     run = runs["slide"]
     found = along(run)
@@ -60,7 +60,7 @@ def sliding(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, [_panel(found, every)])
 
 
-def along_the_link(runs: Mapping[str, Recording]) -> Result:
+def along_the_link(runs: Runs) -> Result:
     """The experiment `wam-along-link`: a large force near the base of a link, small ones near its tip."""
     rows: list[Comparison] = []
     panels = []
@@ -155,7 +155,7 @@ def _panel(found: Along, steps: Sequence[Step]) -> Panel:
     return Panel("force along the commanded one", "time [s]", "force [N]", curves)
 
 
-def pushed(runs: Mapping[str, Recording]) -> Result:
+def pushed(runs: Runs) -> Result:
     """The experiment `wam-touch`: one push, evaluated during its true contact."""
     (run,) = runs.values()
     truth, estimate = run.forces("sim/contact/wrench"), run.forces("contact/wrench")

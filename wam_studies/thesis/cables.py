@@ -1,7 +1,5 @@
 """Chapter 6: efficiency of cables under load, (6.15), and their creep, (6.19)."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,12 +7,12 @@ from wam_description.arm import Arm
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.plant.ideal_testbed import limiting_efficiency
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.recording import Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, near
 from wam_theory import cable
 
 
-def efficiency(runs: Mapping[str, Recording]) -> Result:
+def efficiency(runs: Runs) -> Result:
     """The experiment `efficiency`: power lost while a load is lifted, from rest to rest."""
     run = runs["lift"]
     arm = run.shared.arm
@@ -59,7 +57,7 @@ def load_torque(run: Recording, step: Step) -> float:
     return -float(np.median(push.torque[:, 2]))
 
 
-def creeping(runs: Mapping[str, Recording]) -> Result:
+def creeping(runs: Runs) -> Result:
     """The experiment `creep`: creep of the link while the motor turns out and back under a load."""
     run = runs["out_and_back"]
     arm = run.shared.arm
@@ -95,7 +93,7 @@ def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
     return np.asarray(total) * ratio
 
 
-def corrected(runs: Mapping[str, Recording]) -> Result:
+def corrected(runs: Runs) -> Result:
     """The experiment `creep-correction`: joint angles of the transform, with and without (6.19)."""
     rows, curves = [], []
     for name, run in runs.items():

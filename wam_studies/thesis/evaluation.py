@@ -1,7 +1,7 @@
 """From the bags of an experiment to its result."""
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from wam_bag.bag import BagError
@@ -9,10 +9,10 @@ from wam_bag.losses import CUT
 from wam_description.event import Code
 from wam_description.parameters import ParameterError
 from wam_studies.thesis.definition import Experiment, Run
-from wam_studies.thesis.recording import Recording, recording
+from wam_studies.thesis.recording import Recording, Runs, recording
 from wam_studies.thesis.rows import Comparison, Result, plain
 
-Evaluation = Callable[[Mapping[str, Recording]], Result]
+Evaluation = Callable[[Runs], Result]
 
 
 def evaluate(experiment: Experiment, directory: Path) -> Result:
@@ -76,7 +76,7 @@ def evaluate_sample(experiment: Experiment, recorded: Recording) -> Result:
     return _evaluate(experiment, {experiment.sample.run: recorded})
 
 
-def _evaluate(experiment: Experiment, recordings: Mapping[str, Recording]) -> Result:
+def _evaluate(experiment: Experiment, recordings: Runs) -> Result:
     result = function_of(experiment.evaluation)(recordings)
     runs = [run for run in experiment.runs if run.name in recordings]
     stops = [_stop(run, recordings[run.name]) for run in runs if run.stops or recordings[run.name].fault]

@@ -1,19 +1,17 @@
 """Accuracy of the contact force without feedback, 5.2, and with a sensor that is calibrated wrong, 2.2."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import TestbedStep, played, set_until
-from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.recording import Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.stiction import play
 
 
-def accuracy(runs: Mapping[str, Recording]) -> Result:
+def accuracy(runs: Runs) -> Result:
     """The experiment `force-accuracy`, or its run without feedback alone."""
     rows, panel = open_loop(runs["open_loop"])
     closed = {name.replace("_", " "): played(run) for name, run in runs.items() if name != "open_loop"}
@@ -41,7 +39,7 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
 
 
-def active_pretension(runs: Mapping[str, Recording]) -> Result:
+def active_pretension(runs: Runs) -> Result:
     """The experiment `active-pretension`: deadband by friction of the tension, and stretch of the cable, over it."""
     rows, curves = [], []
     for name, run in runs.items():

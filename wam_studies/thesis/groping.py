@@ -1,22 +1,19 @@
 """The experiment `wam-grope`, groping a box (7.3): its position by the contacts of the arm, and the true one."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from wam_bag.bag import BagError
 from wam_description.rigid_body import RigidBody
-from wam_description.world import World
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.recording import Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result
 
 
-def groping(runs: Mapping[str, Recording]) -> Result:
+def groping(runs: Runs) -> Result:
     """Top, left and right edge of the box, one contact each; of a sample those that it has."""
     (run,) = runs.values()
-    obstacles = run.part("driver", "world", World).obstacles
+    obstacles = run.world.obstacles
     centre, half = np.array(obstacles.positions[:3]), np.array(obstacles.sizes[:3])
     low, high = centre - half, centre + half
     until = float(run.joints("joint_states").time[-1]) - BOUNDS.position_known_after

@@ -1,7 +1,6 @@
 """Inner loops on torque and on position, 2.1.2: largest gains, and what they leave of friction at the motor."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -10,12 +9,10 @@ from wam_studies.figures.inner_loops import largest_gain, on_position, on_torque
 from wam_studies.figures.panels import Numbers, Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, TestbedStep, growth, joint_stiffness, played
-from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, near
 
 FRICTION = ("torque_fed_forward", "torque_loop", "position_loop")  # runs with friction at the motor
-
-Runs = Mapping[str, Recording]
 
 
 def compared(runs: Runs) -> Result:

@@ -1,6 +1,5 @@
 """The limit cycles of chapter 5: by stiction, (5.8) and (5.9), and of the actuator alone, (5.20) to (5.22)."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,14 +8,14 @@ from wam_analysis.measures.limit_cycle import CycleExtent, last_cycle
 from wam_studies.figures.panels import Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, TestbedStep, played
-from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.recording import Runs
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cycle_work
 from wam_theory.stick_slip import assess
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, stiction_cycle_period
 
 
-def stiction(runs: Mapping[str, Recording]) -> Result:
+def stiction(runs: Runs) -> Result:
     """The experiment `stiction-limit-cycle`; of a sample, without the start, (5.8) and (5.9)."""
     shown, *others = (played(run, run.steps[-1] if run.steps else None) for run in runs.values())
     found = last_cycle(shown.time, shown.force)
@@ -70,7 +69,7 @@ def _with_smaller_deadband(shown: TestbedStep, force: float) -> Comparison:
     return Comparison(f"with {fraction:.2f} of that deadband", str(predicted), shown.verdict, equation="integrator")
 
 
-def actuator(runs: Mapping[str, Recording]) -> Result:
+def actuator(runs: Runs) -> Result:
     """The experiment `actuator-limit-cycle`."""
     shown = played(runs["press"])  # the only step, as far as it is recorded
     link, node, desired = shown.link, shown.link.node, shown.desired

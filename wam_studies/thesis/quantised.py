@@ -1,7 +1,7 @@
 """Force feedback read in steps: the smallest controllable force (3.2.1), a deadband against its cycle (5.7)."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,11 +10,9 @@ from wam_driver.driver import DriverParameters
 from wam_studies.figures.panels import Panel, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import TestbedStep, one_link
-from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
-
-Runs = Mapping[str, Recording]
 
 
 def quantised(runs: Runs) -> Result:

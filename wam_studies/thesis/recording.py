@@ -10,9 +10,12 @@ from wam_bag.arrays import Numbers
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.losses import CUT
 from wam_description.arm import Shared
+from wam_description.signals import ObjectState
+from wam_description.world import World
 from wam_sim.recorded_parameters import RecordedParameters
 from wam_sim.recording import recorded_run
 
+OBJECTS = "sim/objects"
 T = TypeVar("T")
 
 
@@ -53,6 +56,35 @@ class Step(NamedTuple):
     begin: float
     end: float
     settings: Mapping[str, Any]
+
+
+class ObjectTrace(NamedTuple):
+    """One object at the times (k,) s, in the base frame.
+
+    Attributes
+    ----------
+    position, velocity : (k, 3), m and m/s.
+    angle : (k,), of a door, rad.
+    arm_force, arm_torque : (k, 3), of the arm on it, N, and about its position, N m.
+    other_force : (k, 3), of obstacles and other objects on it, N.
+    """
+
+    time: Numbers
+    position: Numbers
+    velocity: Numbers
+    angle: Numbers
+    arm_force: Numbers
+    arm_torque: Numbers
+    other_force: Numbers
+
+    def during(self, begin: float, end: float) -> "ObjectTrace":
+        """The part between two times, s."""
+        there = (self.time >= begin) & (self.time < end)
+        return ObjectTrace(*(values[there] for values in self))
+
+    def late(self, step: Step, seconds: float) -> "ObjectTrace":
+        """The last seconds of a step."""
+        return self.during(step.end - seconds, step.end)
 
 
 class Recording(NamedTuple):
@@ -103,6 +135,24 @@ class Recording(NamedTuple):
         found = self.columns(topic, TableColumns)
         return found.stamp_ns[found.message] / 1e9, found.columns
 
+    @property
+    def world(self) -> World:
+        """The world that the run was made in."""
+        return self.part("driver", "world", World)
+
+    @property
+    def objects(self) -> dict[str, ObjectTrace]:
+        """Every object by its name; a run whose truth about them was not recorded is refused."""
+        table = self.columns(OBJECTS, TableColumns)
+        return {name: _trace(table, i) for i, name in enumerate(self.world.objects)}
+
+    def object_states(self, time: float) -> list[ObjectState]:
+        """Every object at a time, s, in the order of `World.objects`."""
+        table = self.columns(OBJECTS, TableColumns)
+        at = int(np.searchsorted(table.stamp_ns, round(time * 1e9)).clip(0, len(table.stamp_ns) - 1))
+        there, of = table.message == at, table.columns
+        return [ObjectState._make(row) for row in zip(*(of[n][there] for n in ObjectState._fields), strict=True)]
+
     def step(self, name: str) -> Step:
         """The first step of this name that was played."""
         for step in self.steps:
@@ -127,6 +177,22 @@ class Recording(NamedTuple):
         if not isinstance(columns, kind):
             raise BagError(f"{self.bag.path} has no topic '{topic}' of {kind.__name__}; record it")
         return columns
+
+
+def _trace(table: TableColumns, i: int) -> ObjectTrace:
+    columns = table.columns
+    mine = columns[ObjectState._fields[0]] == float(i)
+
+    def three(name: str) -> Numbers:
+        return np.column_stack([columns[name.format(axis)][mine] for axis in "xyz"])
+
+    return ObjectTrace(
+        table.row_stamp_ns[mine] / 1e9, three("{}"), three("v{}"), columns["angle"][mine], three("arm_force_{}"),
+        three("arm_torque_{}"), three("other_force_{}"),
+    )  # fmt: skip
+
+
+Runs = Mapping[str, Recording]  # of an experiment, by name
 
 
 def recording(path: Path) -> Recording:

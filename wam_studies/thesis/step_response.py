@@ -1,7 +1,6 @@
 """Step responses of integral force control: (5.2), (5.3), and the half cycles of (5.17) and (5.18)."""
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from wam_studies.figures.panels import Numbers, Panel
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import OneLink, TestbedStep, played
-from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.recording import Runs
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.linear_loop import integral_time_constant, series_stiffness
 from wam_theory.regimes import gamma_a, gamma_b, psi
@@ -17,7 +16,7 @@ from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import breakaway_delay
 
 
-def responses(runs: Mapping[str, Recording]) -> Result:
+def responses(runs: Runs) -> Result:
     """The experiment `step-response`."""
     rows, panels = [], []
     for name, run in runs.items():

@@ -1,7 +1,7 @@
 """Section 5.6: effect of friction, step size, saturation and delay on the stable gain."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -13,12 +13,11 @@ from wam_description.arm import Servo
 from wam_studies.figures.panels import Panel
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import ACROSS, Growth, OneLink, growth, played
-from wam_studies.thesis.recording import Recording, Step
+from wam_studies.thesis.recording import Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, near
 from wam_studies.thesis.step_response import errors_at_rest, exact_ratio
 from wam_theory.stick_slip import Verdict, assess
 
-Runs = Mapping[str, Recording]
 AXES = "time [s]", "force by deflection [N]"
 SAMPLED = "wam_control.force.sampled_loop"
 

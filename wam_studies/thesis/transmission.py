@@ -1,6 +1,6 @@
 """Chapter 4: the force response of a transmission by chirp, and the position of its reducer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from wam_description.arm import Arm
 from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness, link_inertia
-from wam_studies.thesis.recording import Recording
+from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, near
 from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
@@ -28,7 +28,7 @@ class Transfer(NamedTuple):
     coherence: Numbers
 
 
-def frequency_response(runs: Mapping[str, Recording]) -> Result:
+def frequency_response(runs: Runs) -> Result:
     """The experiment `frequency-response`; of a sample, which has motor and joint only, the resonances."""
     (run,) = runs.values()
     found = transfer(run)
@@ -53,7 +53,7 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, panels, (remark,))
 
 
-def allocation(runs: Mapping[str, Recording]) -> Result:
+def allocation(runs: Runs) -> Result:
     """The experiment `stiffness-allocation`, or one of its sweeps, from motor and joint only."""
     rows, curves = [], []
     for name, run in runs.items():

@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,10 +80,10 @@ def validate(case: NodeSet | TestbedSet) -> ValidationRecord:
 class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
     """Random nodes under random loops, and the testbed with random friction, gain, saturation and delay."""
 
-    title: ClassVar[str] = "verdicts of the stability guard compared with simulated responses"
-    page: ClassVar[str] = "docs/guard.md"
-    seeds: ClassVar[tuple[int, ...]] = (1,)
-    base: ClassVar[str] = "testbed"
+    title = "verdicts of the stability guard compared with simulated responses"
+    page = "docs/guard.md"
+    seeds = (1,)
+    base = "testbed"
 
     sets: int = option(200, "random sets for the exact integrator", 1)
     testbed: int = option(40, "random sets for the testbed in MuJoCo", 0)
