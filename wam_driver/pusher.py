@@ -50,16 +50,14 @@ class Pusher:
         self._site = model.site(f"{given.cover}_frame").id
         self._radius = cover.radius
         self._height = given.size[0 if given.shape == "sphere" else 2]
-        self._position, self._angle = given.position, given.angle
-        self._slide, self._turn = given.slide, given.turn
-        self._depth, self._clearance = given.force / given.stiffness, given.clearance
-        self._begin, self._end, self._rise = given.begin, given.end, given.rise
+        self._given = given
         self._motion, self._quaternion = np.zeros(6), np.zeros(4)
 
     def lead(self, time: float) -> None:
         """Move to the pose of the hand at a time, s since power-up."""
-        data = self._data
-        if not self._begin - self._rise <= time <= self._end + self._rise:
+        data, given = self._data, self._given
+        since = time - given.begin
+        if not given.begin - given.rise <= time <= given.end + given.rise:
             if not self._is_away:
                 data.mocap_pos[self._mocap] = self._away
                 self._is_away, self.is_pressing = True, False
@@ -67,12 +65,12 @@ class Pusher:
         self._is_away = False
         depth, sinking = self.depth(time)
         self.is_pressing = depth > 0.0
-        force, across = self._directions(self._angle + self._turn * (time - self._begin))
-        at = self._origin + (self._position + self._slide * (time - self._begin)) * self._slope
+        force, across = self._directions(given.angle + given.turn * since)
+        at = self._origin + (given.position + given.slide * since) * self._slope
         rotation = data.site_xmat[self._site].reshape(3, 3)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_SITE, self._site, self._motion, 0)
         spin, drift = self._motion[:3], self._motion[3:]
-        own = sinking * force + self._slide * self._axis + self._turn * self._radius * across
+        own = sinking * force + given.slide * self._axis + given.turn * self._radius * across
         self.velocity = drift + _cross(spin, rotation @ (at - self._radius * force)) + rotation @ own
         centre = rotation @ (at - (self._radius + self._height - depth) * force)
         carried = drift + _cross(spin, centre)
@@ -84,13 +82,15 @@ class Pusher:
 
     def depth(self, time: float) -> tuple[float, float]:
         """Depth of the surface in the link, m, negative before they touch, and its rate, m/s."""
-        coming, leaving = (time - self._begin) / self._rise, (self._end - time) / self._rise
+        given = self._given
+        coming, leaving = (time - given.begin) / given.rise, (given.end - time) / given.rise
         nearer, way = (coming, 1.0) if coming < leaving else (leaving, -1.0)
+        pressed = given.force / given.stiffness
         if nearer >= 1.0:
-            return self._depth, 0.0
-        size = self._depth if nearer > 0.0 else -self._clearance
+            return pressed, 0.0
+        size = pressed if nearer > 0.0 else -given.clearance
         blend = 0.5 * (1.0 - math.cos(math.pi * nearer))
-        speed = 0.5 * math.pi * math.sin(math.pi * abs(nearer)) / self._rise
+        speed = 0.5 * math.pi * math.sin(math.pi * abs(nearer)) / given.rise
         return size * blend, way * abs(size) * speed
 
     def _directions(self, angle: float) -> tuple[np.ndarray, np.ndarray]:
