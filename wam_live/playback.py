@@ -4,7 +4,7 @@ import math
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,16 +12,34 @@ from wam_analysis.held_messages import joint_angles, row_at
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.traces import ForceSignal
+from wam_bag.bag import TableColumns
 from wam_control.contact.contact_table import contact_of, likely_of
-from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
+from wam_description.signals import BASE, NO_CONTACT, Contact, Table
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import Controls
 from wam_live.scene import Scene
-from wam_live.snapshot import NAN, Snapshot
+from wam_live.snapshot import NAN, Snapshot, objects_of
 from wam_live.thresholds import LIVE
 from wam_sim.replay import tables
 
 SPEEDS: Final = ("0.1", "0.25", "0.5", "1", "2", "5")
+
+
+class StampedTables(NamedTuple):
+    """The tables of a topic and their stamps, ns."""
+
+    stamps: list[int]
+    tables: list[Table]
+
+    @classmethod
+    def of(cls, columns: TableColumns | None) -> "StampedTables":
+        """Those of recorded messages."""
+        return cls([], []) if columns is None else cls(columns.stamp_ns.tolist(), tables(columns))
+
+    def at(self, stamp: int, held: float = math.inf) -> Table | None:
+        """The last one at or before a time, ns, if it is not older than `held`, ns."""
+        row = bisect_right(self.stamps, stamp) - 1
+        return self.tables[row] if row >= 0 and stamp - self.stamps[row] < held else None
 
 
 class BagSource:
@@ -48,16 +66,8 @@ class BagSource:
         statuses = sorted(recording.run.stamped_statuses(), key=lambda one: one[0])
         self._statuses = [status for _, status in statuses]
         self._status_stamps = [stamp for stamp, _ in statuses]
-        columns = recording.run.table("contact/hypotheses")
-        self._likely: list[tuple[LikelyRange, ...]] = []
-        self._estimated: list[Contact] = []
-        self._likely_stamps: list[int] = []
-        if columns is not None:
-            read = list(tables(columns))
-            self._likely = [likely_of(table, self._covers) for table in read]
-            self._estimated = [contact_of(table, self._covers) for table in read]
-            self._likely_stamps = columns.stamp_ns.tolist()
-        self._objects = recording.run.table("sim/objects")
+        self._hypotheses = StampedTables.of(recording.run.table("contact/hypotheses"))
+        self._objects = StampedTables.of(recording.run.table("sim/objects"))
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
 
     def snapshot(self, stamp: int) -> Snapshot:
@@ -65,28 +75,19 @@ class BagSource:
         at = row_at(self._stamps, stamp)
         traces, row = self._traces, int(np.searchsorted(self._traces.stamp, stamp, side="right")) - 1
         known = row >= 0
-        estimate = bisect_right(self._likely_stamps, stamp) - 1
-        is_fresh = estimate >= 0 and stamp - self._likely_stamps[estimate] < LIVE.held
+        hypotheses = self._hypotheses.at(stamp, LIVE.held)
         until = bisect_right(self._status_stamps, stamp)
         return Snapshot(
             stamp=stamp,
             q=tuple(self._angles[at].tolist()),
             true=self._contact(traces.true, row) if known else NO_CONTACT,
-            estimated=self._estimated[estimate] if is_fresh else self._alone(row),
-            likely=self._likely[estimate] if is_fresh else (),
+            estimated=contact_of(hypotheses, self._covers) if self._hypotheses.tables else self._alone(row),
+            likely=likely_of(hypotheses, self._covers),
             commanded=float(traces.commanded.size[row]) if known else NAN,
             measured=float(traces.measured.size[row]) if known else NAN,
             statuses={status.node: status for status in self._statuses[:until]},
-            objects=self._objects_at(stamp),
+            objects=objects_of(self._objects.at(stamp)),
         )
-
-    def _objects_at(self, stamp: int) -> tuple[ObjectState, ...]:
-        """The objects of the world at a time of the arm, ns; none where they were not recorded."""
-        found = self._objects
-        if found is None or not found.columns:
-            return ()
-        there = found.message == row_at(found.stamp_ns, stamp)
-        return tuple(map(ObjectState._make, zip(*(found.columns[name][there] for name in ObjectState._fields))))  # noqa: B905 - columns of one table
 
     def past(self, stamp: int) -> Iterator[Snapshot]:
         """What the plots show before a time of the arm, ns, oldest first."""
@@ -99,8 +100,7 @@ class BagSource:
         A contact without one is shown as one whose position cannot be observed.
         """
         signal = self._traces.estimated
-        is_alone = row >= 0 and not self._likely_stamps and signal.is_placed[row]
-        return self._contact(signal, row) if is_alone else NO_CONTACT
+        return self._contact(signal, row) if row >= 0 and signal.is_placed[row] else NO_CONTACT
 
     @staticmethod
     def _contact(signal: ForceSignal, row: int) -> Contact:

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from wam_description.signals import NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState, Triple
+from wam_description.signals import NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState, Table, Triple
 
 NAN = math.nan
 
@@ -45,3 +45,8 @@ class Snapshot(NamedTuple):
 def size(force: Triple) -> float:
     """Magnitude of a force, N."""
     return math.hypot(*force)
+
+
+def objects_of(table: Table | None) -> tuple[ObjectState, ...]:
+    """The states in a table of objects."""
+    return tuple(ObjectState._make(row) for row in table.rows) if table else ()

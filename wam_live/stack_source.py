@@ -12,9 +12,9 @@ from rclpy.subscription import Subscription
 
 from wam_control.contact.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
-from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
+from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, State, Table
 from wam_description.topics import BY_NAME
-from wam_live.snapshot import NAN, Snapshot, size
+from wam_live.snapshot import NAN, Snapshot, objects_of, size
 from wam_live.thresholds import LIVE
 from wam_ros.messages import Refused, message_type
 from wam_ros.outlets import COPIED, NEWEST, copy_name
@@ -120,11 +120,6 @@ class RunningStack:
                 self._whole.remove(topic)
                 self.node.destroy_subscription(self._topics[topic])
                 self._topics[topic] = self._subscription(topic, copy_name(topic))
-
-
-def objects_of(table: Table | None) -> tuple[ObjectState, ...]:
-    """The states in a table of objects."""
-    return tuple(ObjectState._make(row) for row in table.rows) if table else ()
 
 
 def _taken(subscription: Any) -> Any:
