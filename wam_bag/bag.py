@@ -8,15 +8,14 @@ The checksums of chunks, attachments and the summary are checked in what is read
 everything is read.
 """
 
-from collections import Counter
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from mcap.records import Attachment, Channel
+from mcap.records import Channel
 
-from wam_bag.bag_file import files, is_selected, opened, parts, type_of
+from wam_bag.bag_file import is_selected, opened, parts, type_of
 from wam_bag.columns import (
     BoolColumns,
     ClockColumns,
@@ -30,7 +29,7 @@ from wam_bag.columns import (
     WrenchColumns,
     series,
 )
-from wam_bag.contents import add_attachments, merge
+from wam_bag.contents import contents
 from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.message_search import NEVER
@@ -140,10 +139,10 @@ def read(
             f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the start"
         )
     collectors: dict[str, Collector] = {}
-    counts: Counter[str] = Counter()
-    attachments: dict[str, Attachment] = {}
-    metadata: dict[str, dict[str, str]] = {}
-    for file in files(Path(path)):
+    found = contents(path)
+    if not may_lack:
+        _require(path, topics, found.topics)
+    for file in found.files:
         with opened(file) as mcap:
             if topics is None and begin_ns <= 0 and end_ns >= NEVER:
                 mcap.check_all()
@@ -153,20 +152,13 @@ def read(
                     collector.add(part.buffer, part.found)
                 except Damage as error:
                     raise Damage(f"topic {part.channel.topic}: {error}") from None
-            counts.update({channel.topic: 0 for channel in mcap.channels.values()})
-            for number, count in (mcap.counts or mcap.count()).by_channel.items():
-                counts[mcap.channels[number].topic] += count
             for channel in mcap.channels.values():
                 if is_selected(channel.topic, topics):
                     _collector(collectors, mcap, channel, (begin_ns, end_ns))
-            add_attachments(attachments, mcap.attachments())
-            merge(metadata, mcap.metadata())
-    if not may_lack:
-        _check_has(path, topics, counts)
-    columns = _Topics({t: found.columns(f"{path}, topic {t}") for t, found in sorted(collectors.items())})
-    types = {topic: found.kind.name for topic, found in collectors.items()}
-    data = {name: item.data for name, item in attachments.items()}
-    return Bag(Path(path), columns, types, data, metadata, dict(counts))
+    columns = _Topics({t: one.columns(f"{path}, topic {t}") for t, one in sorted(collectors.items())})
+    types = {topic: one.kind.name for topic, one in collectors.items()}
+    counts = {topic: one.messages for topic, one in found.topics.items()}
+    return Bag(Path(path), columns, types, found.attachments, found.metadata, counts)
 
 
 def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channel, times: tuple[int, int]) -> Collector:
@@ -178,7 +170,7 @@ def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channe
     return collector
 
 
-def _check_has(path: str | Path, selected: Collection[str] | None, present: Collection[str]) -> None:
+def _require(path: str | Path, selected: Collection[str] | None, present: Collection[str]) -> None:
     for name in selected or ():
         if not any(is_selected(topic, [name]) for topic in present):
             raise BagError(

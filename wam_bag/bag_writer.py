@@ -22,7 +22,7 @@ from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError, command
 from wam_bag.mcap_writer import McapWriter
-from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata
+from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, described_topic, write_metadata
 
 __all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "policies", "release"]
 
@@ -112,10 +112,9 @@ class BagWriter:
         self._files: list[FileSummary] = []
         self._topics: list[dict[str, Any]] = []
         self._channels: dict[str, int] = {}
-        self._lengths: list[ExactLength] = []
+        self._lengths: dict[str, ExactLength] = {}
         self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
         self._schemas: dict[str, int] = {}
-        self._definitions: list[tuple[str, str, Mapping[str, str]]] = []
         self._next_flush = 0.0
         self._file_begin: int | None = None
         _make(path)
@@ -146,19 +145,9 @@ class BagWriter:
         kind : type, ``package/msg/Type``; its definition must be installed.
         qos : what the publishers offer, as `policies` takes it.
         """
-        offered = [policies(qos)]
-        digest = type_hash(kind)
-        self._define(name, kind, {"offered_qos_profiles": safe_yaml.dump(offered).strip(), "topic_type_hash": digest})
-        self._lengths.append(ExactLength(kind))
-        self._topics.append(
-            {
-                "name": name,
-                "type": kind,
-                "serialization_format": "cdr",
-                "offered_qos_profiles": offered,
-                "type_description_hash": digest,
-            }
-        )
+        self._topics.append(described_topic(name, kind, "cdr", [policies(qos)], type_hash(kind)))
+        self._define(self._topics[-1])
+        self._lengths[name] = ExactLength(kind)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
         """Write one message.
@@ -176,7 +165,7 @@ class BagWriter:
             if it cannot be written to disk; the bag is closed then and can be read.
         """
         channel = self._channels[topic]
-        length = self._lengths[channel - 1](data)
+        length = self._lengths[topic](data)
         if length < len(data):
             data = data[:length]
         if self._file_begin is None:
@@ -264,20 +253,19 @@ class BagWriter:
             raise
         self._stream = stream
         self._schemas = {}
-        for definition in self._definitions:
-            self._define_in_file(*definition)
+        for topic in self._topics:
+            self._define(topic)
 
     def _file_name(self) -> str:
         return f"{self.path.name}_{len(self._files)}.mcap"
 
-    def _define(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
-        self._definitions.append((name, kind, metadata))
-        self._define_in_file(name, kind, metadata)
-
-    def _define_in_file(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
+    def _define(self, topic: Mapping[str, Any]) -> None:
+        """Define a topic in the present file."""
+        kind, offered = topic["type"], safe_yaml.dump(topic["offered_qos_profiles"]).strip()
+        metadata = {"offered_qos_profiles": offered, "topic_type_hash": topic["type_description_hash"]}
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.schema(kind, "ros2msg", schema(kind))
-        self._channels[name] = self._writer.channel(name, "cdr", self._schemas[kind], metadata)
+        self._channels[topic["name"]] = self._writer.channel(topic["name"], "cdr", self._schemas[kind], metadata)
 
     def _flush(self) -> None:
         self._next_flush = time.monotonic() + FLUSH_PERIOD

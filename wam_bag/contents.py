@@ -1,13 +1,11 @@
 """What is in a bag: topics, times, attachments, the mode of the recording; without reading its messages."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
-from mcap.records import Attachment
 
 from wam_bag import safe_yaml
 from wam_bag.bag_file import files, opened
@@ -31,7 +29,7 @@ class Contents(NamedTuple):
     files : the files.
     first, last : log times, ns; 0 in an empty bag.
     topics : by name.
-    attachments : bytes by name.
+    attachments : their content by name; of one name the last one, and of parameters those of all nodes.
     mode : 'realtime', 'lockstep' or 'unknown', see `mode_of`.
     metadata : records by name; 'recording' is the recorder's, see docs/bags.md.
     """
@@ -41,7 +39,7 @@ class Contents(NamedTuple):
     first: int
     last: int
     topics: dict[str, TopicContents]
-    attachments: dict[str, int]
+    attachments: dict[str, bytes]
     mode: str
     metadata: dict[str, dict[str, str]]
 
@@ -52,7 +50,7 @@ def contents(path: str | Path) -> Contents:
     counts: Counter[str] = Counter()
     types: dict[str, str] = {}
     times: list[int] = []
-    attachments: dict[str, Attachment] = {}
+    attachments: dict[str, bytes] = {}
     metadata: dict[str, dict[str, str]] = {}
     for file in found:
         with opened(file) as mcap:
@@ -63,39 +61,28 @@ def contents(path: str | Path) -> Contents:
                 counts[channel.topic] += found_in.by_channel.get(number, 0)
                 schema = mcap.schemas.get(channel.schema_id)
                 types.setdefault(channel.topic, full_name(schema.name) if schema else "?")
-            add_attachments(attachments, mcap.attachments())
-            merge(metadata, mcap.metadata())
+            for item in mcap.attachments():
+                is_more = item.name == PARAMETERS and item.name in attachments
+                attachments[item.name] = _with_nodes_of(attachments[item.name], item.data) if is_more else item.data
+            for name, values in mcap.metadata().items():
+                metadata.setdefault(name, {}).update(values)
     topics = {topic: TopicContents(types[topic], counts[topic]) for topic in sorted(types)}
-    sizes = {name: len(item.data) for name, item in attachments.items()}
-    mode = mode_of(metadata, attachments[PARAMETERS].data if PARAMETERS in attachments else None)
-    return Contents(Path(path), found, min(times, default=0), max(times, default=0), topics, sizes, mode, metadata)
+    mode, first, last = mode_of(metadata, attachments.get(PARAMETERS)), min(times, default=0), max(times, default=0)
+    return Contents(Path(path), found, first, last, topics, attachments, mode, metadata)
 
 
-def merge(metadata: dict[str, dict[str, str]], more: Mapping[str, Mapping[str, str]]) -> None:
-    """Take the metadata records of another file of a bag: entries of records of the same name are put together."""
-    for name, values in more.items():
-        metadata.setdefault(name, {}).update(values)
-
-
-def add_attachments(found: dict[str, Attachment], more: Iterable[Attachment]) -> None:
-    """Take further attachments: of one name the last one, and of parameters those of all nodes.
+def _with_nodes_of(before: bytes, after: bytes) -> bytes:
+    """The later parameters with those of nodes that only the earlier ones have, unless one of them is unreadable.
 
     A recorder attaches them again when it knows those of more nodes, and a tool that merges bags takes those of each.
     """
-    for item in more:
-        is_more = item.name == PARAMETERS and item.name in found
-        found[item.name] = _with_nodes_of(found[item.name], item) if is_more else item
-
-
-def _with_nodes_of(before: Attachment, after: Attachment) -> Attachment:
-    """The later parameters with those of nodes that only the earlier ones have, unless one of them is unreadable."""
     try:
-        nodes, known = safe_yaml.load(after.data), safe_yaml.load(before.data)
+        nodes, known = safe_yaml.load(after), safe_yaml.load(before)
     except (yaml.YAMLError, UnicodeDecodeError):
         return after
     if not (isinstance(nodes, dict) and isinstance(known, dict) and known.keys() - nodes.keys()):
         return after
-    return replace(after, data=safe_yaml.dump({**known, **nodes}).encode())
+    return safe_yaml.dump({**known, **nodes}).encode()
 
 
 def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None) -> str:

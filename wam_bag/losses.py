@@ -15,7 +15,7 @@ from wam_bag.limits import READING_LIMITS
 REPAIRED: Final = "repaired"  # metadata record of a repair; an entry of JSON for each repair of a file
 PARAMETERS: Final = "parameters.yaml"  # attachment of the recorder
 RECORDING: Final = "recording"  # metadata record of the recorder
-LOST_AT_END: Final = "lost_at_end"  # last word of an entry of it
+DROPPED, LOST_AT_END = "dropped", "lost_at_end"  # last words of entries of it
 UNFINISHED: Final = "no final count"  # entry of it, the names of nodes
 CUT: Final = "cut"  # metadata record of a part of a bag
 _TIME_OF_DAY: Final = 10**18  # ns; smaller log times are stamps of lockstep, which start near 0
@@ -104,12 +104,10 @@ class Losses(NamedTuple):
         lines = [line for name, losses in self.repaired.items() for line in _sentences(name, losses, first)]
         if Counter(self.missing) - self._lost_in_repairs():
             lines.append(f"The recorder received {_counted(self.missing)} that are not in the bag.")
-        if self.dropped:
-            listed = ", ".join(f"{count} of {where}" for where, count in self.dropped.items())
-            lines.append(f"Lost on the way to the recorder: {listed}.")
-        if self.at_end:
-            listed = ", ".join(f"{count} of {where}" for where, count in self.at_end.items())
-            lines.append(f"Lost at the end: {listed}.")
+        for what, lost in (("on the way to the recorder", self.dropped), ("at the end", self.at_end)):
+            if lost:
+                listed = ", ".join(f"{count} of {where}" for where, count in lost.items())
+                lines.append(f"Lost {what}: {listed}.")
         if self.unfinished:
             lines.append(f"Lost at the end: not known for {self.unfinished}, which published no final count.")
         if self.uncounted:
@@ -131,26 +129,25 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
     """
     repaired = {key: _parsed(value) for key, value in metadata.get(REPAIRED, {}).items()}
     recording = metadata.get(RECORDING, {})
-    received, dropped, at_end = Counter[str](), dict[str, int](), dict[str, int]()
+    received = Counter[str]()
+    lost: dict[str, dict[str, int]] = {DROPPED: {}, LOST_AT_END: {}}
     for key, value in recording.items():
         where, _, what = key.rpartition(" ")
         if what == "received":
             received[where.split(" ")[0]] += _number(value)
-        elif what == "dropped" and _number(value):
-            dropped[where.replace(" ", " from ")] = _number(value)
-        elif what == LOST_AT_END and _number(value):
-            at_end[where.replace(" ", " from ")] = _number(value)
+        elif what in lost and _number(value):
+            lost[what][where.replace(" ", " from ")] = _number(value)
     is_part = not counts or CUT in metadata or _is_one_of_several(path, metadata)
     if is_part:
         received = Counter()
     missing = {topic: count - counts.get(topic, 0) for topic, count in sorted(received.items())}
-    lost_on_the_way = {where.split(" ")[0] for where in dropped}
+    lost_on_the_way = {where.split(" ")[0] for where in lost[DROPPED]}
     return Losses(
         repaired,
         {topic: count for topic, count in missing.items() if count > 0},
-        dropped,
+        lost[DROPPED],
         bool(counts) and PARAMETERS in attachments and not recording,
-        at_end,
+        lost[LOST_AT_END],
         recording.get(UNFINISHED, ""),
         frozenset(topic for topic, count in missing.items() if count <= 0 and topic not in lost_on_the_way),
     )

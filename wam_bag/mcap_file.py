@@ -46,16 +46,9 @@ _OF_DATA: Final = {
 }  # fmt: skip
 
 
-class Loose(NamedTuple):
+def loose(start: int, end: int) -> ChunkPlace:
     """Message records outside chunks: bytes of the file, about a batch at most."""
-
-    start: int
-    end: int
-
-    @property
-    def size(self) -> int:
-        """Bytes in memory."""
-        return self.end - self.start
+    return ChunkPlace(start, end, end, 0, NEVER, end - start, frozenset(), is_loose=True)
 
 
 class MessageCounts(NamedTuple):
@@ -93,7 +86,7 @@ class McapFile:
         with path.open("rb") as stream:
             self._data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
         self.size = len(self._data)
-        self._blocks: list[ChunkPlace | Loose] = []
+        self._blocks: list[ChunkPlace] = []
         self._others: list[RecordExtent] = []  # attachments and metadata
         self._memory = np.empty(0, np.uint8)
         self._zstd = zstandard.ZstdDecompressor()
@@ -238,14 +231,13 @@ class McapFile:
         channels : ids of the channels that are needed, None for all.  Others may come as well.
         begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
         """
-        pending: list[ChunkPlace | Loose] = []
+        pending: list[ChunkPlace] = []
         size = 0
         for block in self._blocks:
-            if isinstance(block, ChunkPlace):
-                if block.last < begin or block.first >= end:
-                    continue
-                if channels is not None and block.channels and not block.channels & channels:
-                    continue
+            if block.last < begin or block.first >= end:
+                continue
+            if channels is not None and block.channels and not block.channels & channels:
+                continue
             pending.append(block)
             size += block.size
             if size >= BATCH:
@@ -306,11 +298,10 @@ class McapFile:
         for record in walk(self._data, start, end):
             opcode = record.opcode
             if opcode == Opcode.MESSAGE:
-                last = self._blocks[-1] if self._blocks else None
-                if isinstance(last, Loose) and last.end == record.start and record.end - last.start <= BATCH:
-                    self._blocks[-1] = Loose(last.start, record.end)
-                else:
-                    self._blocks.append(Loose(record.start, record.end))
+                begin, last = record.start, self._blocks[-1] if self._blocks else None
+                if last and last.is_loose and last.end == begin and record.end - last.start <= BATCH:
+                    begin = self._blocks.pop().start
+                self._blocks.append(loose(begin, record.end))
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self.define(opcode, self.content(record))
             elif opcode == Opcode.CHUNK:
@@ -323,7 +314,7 @@ class McapFile:
     def _chunk_at(self, record: RecordExtent) -> ChunkPlace:
         return chunk_of(record, self.content(record._replace(end=min(record.end, record.start + HEAD.size + 24))))
 
-    def _load(self, blocks: list[ChunkPlace | Loose], size: int) -> MessageBatch:
+    def _load(self, blocks: list[ChunkPlace], size: int) -> MessageBatch:
         if len(self._memory) < size + TAIL:  # kept, because the system hands out new memory slowly
             self._memory = np.empty(max(size, BATCH) + TAIL, np.uint8)
         buffer = self._memory[: size + TAIL]
@@ -333,11 +324,11 @@ class McapFile:
         for block in blocks:
             part = buffer[position : position + block.size]
             index = b""
-            if isinstance(block, ChunkPlace):
+            if block.is_loose:
+                part[:] = np.frombuffer(self._data[block.start : block.end], np.uint8)
+            else:
                 decompress(block, self._data[block.start : block.end], part, self._zstd)
                 index = self._data[block.end : block.indexes_end]
-            else:
-                part[:] = np.frombuffer(self._data[block.start : block.end], np.uint8)
             for channel, found in find(part, index, self.define, position).items():
                 parts.setdefault(channel, []).append(found)
             position += len(part)

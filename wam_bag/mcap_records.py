@@ -101,7 +101,7 @@ def walk(data: bytes | mmap, start: int, end: int) -> Iterator[RecordExtent]:
 
 
 class ChunkPlace(NamedTuple):
-    """A chunk in a file.
+    """A chunk in a file, or message records outside chunks.
 
     Attributes
     ----------
@@ -110,6 +110,7 @@ class ChunkPlace(NamedTuple):
     first, last : log times, ns.
     size : decompressed, bytes.
     channels : that have messages in it; none where the file does not list them.
+    is_loose : whether it is no chunk.
     """
 
     start: int
@@ -119,6 +120,7 @@ class ChunkPlace(NamedTuple):
     last: int
     size: int
     channels: frozenset[int]
+    is_loose: bool = False
 
 
 def chunk_of(record: RecordExtent, head: bytes) -> ChunkPlace:

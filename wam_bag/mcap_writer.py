@@ -59,6 +59,7 @@ class McapWriter:
         self._groups = {opcode: bytearray() for opcode in _GROUPS}  # of the summary
         self._numbers = dict.fromkeys(_GROUPS, 0)
         self._compressor = zstandard.ZstdCompressor(level)
+        self._defined: list[records.Schema | records.Channel] = []
         self._buffer = bytearray()
         self._index: dict[int, list[int]] = {}
         self._put(MAGIC + serialized(records.Header("ros2", library)))
@@ -76,7 +77,10 @@ class McapWriter:
         return channel.id
 
     def define(self, definition: records.Schema | records.Channel) -> None:
-        """Take a schema or channel with its id."""
+        """Take a schema or channel with its id; one that is known already is not written again."""
+        if definition in self._defined:
+            return
+        self._defined.append(definition)
         self._summarize(Opcode.SCHEMA if isinstance(definition, records.Schema) else Opcode.CHANNEL, definition)
         self._buffer += serialized(definition)
 

@@ -76,12 +76,19 @@ def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
 
 def topic_information(channel: Channel, schema: Schema) -> dict[str, Any]:
     """One topic in metadata.yaml, from its records in a file."""
+    offered = profiles(channel.metadata.get("offered_qos_profiles", ""))
+    digest = channel.metadata.get("topic_type_hash", "")
+    return described_topic(channel.topic, schema.name, channel.message_encoding, offered, digest)
+
+
+def described_topic(name: str, kind: str, encoding: str, offered: Any, digest: str) -> dict[str, Any]:
+    """One topic in metadata.yaml: its type, with the policies that its publishers offer and its hash."""
     return {
-        "name": channel.topic,
-        "type": schema.name,
-        "serialization_format": channel.message_encoding,
-        "offered_qos_profiles": profiles(channel.metadata.get("offered_qos_profiles", "")),
-        "type_description_hash": channel.metadata.get("topic_type_hash", ""),
+        "name": name,
+        "type": kind,
+        "serialization_format": encoding,
+        "offered_qos_profiles": offered,
+        "type_description_hash": digest,
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Message, Schema
+from mcap.records import Message
 
 from wam_bag.bag_file import files, refuse_compressed
 from wam_bag.bag_writer import CHUNK_SIZE, release
@@ -120,7 +120,6 @@ class _Copy:
         self._lost: Counter[int] = Counter()  # by channel id
         self._all_known = True
         self._last: int | None = None  # log time of what was copied
-        self._defined: list[Schema | Channel] = []
         self._earlier: dict[str, str] = {}  # entries of earlier repairs
 
     def run(self) -> FileLosses:
@@ -208,12 +207,10 @@ class _Copy:
         for one in messages:
             if one.channel_id not in channels or channels[one.channel_id].schema_id not in schemas:
                 raise Damage(f"a message is on channel {one.channel_id}, which is not defined")
-        if len(self._defined) < len(schemas) + len(channels):
-            every: list[Schema | Channel] = [*schemas.values(), *channels.values()]
-            new = [one for one in every if one not in self._defined]
-            for definition in new:
-                self._writer.define(definition)
-            self._defined += new
+        for schema in schemas.values():
+            self._writer.define(schema)
+        for channel in channels.values():
+            self._writer.define(channel)
         for one in messages:
             self._writer.add(one.channel_id, one.log_time, one.publish_time, one.sequence, one.data)
         if times := [one.log_time for one in messages]:

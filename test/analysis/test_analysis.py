@@ -328,7 +328,7 @@ def test_the_verdict_on_a_press_is_that_of_the_guard(moving: Recorded) -> None:
     q, position, direction = [0.0, -1.8, 0.0, 1.45], 0.28, np.array([0.0, -1.0, 0.0])
     node = node_at(recorded_set, recorded_set.arm, q, "outer_link", position, direction)
     assert node is not None
-    for gain, words in ((0.015, "domain I, linearly stable "), (2.0, "NOT stable")):
+    for gain, words in ((0.015, "domain I, linearly stable "), (2.0, "NOT linearly stable")):
         own = replace(
             recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_position=position
         )

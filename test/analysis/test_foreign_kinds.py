@@ -273,7 +273,10 @@ def other_units() -> list[Case]:
         return Case(quantity, write, sent, {}, f"if it is in {told}, give --unit {quantity}={told}")
 
     degree = 180.0 / math.pi
+    slow = one("/joint_states", 100.0, 0.7, 5.0)  # of 5 degrees
+    alone = [s._replace(fields={k: v for k, v in s.fields.items() if k != "velocity"}) for s in slow]
     return [
+        Case("position alone", by_rosbags, alone, {}, "if its position is in deg, give --unit position=deg"),
         scaled("position", degree, ros1, "deg"),
         scaled("velocity", degree, sqlite, "deg/s"),
         scaled("effort", 1e3, by_rosbags, "mA"),
@@ -400,3 +403,10 @@ def test_a_time_that_can_hardly_be_in_seconds_is_refused_until_its_unit_is_given
     assert analysis.recording.duration == pytest.approx(30.0, abs=0.02)
     with pytest.raises(ValueError, match="are in rad and in m"):
         analyse(table | {"position.b [mm]": columns[1]}, lambda doing: None, given)
+
+
+def test_numbers_that_their_decimal_commas_divide_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("time,position.a\n0,01,1,5\n0,02,1,6\n")
+    with pytest.raises(BagError, match="a row of 4 cells below 2 titles"):
+        analyse(path, lambda doing: None)

@@ -388,7 +388,7 @@ def test_missed_periods_jitter_and_stamps_that_go_back_are_counted():
 def test_force_accuracy_is_bias_and_ripple():
     time = np.arange(4000) / 1000.0
     held = 5.2 + 0.1 * np.sign(np.sin(10.0 * math.pi * time + 1e-3))
-    found = force_accuracy(np.full(4000, 5.0), held)
+    found = force_accuracy(5.0, held)
     assert (found.bias, found.ripple) == PRECISE((0.2, 0.1), abs=0.005)
     assert found.smallest == near(0.3)
 

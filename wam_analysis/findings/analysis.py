@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,7 +36,6 @@ Maker = Callable[[AnalysedRecording], Section | None]
 # the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
     *OF_STEPS, "motor_states", "motor_current_command", "joint_sensors", "gravity_effort",
-    "contact/tracked_friction",
 )  # fmt: skip
 OWN_TOPICS = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",
@@ -163,11 +161,12 @@ def analyse_bag(
     sections : which are made; all if empty.
     """
     recording = AnalysedRecording(bag, namespace, given)
+    changed = [*_changed(recording.run, recording.traces.zero)]
     made = []
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
         if (section := make(recording)) is not None:
             progress(section.title)
-            made.append(section)
+            made.append(_marked(section, changed) if changed and section.key in ("force", "stability") else section)
     return Analysis(recording, (_verdict(recording, made), *made))
 
 
@@ -240,12 +239,8 @@ def _changed(run: RecordedRun, zero: int) -> Iterator[str]:
         )
 
 
-def _of_the_start(make: Maker, recording: AnalysedRecording) -> Section | None:
-    """A section whose predictions are for the parameters at the start, marked where these were changed."""
-    section = make(recording)
-    changed = [*_changed(recording.run, recording.traces.zero)]
-    if section is None or not changed:
-        return section
+def _marked(section: Section, changed: Sequence[str]) -> Section:
+    """A section whose predictions are for the parameters at the start, where these were changed."""
     findings = [
         one._replace(note="; ".join(filter(None, (one.note, OF_THE_START)))) if math.isfinite(one.predicted) else one
         for one in section.findings
@@ -253,10 +248,9 @@ def _of_the_start(make: Maker, recording: AnalysedRecording) -> Section | None:
     return section._replace(sentences=(*changed, *section.sentences), findings=findings)
 
 
-_force, _cycles = (partial(_of_the_start, make) for make in (force_section, cycle_section))
-SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, _force, contact_section)
+SECTIONS_OF_STEPS: tuple[Maker, ...] = (happened_section, steps_section, force_section, contact_section)
 SECTIONS: tuple[Maker, ...] = (
-    happened_section, steps_section, _force, _cycles, contact_section, stick_section, friction_section,
+    happened_section, steps_section, force_section, cycle_section, contact_section, stick_section, friction_section,
     power_section, timing_section,
 )  # fmt: skip
 FOREIGN_SECTIONS: tuple[Maker, ...] = (

@@ -10,7 +10,6 @@ from wam_analysis.findings.finding import Finding, Section, shown, stated, times
 from wam_analysis.measures.runs import runs
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import TOUCH
-from wam_description.topics import FRICTION_COLUMNS
 
 BLIND = "Contacts while the brakes hold are not compared: without joint sensors they are not detected."
 
@@ -66,7 +65,6 @@ def contact_section(recording: AnalysedRecording) -> Section:
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else stated(NOT_ESTIMATED))
-    findings += _tracked_friction(recording)
     return Section("contact", "Contact", sentences, findings, lacking, shows, wrong)
 
 
@@ -113,21 +111,6 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
         yield f"{name}: {'; '.join(contact.estimate.reasons)}."
     if contact.true not in ("", contact.estimate.link):
         yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
-
-
-def _tracked_friction(recording: AnalysedRecording) -> Iterator[Finding]:
-    """Friction of motors and joints as the estimator followed it, at the end of the recording."""
-    arm, columns = recording.parameters.arm, recording.run.table("contact/tracked_friction")
-    if columns is None or arm is None:
-        return
-    names = (*arm.motors.names, *arm.joints.names)
-    for way in FRICTION_COLUMNS[:2]:
-        values, sds = columns.columns[way], columns.columns[f"{way}_sd"]
-        for i, name in enumerate(names, start=-len(names)):
-            first, last = values[i % len(names)], float(values[i])
-            if last:
-                note = f"tracked between contacts, {100.0 * (last / first - 1.0):+.1f} % since the start"
-                yield Finding(f"{name}: friction in {way} motion", "N m", last, note=note, error=float(sds[i]))
 
 
 def _errors(away: float, off: float) -> str:

@@ -12,9 +12,7 @@ from wam_analysis.recorded import PredictionParameters
 from wam_analysis.thresholds import HOLD
 from wam_bag.arrays import Numbers
 from wam_control.force.force_loop_parameters import force_law, task_of
-from wam_control.force.friction_verdict import Domain
 from wam_control.force.stability_guard import GuardAssessment, GuardedContact, StabilityGuard, posture_of
-from wam_control.force.thresholds import GUARD
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
@@ -75,22 +73,12 @@ def sentence(found: Guarded) -> str:
     """The result as a sentence."""
     assessment = found.assessment
     surface = f"contact of {shown(found.surface)} N/m"
-    text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture})"
-    over = f"{shown(1.0 / assessment.scale)} times the largest linearly stable ones" if assessment.scale else ""
-    if assessment.domain is Domain.I:
-        more = (
-            f"even with {GUARD.largest_scale:g}"
-            if assessment.scale >= GUARD.largest_scale
-            else f"with up to {shown(assessment.scale)}"
-        )
-        return f"{text}: domain I, linearly stable {more} times these gains."
+    text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture}): domain"
     if assessment.scale >= 1.0:
-        return f"{text}: linearly stable, but only with up to {shown(assessment.scale)} times these gains."
-    if not over:
-        return f"{text}: NOT stable, not even with a hundredth of the gains."
-    if assessment.stable_error > 0.0:
-        return (
-            f"{text}: domain {assessment.domain}; the gains are {over}; friction keeps it stable for errors up to "
-            f"{shown(assessment.stable_error, 'N')}."
-        )
-    return f"{text}: NOT stable, domain {assessment.domain}; the gains are {over}."
+        return f"{text} {assessment.domain}, linearly stable with up to {shown(assessment.scale)} times these gains."
+    error = shown(assessment.stable_error, "N")
+    friction = f"; friction keeps it stable for errors up to {error}" * (assessment.stable_error > 0.0)
+    return (
+        f"{text} {assessment.domain}, NOT linearly stable with more than {shown(assessment.scale)} times these "
+        f"gains{friction}."
+    )

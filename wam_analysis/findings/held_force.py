@@ -27,7 +27,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_sim.recording import RecordedRun
 from wam_theory.verdicts import Verdict
 
-UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
+UNMEASURED = force_accuracy(math.nan, np.empty(0))
 
 
 class HeldForce(NamedTuple):
@@ -112,7 +112,7 @@ def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, ho
 
 def _accuracy(hold: Hold, force: Numbers) -> ForceAccuracy:
     """Of the force in the steady part, which a short hold lacks."""
-    return UNMEASURED if hold.is_short else force_accuracy(np.full(len(force), hold.commanded), force)
+    return UNMEASURED if hold.is_short else force_accuracy(hold.commanded, force)
 
 
 def _measured(run: RecordedRun, hold: Hold) -> tuple[Numbers, Numbers]:

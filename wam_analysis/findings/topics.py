@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, counted, shown, times
-from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of
+from wam_analysis.foreign.sources import Source, Treated, Treatment, clocks_of, pieces
 from wam_analysis.foreign.topic_map import QUANTITIES, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import Bag, Columns, JointColumns, WrenchColumns
 from wam_bag.limits import READING_LIMITS
 
 UNUSUAL = {  # values that few robots reach, in the unit of ROS, and many in another one
-    "position": (4.0 * math.pi, "deg"), "velocity": (4.0 * math.pi, "deg/s"), "effort": (1e3, "mA"),
+    "position": (4.0 * math.pi, "deg"), "velocity": (4.0 * math.pi, "deg/s"), "effort": (400.0, "mA"),
     "force": (1e4, "mN"), "torque": (1e3, "mNm"),
 }  # fmt: skip
 
@@ -33,6 +33,7 @@ def topics_section(recording: AnalysedRecording) -> Section:
         if isinstance(columns, JointColumns):
             wrong += [f"{name}: {counted(n, 'message')} with {what}." for what, n in columns.irregular.items()]
         wrong += _unusual(name, columns, given)
+    wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
     sentences += [*wrong, *_alike(found), *_unread(bag)]
@@ -64,6 +65,18 @@ def _unusual(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
         if largest > most and quantity not in given.units:
             taken = f"{quantity} up to {shown(largest, QUANTITIES[quantity])}, as ROS has it"
             yield f"{name}: {taken}; if it is in {other}, give --unit {quantity}={other}."
+
+
+def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
+    """Which joints would move faster than few do, where their velocity was not recorded."""
+    most, _ = UNUSUAL["velocity"]
+    for one in found:
+        lacks_velocity = "position" in one.values and "velocity" not in one.values
+        if lacks_velocity and "position" not in given.units and not one.is_command:
+            speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
+            if max(speeds, default=0.0) > most:
+                fast = f"moves at up to {shown(float(max(speeds)), 'rad/s')}"
+                yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
 
 
 DONE_TO = {

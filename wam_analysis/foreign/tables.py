@@ -25,13 +25,17 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     Raises
     ------
     BagError
-        if it has no row.
+        if it has no row, or one with more cells than titles, as where decimal commas divide numbers.
     """
     with path.open(newline="", encoding="utf-8-sig") as stream:
         lines = [line for line in stream if line.strip()]
     head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
     if not rows:
         raise BagError(f"{path} has no row below the names of its columns")
+    if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
+        raise BagError(
+            f"{path} has a row of {len(wide)} cells below {len(head)} titles; divide its cells by ';' or tabs"
+        )
     return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
 
 

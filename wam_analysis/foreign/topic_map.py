@@ -1,7 +1,7 @@
 """Which topics, joints and fields of a recording hold which quantity, and in which unit."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 QUANTITIES = {
@@ -74,23 +74,24 @@ def topic_map(
     ValueError
         with what is allowed.
     """
+    named = _values("--map", "FIELD", MAPPED, fields)
+    factors = {
+        quantity: unit_of(quantity, unit) for quantity, unit in _values("--unit", "UNIT", QUANTITIES, units).items()
+    }
+    return TopicMap(tuple(topics), tuple(joints), tuple(commands), named, factors)
+
+
+def _values(option: str, what: str, allowed: Collection[str], texts: Sequence[str]) -> dict[str, str]:
+    """The values of an option by quantity."""
     found: dict[str, str] = {}
-    for option in fields:
-        quantity, _, field = option.partition("=")
-        if quantity not in MAPPED or not field:
-            raise ValueError(f"--map is '{option}'; write QUANTITY=FIELD, with a quantity of {', '.join(MAPPED)}")
+    for text in texts:
+        quantity, _, value = text.partition("=")
+        if quantity not in allowed or not value:
+            raise ValueError(f"{option} is '{text}'; write QUANTITY={what}, with a quantity of {', '.join(allowed)}")
         if quantity in found:
-            raise ValueError(f"--map {quantity} is given twice, as '{found[quantity]}' and as '{field}'")
-        found[quantity] = field
-    factors: dict[str, tuple[float, str]] = {}
-    for option in units:
-        quantity, _, unit = option.partition("=")
-        if quantity not in QUANTITIES:
-            raise ValueError(f"--unit is '{option}'; write QUANTITY=UNIT, with a quantity of {', '.join(QUANTITIES)}")
-        if quantity in factors:
-            raise ValueError(f"--unit {quantity} is given twice; the second is '{unit}'")
-        factors[quantity] = unit_of(quantity, unit)
-    return TopicMap(tuple(topics), tuple(joints), tuple(commands), found, factors)
+            raise ValueError(f"{option} {quantity} is given twice, as '{found[quantity]}' and as '{value}'")
+        found[quantity] = value
+    return found
 
 
 def unit_of(quantity: str, text: str) -> tuple[float, str]:

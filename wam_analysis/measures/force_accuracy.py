@@ -23,14 +23,14 @@ class ForceAccuracy(NamedTuple):
     smallest: float
 
 
-def force_accuracy(commanded: Numbers, held: Numbers) -> ForceAccuracy:
+def force_accuracy(commanded: float, held: Numbers) -> ForceAccuracy:
     """Accuracy of a force in its steady state.
 
     Parameters
     ----------
-    commanded, held : (n,), N, along the same direction; NaN if not known.
+    commanded, held : N, and (n,), N, along the same direction; NaN if not known.
     """
-    error = (held - commanded)[np.isfinite(held) & np.isfinite(commanded)]
+    error = held[np.isfinite(held)] - commanded
     if not len(error):
         return ForceAccuracy(math.nan, math.nan, math.nan)
     bias = float(np.mean(error))

@@ -89,7 +89,7 @@ def described(found: Contents) -> list[str]:
     lines.append(f"from {_time(found.first)}, {seconds:.3f} s, {count} messages")
     if RECORDING in found.metadata or PARAMETERS in found.attachments:
         lines.append(f"recorded in {found.mode} mode, lost: {_lost(found, lost)}")
-    lines += [f"attachment {name}, {size} bytes" for name, size in found.attachments.items()]
+    lines += [f"attachment {name}, {len(data)} bytes" for name, data in found.attachments.items()]
     width = max(map(len, found.topics), default=0)
     for name, topic in found.topics.items():
         rate = f"{(topic.messages - 1) / seconds:9.1f} Hz" if topic.messages > 1 and seconds else " " * 12
