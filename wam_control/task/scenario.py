@@ -12,7 +12,7 @@ from wam_control.force.contact_place import torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
-from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list, require_made
+from wam_control.task.scenario_values import is_one_of, known, number, numbers, plain, require_list, require_made
 from wam_control.task.task_text import as_of_file, require_task, task_of_text, torque_task
 from wam_control.thresholds import MOTION
 from wam_description import yaml_text
@@ -44,6 +44,7 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
+CHIRP_KEYS = ("newtons", "from", "to")
 NO_FORCE = ForceCommand("base", ZERO)
 FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
 Motion = GoalMotion | PostureMotion | LineMotion
@@ -127,6 +128,9 @@ class ScenarioStep(NamedTuple):
     def commands_arm(self) -> bool:
         """Whether a motion, a force or a task is commanded."""
         return self.moves or self.presses
+
+
+PARTS = {"force": ForceCommand, "push": Push, "chirp": Chirp, "trajectory": PosturePath}  # classes of a step's fields
 
 
 class ScenarioOutput(NamedTuple):
@@ -493,53 +497,34 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
     known(where, body, tuple(STEP_KEYS), ("name", "seconds"))
-    seconds = number(where, "seconds", body["seconds"])
-    force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
     for keys in (FORCES, MOTIONS):
         _require_one(where, [key for key in keys if key in body])
     step = ScenarioStep(
         name=body["name"],
-        seconds=seconds,
+        seconds=body["seconds"],
         posture=numbers(where, "posture", body["posture"], len(arm.joints.names)) if "posture" in body else (),
-        until_force=number(where, "until_force", body.get("until_force", 0.0)),
-        force=force,
-        push=_push(where, body["push"], arm, seconds) if "push" in body else None,
+        until_force=body.get("until_force", 0.0),
+        force=_force(where, body["force"], arm) if "force" in body else NO_FORCE,
+        push=_push(where, body["push"], body["seconds"]) if "push" in body else None,
         request=body.get("request", ""),
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
-        settings=tuple(settings_of(where, body["set"], shared)) if "set" in body else (),
+        settings=tuple(settings_of(where, body["set"])) if "set" in body else (),
         task=_task(where, body, arm),
-        trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
+        trajectory=_trajectory(where, body["trajectory"]) if "trajectory" in body else None,
         tip=_tip(where, body["tip"]) if "tip" in body else None,
-        rise=number(where + ", force", "rise", body.get("force", {}).get("rise", 0.0)),
+        rise=body.get("force", {}).get("rise", 0.0),
     )
+    return _checked(where, step, shared)
+
+
+def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any] = NONE) -> ScenarioStep:
+    """A step of a file or made in Python, as it is played."""
     _require_step(where, step, shared)
-    return step
-
-
-def _checked(where: str, step: ScenarioStep, shared: Shared, controllers: Mapping[str, Any]) -> ScenarioStep:
-    """A step made in Python, with tuples and floats as those of a file have them; compiled code takes no others."""
-    _require_step(where, step, shared)
-    return step._replace(
-        seconds=float(step.seconds),
-        posture=floats(step.posture),
-        until_force=float(step.until_force),
-        force=ForceCommand(step.force.frame, *map(floats, step.force[1:])),
-        push=step.push and _on_axis(_push_of_floats(step.push), shared.arm),
-        chirp=step.chirp and Chirp(*floats(step.chirp)),
-        settings=checked_settings(where, step.settings, shared, controllers),
-        task=step.task and as_of_file(step.task),
-        trajectory=step.trajectory and PosturePath(tuple(map(_point_of_floats, step.trajectory.points))),
-        tip=step.tip and floats(step.tip),
-    )
-
-
-def _push_of_floats(push: Push) -> Push:
-    begin, end = float(push.begin), float(push.end)
-    return Push(push.cover, float(push.position), floats(push.force), begin, end, push.aside and floats(push.aside))
-
-
-def _point_of_floats(point: PathPoint) -> PathPoint:
-    return PathPoint(floats(point.position), floats(point.velocity), float(point.time))
+    push, task, settings = step.push, step.task, checked_settings(where, step.settings, shared, controllers)
+    if push and not push.aside:
+        push = push._replace(aside=shared.arm.covers.aside(push.cover, push.position))
+    whole: ScenarioStep = plain(step._replace(push=push, task=None, settings=()))
+    return whole._replace(task=task and as_of_file(task), settings=settings)
 
 
 def _require_one(where: str, keys: Sequence[str]) -> None:
@@ -549,7 +534,9 @@ def _require_one(where: str, keys: Sequence[str]) -> None:
 def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     """Refuse a step whose values cannot be, whether it is from a file or made in Python."""
     arm = shared.arm
-    _require_parts(where, step)
+    for key, kind in PARTS.items():
+        if (part := getattr(step, key)) is not None or kind is ForceCommand:
+            require_made(where, key, part, kind)
     require(
         isinstance(step.name, str) and step.name != "", f"{where}: name is {step.name!r}; it must be a text (quote it)"
     )
@@ -590,18 +577,6 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
         _require_push(where, step.push, shared, seconds)
 
 
-def _require_parts(where: str, step: ScenarioStep) -> None:
-    """Refuse a part of a step that is of another class."""
-    require_made(where, "force", step.force, ForceCommand)
-    for key, part, kind in (
-        ("push", step.push, Push),
-        ("chirp", step.chirp, Chirp),
-        ("trajectory", step.trajectory, PosturePath),
-    ):
-        if part is not None:
-            require_made(where, key, part, kind)
-
-
 def _require_trajectory(where: str, trajectory: PosturePath, arm: Arm) -> None:
     require_list(where, "points of the trajectory", trajectory.points, "PathPoint")
     require(len(trajectory.points) > 0, f"{where}: the trajectory has no points; give at least one")
@@ -614,14 +589,12 @@ def _require_trajectory(where: str, trajectory: PosturePath, arm: Arm) -> None:
         number(where, "times", point.time)
 
 
-def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
+def _trajectory(where: str, body: Any) -> PosturePath:
     known(f"{where}, trajectory", body, ("postures", "times"), ("postures",))
     postures = body["postures"]
     require(isinstance(postures, list) and len(postures) > 0, f"{where}: postures is {postures!r}; give a list of them")
     times = numbers(where, "times", body["times"], len(postures)) if "times" in body else (0.0,) * len(postures)
-    points = zip(postures, times, strict=True)
-    count = len(arm.joints.names)
-    return PosturePath(tuple(PathPoint(numbers(where, "posture", one, count), (), time) for one, time in points))
+    return PosturePath(tuple(PathPoint(one, (), time) for one, time in zip(postures, times, strict=True)))
 
 
 def _tip(where: str, body: Any) -> Triple:
@@ -668,14 +641,12 @@ def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
 
 
 def _chirp(where: str, body: Any) -> Chirp:
-    keys = ("newtons", "from", "to")
-    known(where + ", chirp", body, keys, keys)
-    return Chirp(*(number(where + ", chirp", key, body[key]) for key in keys))
+    known(where + ", chirp", body, CHIRP_KEYS, CHIRP_KEYS)
+    return Chirp(*(body[key] for key in CHIRP_KEYS))
 
 
 def _require_chirp(where: str, chirp: Chirp) -> None:
-    keys = ("newtons", "from", "to")
-    _, start, end = (number(where + ", chirp", key, value) for key, value in zip(keys, chirp, strict=True))
+    _, start, end = (number(where + ", chirp", key, value) for key, value in zip(CHIRP_KEYS, chirp, strict=True))
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
     require(
         start >= MOTION.slowest_chirp and end <= MOTION.fastest_chirp,
@@ -684,34 +655,22 @@ def _require_chirp(where: str, chirp: Chirp) -> None:
     )
 
 
-def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
+def _push(where: str, body: Any, seconds: Any) -> Push:
     needed = ("cover", "contact_position", "newtons")
     known(where + ", push", body, (*needed, "begin", "end"), needed)
-    x, y, z = numbers(where, "newtons", body["newtons"], 3)
-    place = number(where, "contact_position", body["contact_position"])
-    begin, end = number(where, "begin", body.get("begin", 0.0)), number(where, "end", body.get("end", seconds))
-    push = Push(body["cover"], place, (x, y, z), begin, end)
-    _require_place(where, push, arm)
-    return _on_axis(push, arm)
+    return Push(*(body[key] for key in needed), body.get("begin", 0.0), body.get("end", seconds))
 
 
-def _on_axis(push: Push, arm: Arm) -> Push:
-    """The push with where the tube's axis is, unless it has that."""
-    return push if push.aside else push._replace(aside=arm.covers.aside(push.cover, push.position))
-
-
-def _require_place(where: str, push: Push, arm: Arm) -> None:
-    covers = arm.covers.names
-    require(is_one_of(push.cover, covers), f"{where}: cover is {push.cover!r}; allowed: {', '.join(covers)}")
-    place, length = number(where, "contact_position", push.position), arm.covers.length_of(push.cover)
+def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
+    covers = shared.arm.covers
+    require(
+        is_one_of(push.cover, covers.names), f"{where}: cover is {push.cover!r}; allowed: {', '.join(covers.names)}"
+    )
+    place, length = number(where, "contact_position", push.position), covers.length_of(push.cover)
     require(
         0.0 <= place <= length,
         f"{where}: contact_position is {place:g} m; {push.cover} reaches from 0 to {length:g} m",
     )
-
-
-def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:
-    _require_place(where, push, shared.arm)
     numbers(where, "newtons", push.force, 3)
     if push.aside is not None:
         _require_within_tube(where, push, shared.arm)

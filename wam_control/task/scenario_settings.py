@@ -23,13 +23,24 @@ class Setting(NamedTuple):
     value: float | int | bool | str | tuple[float | int | bool | str, ...]
 
 
-def settings_of(where: str, body: Any, shared: Shared, controllers: Mapping[str, Any] = NONE) -> Iterator[Setting]:
-    """Those of a step: each is a live parameter of its node, with a value of its type and range.
+def settings_of(where: str, body: Any) -> Iterator[Setting]:
+    """Those of a step of a file: values by parameter, by node; `where` begins a refusal: file and step."""
+    known(where + ", set", body, TUNABLE, ())
+    for node, values in body.items():
+        require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
+        for name, value in given_once(f"{where}: set, {node}", values).items():
+            yield Setting(node, name, value)
+
+
+def checked_settings(
+    where: str, settings: Sequence[Setting], shared: Shared, controllers: Mapping[str, Any] = NONE
+) -> tuple[Setting, ...]:
+    """Settings of a step, each of a live parameter of its node, with a value of its type and range.
 
     Parameters
     ----------
     where : what begins a refusal: file and step.
-    body : values by parameter, by node.
+    settings : of the step.
     shared : lists the nodes.
     controllers : node classes by name that take the place of those in `shared.nodes`, or come on top.
 
@@ -38,35 +49,23 @@ def settings_of(where: str, body: Any, shared: Shared, controllers: Mapping[str,
     ParameterError
         names the node, the parameter and what is allowed.
     """
-    known(where + ", set", body, TUNABLE, ())
-    for node, values in body.items():
-        require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
-        live = {field.name: field for field in fields(_parameter_class(where, node, shared, controllers)) if field.live}
-        for name, value in given_once(f"{where}: set, {node}", values).items():
-            has = meant(name, live).strip() or f"it has: {', '.join(sorted(live)) or 'none'}"
-            require(
-                name in live,
-                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {has}",
-            )
-            try:
-                yield Setting(node, name, checked(live[name], value))
-            except ParameterError as error:
-                raise ParameterError(f"{where}: set, {node}: {error}") from None
-
-
-def checked_settings(
-    where: str, settings: Sequence[Setting], shared: Shared, controllers: Mapping[str, Any] = NONE
-) -> tuple[Setting, ...]:
-    """Settings of a step made in Python as those of a file, or refused as those; arguments of `settings_of`."""
     require_list(where, "settings", settings, "Setting(node, name, value), () for none")
+    found: dict[tuple[str, str], Setting] = {}
     for one in settings:
         is_named = isinstance(one, Setting) and isinstance(one.node, str) and isinstance(one.name, str)
         require(is_named, f"{where}: settings has {one!r}; give Setting(node, name, value), node and name as texts")
-    found: dict[tuple[str, str], Setting] = {}
-    for node, name, value in settings:
-        for one in settings_of(where, {node: {name: value}}, shared, controllers):
-            require(one[:2] not in found, f"{where}: set, {node}: '{one.name}' is given twice; remove one")
-            found[one[:2]] = one
+        node, name, value = one
+        known(where + ", set", {node: value}, TUNABLE, ())
+        live = {field.name: field for field in fields(_parameter_class(where, node, shared, controllers)) if field.live}
+        has = meant(name, live).strip() or f"it has: {', '.join(sorted(live)) or 'none'}"
+        require(
+            name in live, f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {has}"
+        )
+        require((node, name) not in found, f"{where}: set, {node}: '{name}' is given twice; remove one")
+        try:
+            found[node, name] = Setting(node, name, checked(live[name], value))
+        except ParameterError as error:
+            raise ParameterError(f"{where}: set, {node}: {error}") from None
     return tuple(found.values())
 
 

@@ -33,9 +33,12 @@ def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     return tuple(number(where, key, element) for element in value)
 
 
-def floats(values: Sequence[float]) -> Any:
-    """The numbers of a vector as a tuple, whatever sequence they were given in."""
-    return tuple(map(float, values))
+def plain(value: Any) -> Any:
+    """The same with floats and tuples in place of other numbers and lists; compiled code takes no others."""
+    if isinstance(value, (list, tuple)):
+        found = map(plain, value)
+        return type(value)(*found) if hasattr(value, "_fields") else tuple(found)
+    return float(value) if isinstance(value, Real) else value
 
 
 def require_made(where: str, key: str, value: Any, kind: Any) -> None:

@@ -20,7 +20,7 @@ from typing import Any, Final
 import pinocchio as pin
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
-from wam_control.task.scenario_values import floats, is_one_of, known, number, numbers, require_list
+from wam_control.task.scenario_values import is_one_of, known, number, numbers, plain, require_list
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require
 from wam_description.signals import BASE, Triple
@@ -75,14 +75,7 @@ def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
 
 def as_of_file(task: TaskCommand) -> TaskCommand:
     """A task that was made in Python with tuples and floats as one of a file has them."""
-    return task._replace(axes=tuple(_as_of_file(axis) for axis in task.axes))
-
-
-def _as_of_file(axis: TaskAxis) -> TaskAxis:
-    position, value = (None if one is None else float(one) for one in (axis.position, axis.value))
-    rate, stiffness, damping = floats((axis.rate, axis.stiffness, axis.damping))
-    motion = {"value": value, "rate": rate, "stiffness": stiffness, "damping": damping}
-    return axis._replace(position=position, direction=floats(axis.direction), **motion)
+    return task._replace(axes=tuple(plain(axis)._replace(kind=axis.kind, joint=axis.joint) for axis in task.axes))
 
 
 def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
