@@ -38,7 +38,7 @@ class Covers:
     rotation: tuple[float, ...] = parameter(
         "rotation from the link's axes to the cover's, roll pitch yaw", "rad", low=-6.3, high=6.3, width=3
     )
-    length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", low=0.0, high=3.0)
+    length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", high=3.0)
     start: tuple[float, ...] = parameter(
         "start of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
     )
@@ -90,12 +90,12 @@ class Arm:
         "matrix M of (A.5), q = M theta, row by row", low=-100.0, high=100.0
     )
     tool: tuple[float, ...] = parameter(
-        "origin of the tool frame in the last link's frame, x y z", "m", low=-3.0, high=3.0
+        "origin of the tool frame in the last link's frame, x y z", "m", low=-3.0, high=3.0, length=3
     )
     payload: float = parameter(
-        "mass carried at the tool, known to all nodes and part of the simulated arm", "kg", low=0.0, high=50.0,
+        "mass carried at the tool, known to all nodes and part of the simulated arm", "kg", high=50.0,
     )  # fmt: skip
-    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0)
+    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0, length=3)
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
     def __post_init__(self) -> None:
@@ -118,8 +118,6 @@ class Arm:
         for key in ("pretension", "breaking_strength", "damping", "reducer"):
             lengths("arm.cables", self.motors.names, {key: getattr(self.cables, key)})
         self.circuits  # noqa: B018 - refuses stages that make no circuit
-        for name, vector in (("tool", self.tool), ("gravity", self.gravity)):
-            require(len(vector) == 3, f"parameter 'arm.{name}' has {len(vector)} values; it needs x y z")
         for link in self.covers.links:
             require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
         self._require_plausible()
@@ -245,7 +243,7 @@ class Timing:
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
     outer_divisor: int = parameter("inner periods in one period of the joint side", low=1, high=1000)
-    outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
+    outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
         "niceness in realtime of all nodes but the recorder, if the system does not grant "
@@ -256,18 +254,15 @@ class Timing:
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     real_time_factor: float = parameter(
         "largest pace of lockstep, simulated time over wall clock; at least 0.001, or 0: as fast as possible",
-        low=0.0,
         high=100.0,
     )
     dither_cycle: int = parameter(
         "inner periods in one cycle of the dither, which shows contact at rest; 0: no dither",
-        low=0,
         high=1000,
     )
     fifo_priority: int = parameter(
         "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; the other "
         "nodes but the recorder have one less; 0: none requested",
-        low=0,
         high=49,
     )
 
@@ -363,9 +358,9 @@ class Shared:
     servo: Servo
     motion: MotionParameters
     model: ArmModel
-    disturbance_force_limit: float = parameter("largest force of a push of sim/disturbance", "N", low=0.0, high=1e4)
+    disturbance_force_limit: float = parameter("largest force of a push of sim/disturbance", "N", high=1e4)
     disturbance_torque_limit: float = parameter(
-        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4
+        "largest torque of a push of sim/disturbance about the cover's origin", "N m", high=1e4
     )
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")
 

@@ -46,7 +46,7 @@ class Configuration(NamedTuple):
     written: str = ""
 
     @classmethod
-    def load(cls, path: str | Path, _above: tuple[Path, ...] = ()) -> "Configuration":
+    def load(cls, path: str | Path) -> "Configuration":
         """Read a ROS parameter file.
 
         Raises
@@ -60,19 +60,13 @@ class Configuration(NamedTuple):
         file, holds only what differs from that one: values, and sections of nodes that the base does not have.
         """
         path = Path(path)
-        if not path.is_file():
-            raise ParameterError(f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)")
-        try:
-            text = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise ParameterError(f"configuration {path} is not a text file: {error}") from error
-        tree = _tree(path, text)
-        if not isinstance(tree, dict) or BASE not in tree:
-            sections = _sections(path, tree)
-            is_mixed = any(_is_mixed(value) for flat in sections.values() for value in flat.values())
-            return cls(path, sections, "" if is_mixed else text)
-        base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
-        return base._overlaid(path, _sections(path, tree, whole=False))
+        (first, text, tree), *overlays = reversed(_chain(path))
+        sections = _sections(first, tree)
+        is_mixed = any(_is_mixed(value) for flat in sections.values() for value in flat.values())
+        whole = cls(first, sections, "" if is_mixed else text)
+        for overlay, _, changes in overlays:
+            whole = whole.with_sections(_sections(overlay, changes, whole=False), overlay)
+        return whole
 
     def __repr__(self) -> str:
         """Path and sections, not every value."""
@@ -149,22 +143,20 @@ class Configuration(NamedTuple):
             f"'{one}'" + f" of section '{SHARED}'" * (bool(place) and ":" not in one) for one in sorted(found) or near
         )
 
-    def with_sections(self, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
+    def with_sections(self, changes: Mapping[str, Mapping[str, Any]], path: Path | None = None) -> "Configuration":
         """The same configuration with some values replaced, and with sections of further nodes.
 
         Parameters
         ----------
         changes : flat ``{dotted name: value}`` by section, as `sections`.
+        path : of the file that changes them, by default that of this one.
 
         Raises
         ------
         ParameterError
             if the configuration has no such parameter, or a new section is of no node.
         """
-        return self._overlaid(self.path, changes)
-
-    def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
-        """The configuration of `path`: this one with changed values and further sections."""
+        path = path or self.path
         new = {name: dict(flat) for name, flat in changes.items() if name not in self.sections}
         sections = {**new, **{name: dict(flat) for name, flat in self.sections.items()}}
         whole = Configuration(path, _frozen(sections))
@@ -224,14 +216,7 @@ def files_of(path: str | Path) -> list[Path]:
     ParameterError
         as `Configuration.load`.
     """
-    Configuration.load(path)  # each of them is a file that can be read
-    found: list[Path] = []
-    name: Path | None = Path(path)
-    while name is not None:
-        found.append(name)
-        tree = _tree(name, name.read_text(encoding="utf-8"))
-        name = _base(name, tree[BASE], ()) if isinstance(tree, dict) and BASE in tree else None
-    return found
+    return [one for one, _, _ in _chain(Path(path))]
 
 
 def differences(path: Path, loaded: Configuration) -> list[str]:
@@ -351,11 +336,21 @@ def _may_be(entry: str, name: str) -> bool:
     return entry == name or ":" in entry
 
 
-def _tree(path: Path, text: str) -> Any:
+def _chain(path: Path, above: tuple[Path, ...] = ()) -> list[tuple[Path, str, Any]]:
+    """A file and those that it builds on, its base, the base of that and so on, with text and further content."""
+    if not path.is_file():
+        raise ParameterError(f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)")
     try:
-        return yaml_text.parse(text)
+        text = path.read_text(encoding="utf-8")
+        tree = yaml_text.parse(text)
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"configuration {path} is not a text file: {error}") from error
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
+    if not isinstance(tree, dict) or BASE not in tree:
+        return [(path, text, tree)]
+    base = _base(path, tree.pop(BASE), above)
+    return [(path, text, tree), *_chain(base, (*above, path.resolve()))]
 
 
 def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:

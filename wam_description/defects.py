@@ -44,14 +44,23 @@ def defect_finder(topic: Topic, arm: Arm, arrays: str) -> Callable[[Any], str]:
     topic : row of the table of topics, of one of the types that carry numbers.
     arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
     """
-    names, wanted, allowed = owners(topic, arm), frozenset(arrays.split()), frames(arm)
+    if topic.type == JOINT_STATE:
+        names, wanted = owners(topic, arm), frozenset(arrays.split())
+        return lambda value: state_defect(value, names, wanted)
+    allowed = frames(arm)
     finders: dict[str, Callable[[Any], str]] = {
-        JOINT_STATE: lambda value: state_defect(value, names, wanted),
-        WRENCH: lambda value: wrench_defect(value, allowed),
-        POINT: lambda value: point_defect(value, allowed),
-        TABLE: lambda value: table_defect(value, topic.columns, allowed),
+        WRENCH: wrench_defect,
+        POINT: point_defect,
+        TABLE: lambda table: table_defect(table, topic.columns, allowed[1:]),
     }
-    return finders[topic.type]
+    find = finders[topic.type]
+
+    def defect(value: Any) -> str:
+        if value.frame not in allowed:
+            return f"frame_id is '{value.frame}'; allowed are {', '.join(allowed)}"
+        return find(value)
+
+    return defect
 
 
 def output_check(node: str, topic: Topic, defect_of: Callable[[Any], str] = lambda value: "") -> Check:
@@ -147,10 +156,8 @@ def state_defect(state: State, owners: Sequence[str], wanted: Collection[str]) -
     return ""
 
 
-def wrench_defect(wrench: Wrench, frames: Sequence[str]) -> str:
-    """What is wrong with a force and a torque in one of the frames."""
-    if wrench.frame not in frames:
-        return f"frame_id is '{wrench.frame}'; allowed are {', '.join(frames)}"
+def wrench_defect(wrench: Wrench) -> str:
+    """What is wrong with a force and a torque."""
     if [len(vector) for vector in wrench[1:]] != [3, 3]:
         return f"force {wrench.force} N, torque {wrench.torque} N m; send three numbers for each"
     for name, unit, vector in (("force", "N", wrench.force), ("torque", "N m", wrench.torque)):
@@ -163,11 +170,9 @@ def wrench_defect(wrench: Wrench, frames: Sequence[str]) -> str:
     return ""
 
 
-def point_defect(point: Point, frames: Sequence[str]) -> str:
-    """What is wrong with a position in one of the frames; NaN means that a coordinate is not known."""
-    frame, position = point
-    if frame not in frames:
-        return f"frame_id is '{frame}'; allowed are {', '.join(frames)}"
+def point_defect(point: Point) -> str:
+    """What is wrong with a position; NaN means that a coordinate is not known."""
+    position = point.position
     if [len(each) for each in point[1:]] != [3]:
         return f"position is {position} m; send three numbers"
     if any(isinf(value) for value in position):
@@ -177,10 +182,8 @@ def point_defect(point: Point, frames: Sequence[str]) -> str:
     return ""
 
 
-def table_defect(table: Table, columns: Sequence[str], frames: Sequence[str]) -> str:
+def table_defect(table: Table, columns: Sequence[str], covers: Sequence[str]) -> str:
     """What is wrong with rows of numbers under these columns; NaN in some means that a number is not known."""
-    if table.frame not in frames:
-        return f"frame_id is '{table.frame}'; allowed are {', '.join(frames)}"
     if sizes := {len(row) for row in table.rows} - {len(columns)}:
         return f"a row has {min(sizes)} numbers; send {len(columns)}: {', '.join(columns)}"
     known = columns_of(tuple(columns))
@@ -192,8 +195,8 @@ def table_defect(table: Table, columns: Sequence[str], frames: Sequence[str]) ->
                 return f"{name} is {value:g}; {_allowed(largest)}, or NaN where it is not known"
             return f"{name} is {value}; send a finite number{', or NaN where it is not known' * may_be_unknown}"
     for link in (row[0] for row in table.rows if columns[0] == LINK):
-        if link not in range(len(frames) - 1):
-            return f"link is {link}; send the index of one of {', '.join(frames[1:])}"
+        if link not in range(len(covers)):
+            return f"link is {link}; send the index of one of {', '.join(covers)}"
     return ""
 
 

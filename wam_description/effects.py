@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wam_description.arm import Arm
-from wam_description.parameters import aligned, option, parameter, require, rows, tunable
+from wam_description.parameters import aligned, each, empty, option, parameter, require, rows, tunable
 from wam_description.parts import Motors
 
 
@@ -19,7 +19,7 @@ class Ripples:
 
     shafts: tuple[str, ...] = parameter("motor or joint of each ripple, directly or geared")
     ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft", low=-1000.0, high=1e3)
-    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", low=0.0, high=100.0)
+    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", high=100.0)
     cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1, high=1e4)
     phase: tuple[float, ...] = parameter("phase at angle zero", "rad", low=-6.3, high=6.3)
 
@@ -37,14 +37,12 @@ class Effects:
         "play of each circuit at its motor, one for all or one each; above 0 the circuit is a gear or "
         "shaft without pretension (2.2)",
         "rad",
-        low=0.0,
         high=10.0,
         is_common=True,
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     pretension_share: tuple[float, ...] = parameter(
         "active pretension (6.5): fraction of arm.cables.pretension, one for all or one each; it changes at once",
-        low=0.0,
         high=10.0,
         live=True,
         is_common=True,
@@ -52,7 +50,6 @@ class Effects:
     tension_friction: tuple[float, ...] = parameter(
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
         "N m/N",
-        low=0.0,
         high=1.0,
     )
     included_in_friction: bool = parameter(
@@ -73,10 +70,6 @@ class Effects:
         high=50.0,
     )
 
-    def tightened(self, motor: int) -> float:
-        """Part of the pretension of this motor's circuit that is set."""
-        return self.pretension_share[motor if len(self.pretension_share) > 1 else 0]
-
     def require_fit(self, arm: Arm) -> None:
         """Refuse effects that do not fit the arm, as a pretension that leaves a cable no margin up to its strength.
 
@@ -94,13 +87,14 @@ class Effects:
             "does not slip as a whole: set one of them to 0 or false",
         )
         aligned("effects", motors, self)
-        for i, (name, pretension, strength) in enumerate(
-            zip(motors, cables.pretension, cables.breaking_strength, strict=True)
+        shares = each(self.pretension_share, len(motors))
+        for name, share, pretension, strength in zip(
+            motors, shares, cables.pretension, cables.breaking_strength, strict=True
         ):
             most = max(strength / pretension - 1.0, 1.0) if pretension else math.inf
             require(
-                self.tightened(i) <= most,
-                f"effects.pretension_share of {name} is {self.tightened(i):.4g}; allowed: up to {most:.4g}, or at full "
+                share <= most,
+                f"effects.pretension_share of {name} is {share:.4g}; allowed: up to {most:.4g}, or at full "
                 f"torque its cable would be above its breaking strength, {strength:g} N",
             )
 
@@ -129,7 +123,8 @@ class Effects:
     def smooth(self, arm: Arm) -> Motors:
         """The motors with the friction that does not depend on their angle: dry, and by the pretension."""
         motors = self.dry(arm)
-        by_tension = [self._tension_torque(arm, i) * self.tightened(i) for i in range(len(motors.names))]
+        shares = each(self.pretension_share, len(motors.names))
+        by_tension = [self._tension_torque(arm, i) * share for i, share in enumerate(shares)]
         return _with_friction(motors, [1.0] * len(by_tension), by_tension)
 
     def _tension_torque(self, arm: Arm, motor: int) -> float:
@@ -157,7 +152,7 @@ def _with_friction(motors: Motors, shares: Sequence[float], more: Sequence[float
 def no_effects(arm: Arm) -> Effects:
     """An ideal transmission: elastic, and nothing else."""
     return Effects(
-        ripples=Ripples((), (), (), (), ()),
+        ripples=empty(Ripples),
         creep=False,
         backlash=(0.0,),
         slack=False,

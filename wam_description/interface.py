@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
@@ -171,17 +171,15 @@ class Interface:
 
         It does where the driver publishes it, or a node of the bring-up in answer to such a topic.
         """
-        return self._is_answer(topic, frozenset())
+        return topic in self._streamed
 
-    def _is_answer(self, topic: str, passed: frozenset[str]) -> bool:
-        """Whether a topic comes in answer to one of the driver's, not by way of those passed already."""
-        if topic in _sources():
-            return True
-        return topic not in passed and any(
-            topic in reaction.outputs and self._is_answer(reaction.trigger.topic, passed | {topic})
-            for one in self.declarations.values()
-            for reaction in one.reactions
-        )
+    @cached_property
+    def _streamed(self) -> frozenset[str]:
+        found = frozenset(_sources())
+        reactions = [reaction for one in self.declarations.values() for reaction in one.reactions]
+        for _ in reactions:  # the longest chain has all of them
+            found |= {topic for reaction in reactions if reaction.trigger.topic in found for topic in reaction.outputs}
+        return found
 
     def checks(self, declaration: Declaration) -> dict[str, Check]:
         """What each output of a node of your own goes through, by topic: see `output_check`, if another node takes it.

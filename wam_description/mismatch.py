@@ -19,10 +19,10 @@ class ModelMismatch:
     """Factors of the true plant on the configured values; without mismatch all are 1 and there is no payload."""
 
     mass: tuple[float, ...] = parameter("factor on mass and inertia of each link", low=0.1, high=10.0)
-    motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", low=0.0, high=10.0)
-    joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", low=0.0, high=10.0)
+    motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", high=10.0)
+    joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
-    payload: float = parameter("unmodelled payload at the tool, besides arm.payload", "kg", low=0.0, high=100.0)
+    payload: float = parameter("unmodelled payload at the tool, besides arm.payload", "kg", high=100.0)
     torque_constant: tuple[float, ...] = parameter("factor on the torque of each motor per current", low=0.1, high=10.0)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_description.contact_pairs import ContactPair, contact_pairs, folded
 from wam_description.effects import Effects, Ripples
-from wam_description.mjcf_objects import add_bodies, add_doors, require_names
+from wam_description.mjcf_objects import add_bodies, add_doors
 from wam_description.parameters import require, rows
 from wam_description.parts import Motors
 from wam_description.thresholds import MODEL
@@ -68,15 +68,18 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
 
 def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     motors, joints = arm.motors.names, arm.joints.names
-    for name in world.obstacles.names:
-        require(name not in arm.covers.names, f"obstacle '{name}' has the name of a cover of the arm; rename it")
+    covers, obstacles = arm.covers.names, world.obstacles.names
+    parts = {
+        "obstacle": covers,
+        "pusher": (*covers, *obstacles),
+        "object": (*covers, *arm.links.names, *motors, *joints),
+    }
+    for (what, taken), names in zip(parts.items(), (obstacles, world.pushers.names, world.objects), strict=True):
+        for name in names:
+            require(name not in taken, f"{what} '{name}' has the name of a part of the arm or an obstacle; rename it")
     for pusher in rows(world.pushers):
-        name, cover = pusher.name, pusher.cover
-        taken = (*arm.covers.names, *world.obstacles.names)
-        require(name not in taken, f"pusher '{name}' has the name of a cover or an obstacle; rename it")
-        known = ", ".join(arm.covers.names)
-        require(cover in arm.covers.names, f"pusher '{name}' presses on '{cover}'; covers: {known}")
-    require_names(world, (*arm.covers.names, *arm.links.names, *motors, *joints))
+        known = ", ".join(covers)
+        require(pusher.cover in covers, f"pusher '{pusher.name}' presses on '{pusher.cover}'; covers: {known}")
     for name in world.springs.joints:
         require(name in joints, f"world.springs.joints names '{name}'; joints: {', '.join(joints)}")
     for name in effects.ripples.shafts:

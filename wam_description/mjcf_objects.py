@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
 from wam_description.movable import BODY_SHAPES, Doors, FreeBodies, principal_inertia
-from wam_description.parameters import require
-from wam_description.world import World
 from wam_description.xml_element import add
 
 DOOR_COLOUR, BODY_COLOUR = "0.70 0.52 0.34 1", "0.36 0.56 0.72 1"
@@ -14,18 +12,6 @@ DOOR_COLOUR, BODY_COLOUR = "0.70 0.52 0.34 1", "0.36 0.56 0.72 1"
 def hinge_name(door: str) -> str:
     """Name of the joint of a door."""
     return f"{door}_hinge"
-
-
-def require_names(world: World, taken: Sequence[str]) -> None:
-    """Refuse free bodies and doors with the name of a part of the arm.
-
-    Raises
-    ------
-    ParameterError
-        which names it.
-    """
-    for name in world.objects:
-        require(name not in taken, f"object '{name}' has the name of a part of the arm; rename it")
 
 
 def add_doors(parent: Element, doors: Doors) -> None:

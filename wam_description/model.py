@@ -47,10 +47,9 @@ class MotorModel:
     stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
     load_positive: tuple[float, ...] = parameter(
         "friction k per transmitted torque, in positive motion",
-        low=0.0,
         high=0.9,
     )
-    load_negative: tuple[float, ...] = parameter("the same in negative motion", low=0.0, high=0.9)
+    load_negative: tuple[float, ...] = parameter("the same in negative motion", high=0.9)
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class JointModel:
     static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")
     stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
-    load: tuple[float, ...] = parameter("friction k per transmitted torque", low=0.0, high=0.9)
+    load: tuple[float, ...] = parameter("friction k per transmitted torque", high=0.9)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from wam_description.parameters import named, parameter, require, rows
+from wam_description.parameters import empty, named, parameter, require, rows
 
 BOX = {"box": 3}  # numbers that the size of a shape needs
 BODY_SHAPES = {**BOX, "cylinder": 2, "ball": 1}
@@ -19,7 +19,6 @@ class FreeBodies:
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; ball radius, 0, 0",
         "m",
-        low=0.0,
         high=10.0,
         width=3,
     )
@@ -29,11 +28,10 @@ class FreeBodies:
     rotations: tuple[float, ...] = parameter(
         "rotation from the base frame at power-up, roll pitch yaw of each", "rad", low=-6.3, high=6.3, width=3
     )
-    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", low=0.0, high=1e3)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
+    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no body", "kg", high=1e3)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
     ground_friction: tuple[float, ...] = parameter(
         "coefficient of friction against obstacles, doors and other bodies; of two bodies the larger one counts",
-        low=0.0,
         high=10.0,
     )
     ground_stiffness: tuple[float, ...] = parameter(
@@ -42,11 +40,9 @@ class FreeBodies:
         low=1.0,
         high=1e9,
     )
-    ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", low=0.0, high=1e6)
+    ground_damping: tuple[float, ...] = parameter("damping of each such point", "N s/m", high=1e6)
     stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
-    damping: tuple[float, ...] = parameter(
-        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6
-    )
+    damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:
         require_solids("world.bodies", self, BODY_SHAPES)
@@ -74,22 +70,19 @@ class Doors:
     sizes: tuple[float, ...] = parameter(
         "three half lengths each: along the panel from the hinge, across it, along the hinge",
         "m",
-        low=0.0,
         high=10.0,
         width=3,
     )
-    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no door", "kg", low=0.0, high=1e3)
-    hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", low=0.0, high=1e3)
-    hinge_damping: tuple[float, ...] = parameter("viscous friction of the hinge", "N m s/rad", low=0.0, high=1e4)
-    spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", low=0.0, high=1e5)
+    mass: tuple[float, ...] = parameter("mass of each, uniform; 0: no door", "kg", high=1e3)
+    hinge_friction: tuple[float, ...] = parameter("dry friction of the hinge", "N m", high=1e3)
+    hinge_damping: tuple[float, ...] = parameter("viscous friction of the hinge", "N m s/rad", high=1e4)
+    spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", high=1e5)
     rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3)
     lower: tuple[float, ...] = parameter("smallest angle", "rad", low=-6.3, high=6.3)
     upper: tuple[float, ...] = parameter("largest angle", "rad", low=-6.3, high=6.3)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
     stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
-    damping: tuple[float, ...] = parameter(
-        "damping of the surface, where a cover touches it", "N s/m", low=0.0, high=1e6
-    )
+    damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)
 
     def __post_init__(self) -> None:
         require_solids("world.doors", self)
@@ -117,8 +110,8 @@ class Motions:
     amplitude: tuple[float, ...] = parameter(
         "direction and amplitude in the base frame, x y z of each", "m", low=-10.0, high=10.0, width=3
     )
-    frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", low=0.0, high=100.0)
-    begin: tuple[float, ...] = parameter("start, since power-up", "s", low=0.0, high=1e6)
+    frequency: tuple[float, ...] = parameter("frequency; 0: no motion", "Hz", high=100.0)
+    begin: tuple[float, ...] = parameter("start, since power-up", "s", high=1e6)
 
     def __post_init__(self) -> None:
         named("world.motions", self)
@@ -169,6 +162,6 @@ def require_solids(group: str, given: Any, shapes: Mapping[str, int] = BOX) -> N
         )
 
 
-NO_BODIES = FreeBodies((), (), (), (), (), (), (), (), (), (), (), ())
-NO_DOORS = Doors((), (), (), (), (), (), (), (), (), (), (), (), (), ())
-NO_MOTIONS = Motions((), (), (), ())
+NO_BODIES = empty(FreeBodies)
+NO_DOORS = empty(Doors)
+NO_MOTIONS = empty(Motions)

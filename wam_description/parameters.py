@@ -53,6 +53,7 @@ class Field(NamedTuple):
     live: bool
     width: int
     is_common: bool
+    length: int
     derived: Callable[[Mapping[str, Any]], Value] | None
 
     @property
@@ -60,24 +61,21 @@ class Field(NamedTuple):
         """The allowed values in words, empty if every value of the type is allowed."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
-        if math.isinf(self.low) and math.isinf(self.high):
+        if self.kind in (str, bool):
             return ""
-        if math.isinf(self.high):
-            return f"at least {self.low:g}"
-        if math.isinf(self.low):
-            return f"at most {self.high:g}"
-        return f"{self.low:g} to {self.high:g}"
+        return f"at least {self.low:g}" if math.isinf(self.high) else f"{self.low:g} to {self.high:g}"
 
 
 def parameter(
     doc: str,
     unit: str = "",
-    low: float = -math.inf,
+    low: float = 0.0,
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     live: bool = False,
     width: int = 1,
     is_common: bool = False,
+    length: int = 0,
     derived: Callable[[Mapping[str, Any]], Value] | None = None,
 ) -> Any:
     """Declare a field of a parameter class.
@@ -86,24 +84,25 @@ def parameter(
     ----------
     doc : what the parameter is, one sentence.
     unit : SI unit, empty for pure numbers and names.
-    low, high : inclusive range of each number.
+    low, high : inclusive range of each number; not negative unless `low` is given.
     choices : allowed strings.
     live : True if a running node may take a new value.
     width : of a list, the number of values for each of what it runs over, see `aligned`.
     is_common : of a list, whether a single value counts for all.
+    length : of a list that runs over nothing with names, the number of its values; 0 for any.
     derived : the value where a configuration does not give one, a function of the other parameters of its section,
         see `like`.
     """
     return dataclasses.field(
         metadata={
             "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live,
-            "width": width, "is_common": is_common, "derived": derived,
+            "width": width, "is_common": is_common, "length": length, "derived": derived,
         }
     )  # fmt: skip
 
 
 def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9) -> Any:
-    """Declare numbers that a running node may change, not negative unless `low` is given; as `parameter` else."""
+    """Declare numbers that a running node may change; as `parameter` else."""
     return parameter(doc, unit, low, high, live=True)
 
 
@@ -164,13 +163,8 @@ def meant(name: str, known: Iterable[str]) -> str:
     return f"did you mean '{near[0]}'? " if near else ""
 
 
-def flatten(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """A nested mapping as a flat one with dotted names, the form that ROS uses; of a name given twice the last one."""
-    return dict(dotted(tree))
-
-
 def dotted(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of a nested mapping, each as often as it is given; an empty group is a value."""
+    """Dotted names, as ROS has them, and values of a nested mapping, each as it is given; an empty group is a value."""
     for key, value in tree.items():
         if isinstance(value, Mapping) and value:
             yield from dotted(value, f"{prefix}{key}.")
@@ -195,7 +189,7 @@ def given_once(where: str, tree: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """A flat mapping with dotted names as a nested one; the inverse of `flatten`."""
+    """A flat mapping with dotted names as a nested one; the inverse of `dotted`."""
     tree: dict[str, Any] = {}
     for name, value in flat.items():
         *groups, leaf = name.split(".")
@@ -298,6 +292,8 @@ def checked(field: Field, value: Any) -> Value:
             raise ParameterError(
                 f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}{as_number(value)}"
             )
+        if field.length and len(value) != field.length:
+            raise ParameterError(f"parameter '{field.name}' has {len(value)} values; it needs {field.length}")
         return tuple(_checked_scalar(field, element) for element in value)
     return _checked_scalar(field, value)
 
@@ -318,7 +314,7 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
     if field.kind is int and is_finite(value) and value != int(value):
         raise refuse("a whole number")
     if not is_finite(value) or not field.low <= value <= field.high:
-        raise refuse(field.allowed or "a finite number")
+        raise refuse(field.allowed)
     return field.kind(value)
 
 
@@ -369,6 +365,11 @@ def aligned(group: str, names: Sequence[Any], given: Any) -> None:
         lengths(group, names, {name: array}, declared["width"], declared["is_common"])
 
 
+def each(array: tuple[T, ...], count: int) -> tuple[T, ...]:
+    """A list with one value for each of `count`, from one that has them or a single value for all."""
+    return array * count if len(array) == 1 else array
+
+
 def named(group: str, given: Any, least: int = 0) -> None:
     """Refuse lists that are not `aligned` with the first one, and in that one too few, empty or equal names."""
     (key, names, _), *_ = _lists(given)
@@ -378,6 +379,11 @@ def named(group: str, given: Any, least: int = 0) -> None:
         f"parameter '{group}.{key}' is {', '.join(map(repr, names))}; give each a name of its own",
     )
     aligned(group, names, given)
+
+
+def empty(cls: type[T]) -> T:
+    """A parameter object of lists that run over nothing."""
+    return cls(*[()] * len(fields(cls)))
 
 
 def rows(given: Any) -> list[Any]:

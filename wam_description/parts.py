@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,13 @@ class Motors:
     names: tuple[str, ...] = parameter("motor names, as in JointState messages")
     inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9, high=1e5)
     torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6, high=100.0)
-    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", low=0.0, high=1e9)
+    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", high=1e9)
     continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6, high=1e9)
     static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", low=0.0, high=100.0
+        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", high=100.0
     )
-    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", low=0.0, high=100.0)
-    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0, high=10.0)
+    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", high=100.0)
+    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", high=10.0)
 
     def __post_init__(self) -> None:
         _check_shafts("arm.motors", self)
@@ -32,6 +33,11 @@ class Motors:
                 continuous <= peak,
                 f"{name}: arm.motors.continuous_torque {continuous:g} N m is above peak_torque {peak:g} N m",
             )
+
+    @cached_property
+    def peak_current(self) -> tuple[float, ...]:
+        """Current of each motor at its peak torque, (n,), A."""
+        return tuple(torque / k for torque, k in zip(self.peak_torque, self.torque_constant, strict=True))
 
 
 @dataclass(frozen=True)
@@ -45,17 +51,13 @@ class Joints:
     lower: tuple[float, ...] = parameter("lower stop", "rad", low=-13.0, high=13.0)
     upper: tuple[float, ...] = parameter("upper stop", "rad", low=-13.0, high=13.0)
     start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad", low=-13.0, high=13.0)
-    armature: tuple[float, ...] = parameter(
-        "inertia of the pulleys that turn with the joint", "kg m^2", low=0.0, high=1e3
-    )
+    armature: tuple[float, ...] = parameter("inertia of the pulleys that turn with the joint", "kg m^2", high=1e3)
     static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) at the joint", "N m", low=0.0, high=1e3
+        "static friction F_s (breakaway torque) at the joint", "N m", high=1e3
     )
-    dynamic_friction: tuple[float, ...] = parameter(
-        "dynamic friction F_d in motion, at the joint", "N m", low=0.0, high=1e3
-    )
-    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", low=0.0, high=1e3)
-    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0, high=100.0)
+    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion, at the joint", "N m", high=1e3)
+    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", high=1e3)
+    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", high=100.0)
 
     def __post_init__(self) -> None:
         _check_shafts("arm.joints", self)
@@ -96,7 +98,6 @@ class Links:
     inertia: tuple[float, ...] = parameter(
         "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
         "kg m^2",
-        low=0.0,
         high=100.0,
         width=3,
     )

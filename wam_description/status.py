@@ -18,14 +18,13 @@ EVENT = "event"  # beginning of the keys of an event: event.1, event.1.severity,
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")
+_TEXTS, _NUMBERS = ("mode", "fault", "step"), ("session", "since", "stamp")  # fields
 
 
 def pairs(status: NodeStatus) -> list[tuple[str, str]]:
     """The fields of a status that are not empty, then its facts, as (key, value) in text."""
-    own = {"peers": _CONNECTED[status.connected], "mode": status.mode, "fault": status.fault, "step": status.step}
-    found = [(key, value) for key, value in own.items() if value]
-    numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
-    found += [(key, str(value)) for key, value in numbers.items() if value]
+    found = [("peers", _CONNECTED[status.connected])]
+    found += [(key, str(value)) for key in (*_TEXTS, *_NUMBERS) if (value := getattr(status, key))]
     found += [(key, str(value)) for key, value in status.facts.items()]
     for number, event in enumerate(status.events, start=1):
         found += [(f"{EVENT}.{number}", event.code), (f"{EVENT}.{number}.severity", event.severity.name)]
@@ -112,20 +111,17 @@ def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]])
     """The status that these pairs describe; unknown keys become facts, an unknown level the highest."""
     facts = dict(given)
     events = _events(facts)
-    session, since, stamp = (_number(facts.pop(key, "")) for key in ("session", "since", "stamp"))
+    texts = {key: facts.pop(key, "") for key in _TEXTS}
+    numbers = {key: _number(facts.pop(key, "")) for key in _NUMBERS}
     return NodeStatus(
         level=Level(level) if level in Level._value2member_map_ else Level.ERROR,
         message=message,
         node=node,
         connected=facts.pop("peers", "") == _CONNECTED[True],
-        mode=facts.pop("mode", ""),
-        fault=facts.pop("fault", ""),
-        step=facts.pop("step", ""),
-        session=session,
-        since=since,
-        stamp=stamp,
         facts=facts,
         events=events,
+        **texts,
+        **numbers,
     )
 
 

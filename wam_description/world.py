@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from wam_description.movable import BOX, NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions, require_solids
-from wam_description.parameters import aligned, option, parameter, require, rows
+from wam_description.parameters import aligned, empty, option, parameter, require, rows
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
 NEEDED = {**SHAPES, "plane": 0}  # of these that have to be above 0
@@ -25,16 +25,15 @@ class Obstacles:
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0",
         "m",
-        low=0.0,
         high=100.0,
         width=3,
     )
     stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0, high=1e6)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
     hardening: tuple[float, ...] = parameter(
-        "h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", low=0.0, high=1e6
+        "h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", high=1e6
     )
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
 
     def __post_init__(self) -> None:
         require_solids("world.obstacles", self, NEEDED)
@@ -45,7 +44,7 @@ class Springs:
     """Springs that push on the lever of a joint, like the one under the tip of the testbed (section 5.6)."""
 
     joints: tuple[str, ...] = parameter("joint of each spring")
-    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", low=0.0, high=1e9)
+    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", high=1e9)
     lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3, high=3.0)
     rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
     bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
@@ -59,7 +58,7 @@ class Springs:
         return [spring for spring in rows(self) if spring.stiffness > 0.0]
 
 
-NO_SPRINGS = Springs((), (), (), (), ())
+NO_SPRINGS = empty(Springs)
 
 
 PUSHER_SHAPES = {"sphere": 1, **BOX}
@@ -80,20 +79,17 @@ class Pushers:
         "three numbers each: radius of a sphere, 0, 0; or half lengths of a box along the link, across "
         "it, along the force",
         "m",
-        low=0.0,
         high=10.0,
         width=3,
     )
     covers: tuple[str, ...] = parameter("cover that each presses on")
-    positions: tuple[float, ...] = parameter(
-        "position along the cover where each touches first", "m", low=0.0, high=3.0
-    )
+    positions: tuple[float, ...] = parameter("position along the cover where each touches first", "m", high=3.0)
     angles: tuple[float, ...] = parameter(
         "direction of the force about the cover, from its y to its z axis", "rad", low=-6.3, high=6.3
     )
-    force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", low=0.0, high=1e3)
-    begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", low=0.0, high=1e6)
-    end: tuple[float, ...] = parameter("time of release, since power-up", "s", low=0.0, high=1e6)
+    force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", high=1e3)
+    begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", high=1e6)
+    end: tuple[float, ...] = parameter("time of release, since power-up", "s", high=1e6)
     rise: tuple[float, ...] = parameter("time in which the force rises and falls", "s", low=1e-3, high=1e3)
     clearance: tuple[float, ...] = parameter(
         "distance from the link before and after contact", "m", low=1e-3, high=10.0
@@ -101,8 +97,8 @@ class Pushers:
     slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", low=-10.0, high=10.0)
     turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", low=-100.0, high=100.0)
     stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0, high=1e6)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0, high=10.0)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", high=1e6)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", high=10.0)
 
     def __post_init__(self) -> None:
         require_solids("world.pushers", self, PUSHER_SHAPES)
@@ -124,19 +120,18 @@ class Pushers:
 class Folding:
     """Contact between the tubes of links that follow each other, as of a folded elbow."""
 
-    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", low=0.0, high=1e9)
-    damping: float = parameter("damping", "N s/m", low=0.0, high=1e6)
-    friction: float = parameter("friction coefficient", low=0.0, high=10.0)
+    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", high=1e9)
+    damping: float = parameter("damping", "N s/m", high=1e6)
+    friction: float = parameter("friction coefficient", high=10.0)
     clearance: float = parameter(
         "length of the outer tube from the joint on that touches nothing: near it the tubes overlap",
         "m",
-        low=0.0,
         high=10.0,
     )
 
 
 NO_FOLDING = Folding(0.0, 0.0, 0.0, 0.0)
-NO_PUSHERS = Pushers((), (), (), (), (), (), (), (), (), (), (), (), (), (), (), ())
+NO_PUSHERS = empty(Pushers)
 
 
 class Solid(NamedTuple):

@@ -16,25 +16,24 @@ _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _DUMPER: Final[Any] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
+def _refusal(reason: str, at: Any) -> yaml.YAMLError:
+    """The reason with the line of a node or an event."""
+    return yaml.constructor.ConstructorError(None, None, reason, at.start_mark)
+
+
 class _Strict(_LOADER):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         if not isinstance(node, yaml.MappingNode):
-            raise yaml.constructor.ConstructorError(
-                None, None, "it is marked as a mapping and is none", node.start_mark
-            )
+            raise _refusal("it is marked as a mapping and is none", node)
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"'{key.value}' is given twice; remove one of the two", key.start_mark
-                )
+                raise _refusal(f"'{key.value}' is given twice; remove one of the two", key)
             seen.add(key.value)
         mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
         for name in mapping:
             if not isinstance(name, str):
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {name!r} is no text; write it in quotes if it is one", node.start_mark
-                )
+                raise _refusal(f"the key {name!r} is no text; write it in quotes if it is one", node)
         return mapping
 
     def construct_decimal(self, node: yaml.ScalarNode) -> float:
@@ -42,16 +41,9 @@ class _Strict(_LOADER):
         is_int = node.tag.endswith(":int")
         value: float = self.construct_yaml_int(node) if is_int else self.construct_yaml_float(node)
         if not is_finite(value) and is_int:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"a number of {len(node.value)} digits is beyond every float", node.start_mark
-            )
+            raise _refusal(f"a number of {len(node.value)} digits is beyond every float", node)
         if ":" in node.value or (is_int and OCTAL.fullmatch(node.value) and value != int(node.value)):
-            raise yaml.constructor.ConstructorError(
-                None,
-                None,
-                f"{node.value} is {value:g} in YAML; write that number, or a text in quotes",
-                node.start_mark,
-            )
+            raise _refusal(f"{node.value} is {value:g} in YAML; write that number, or a text in quotes", node)
         return value
 
 
@@ -87,10 +79,7 @@ def _require_plain(text: str) -> None:
         elif isinstance(event, yaml.CollectionEndEvent):
             within.pop()
         elif isinstance(event, yaml.AliasEvent) and event.anchor in within:
-            mark: Any = event.start_mark
-            raise yaml.composer.ComposerError(
-                None, None, f"*{event.anchor} is inside of what it refers to; write the value itself", mark
-            )
+            raise _refusal(f"*{event.anchor} is inside of what it refers to; write the value itself", event)
         if len(within) > DEEPEST:
             raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
 

@@ -41,7 +41,7 @@ class Amplifier:
         aligned("amplifier", motors.names, parameters)
         self.torque_constant = list(motors.torque_constant)
         self._true_constant = list(true_constant or motors.torque_constant)
-        self.peak = [t / k for t, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]
+        self.peak = list(motors.peak_current)
         self.continuous = [t / k for t, k in zip(motors.continuous_torque, motors.torque_constant, strict=True)]
         self._parameters = parameters
         self._is_noisy = any(parameters.current_noise)

@@ -36,11 +36,10 @@ class DriverParameters:
     friction: FrictionParameters
     amplifier: AmplifierParameters
     sensors: SensorParameters
-    seed: int = parameter("seed of the random numbers of all noise", low=0, high=2**53)
+    seed: int = parameter("seed of the random numbers of all noise", high=2**53)
     watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
     late_periods: float = parameter(
         "part of the newest 2000 periods that may be late when the brakes are released, in realtime",
-        low=0.0,
         high=1.0,
     )
     brake_torque: float = parameter(
@@ -52,10 +51,9 @@ class DriverParameters:
     cover_speed_limit: float = parameter(
         "limit of the speed of the start of a cover, where it meets the link before",
         "m/s",
-        low=0.0,
         high=100.0,
     )
-    tip_speed_limit: float = parameter("limit of the speed of the tool", "m/s", low=0.0, high=100.0)
+    tip_speed_limit: float = parameter("limit of the speed of the tool", "m/s", high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 

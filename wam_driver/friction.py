@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.parameters import option, parameter
+from wam_description.parameters import each, option, parameter
 
 
 class FrictionLaw(Protocol):
@@ -119,8 +119,7 @@ class Presliding:
 
 def each_shaft(motors: tuple[float, ...], joints: tuple[float, ...], size: int) -> list[float]:
     """Values of all motors, then of all joints, from lists that hold one value or one each."""
-    half = size // 2
-    return [*(motors if len(motors) == half else motors * half), *(joints if len(joints) == half else joints * half)]
+    return [*each(motors, size // 2), *each(joints, size // 2)]
 
 
 LAWS: dict[str, Callable[[Sequence[float], Sequence[float], "FrictionParameters"], Iterable[FrictionLaw]]] = {
@@ -161,18 +160,17 @@ class FrictionParameters:
     )
     joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9, is_common=True)
     motor_load_factor: tuple[float, ...] = parameter(
-        "friction of each motor per torque that the cables transmit to it", low=0.0, high=0.9, is_common=True
+        "friction of each motor per torque that the cables transmit to it", high=0.9, is_common=True
     )
-    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", low=0.0, high=0.9, is_common=True)
+    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", high=0.9, is_common=True)
     motor_presliding_stiffness: tuple[float, ...] = parameter(
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
-        low=0.0,
         high=1e9,
         is_common=True,
     )
     joint_presliding_stiffness: tuple[float, ...] = parameter(
-        "the same of each joint", "N m/rad", low=0.0, high=1e9, is_common=True
+        "the same of each joint", "N m/rad", high=1e9, is_common=True
     )
     warm_drop: float = option(
         "part of the dry friction of a motor that is gone when its winding is at its thermal limit, in proportion to "

@@ -10,11 +10,11 @@ class AmplifierParameters:
     """Imperfections of the amplifiers and the thermal time constant of the motors."""
 
     thermal_time: float = parameter("thermal time constant of the motors' windings", "s", low=0.1, high=1e6)
-    deadband: tuple[float, ...] = parameter("commanded current below which no current flows", "A", low=0.0, high=100.0)
-    torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", low=0.0, high=1.0)
+    deadband: tuple[float, ...] = parameter("commanded current below which no current flows", "A", high=100.0)
+    torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", high=1.0)
     ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1, high=1e4)
     current_noise: tuple[float, ...] = parameter(
-        "standard deviation of the actual current, while it is not zero", "A", low=0.0, high=100.0
+        "standard deviation of the actual current, while it is not zero", "A", high=100.0
     )
     torque_offset: tuple[float, ...] = parameter(
         "torque of each motor at a reported current of zero, by the offset of its current sensor",
@@ -33,18 +33,14 @@ class SensorParameters:
     encoder_resolution: tuple[float, ...] = parameter(
         "resolution of the motor angle; if it is not zero, the velocity is the difference over one period",
         "rad",
-        low=0.0,
         high=1.0,
     )
-    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0, high=1.0)
+    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", high=1.0)
     joint_encoder_resolution: tuple[float, ...] = parameter(
         "resolution of the joint angle, one for all or one each; the velocity as with encoder_resolution",
         "rad",
-        low=0.0,
         high=1.0,
         is_common=True,
     )
-    joint_encoder_noise: tuple[float, ...] = parameter(
-        "standard deviation of the joint angle", "rad", low=0.0, high=1.0
-    )
-    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", low=0.0, high=100.0)
+    joint_encoder_noise: tuple[float, ...] = parameter("standard deviation of the joint angle", "rad", high=1.0)
+    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", high=100.0)

@@ -44,7 +44,6 @@ class LimitWatch:
         self._map = TransmissionMap.of(arm)
         self._body = RigidBody(arm)
         motors, joints = arm.motors, arm.joints
-        self._peak = [torque / k for torque, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]
         self._middle = [0.5 * (low + high) for low, high in zip(joints.lower, joints.upper, strict=True)]
         self._half = [0.5 * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
         starts = self._body.moving
@@ -63,7 +62,7 @@ class LimitWatch:
 
     def _with_travel(self, travel: Sequence[float]) -> list[float]:
         """The limits of all quantities, with those of the travel, (n,), rad."""
-        return [*self._speeds, *travel, *self._peak, *self._strengths]
+        return [*self._speeds, *travel, *self._arm.motors.peak_current, *self._strengths]
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""

@@ -150,8 +150,9 @@ class CoverLoads:
                 depth, (radius, half, _) = -float(data.contact.dist[i]), sizes[geom].tolist()
                 if geom not in self._cover_of_geom or depth <= radius:
                     continue
-                deepest = radius + PLANT.middle * _half_thickness(self._model.geom(other))
-                if depth > deepest:
+                deepest = radius + PLANT.middle * half_lengths(self._model, other).min()
+                is_solid = self._model.geom_type[other] != mujoco.mjtGeom.mjGEOM_PLANE
+                if is_solid and depth > deepest:
                     return (
                         f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}, "
                         f"beyond whose middle the contact force would be to the other side; allowed: "
@@ -210,14 +211,15 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
 
 
-def _half_thickness(geom: Any) -> float:
-    """From the surface of a geom of MuJoCo to its middle, m."""
-    (x, y, z), kind = geom.size.tolist(), geom.type
-    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-        return math.inf
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return min(x, y, z)
-    return min(x, y) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else x  # of a sphere and a tube, the radius
+def half_lengths(model: Any, geom: int) -> np.ndarray:
+    """From the surface of a geom of MuJoCo to its middle along its axes, (3,), m; of a plane its size."""
+    x, y, z = model.geom_size[geom].tolist()
+    kind = model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return np.array((x, x, x))
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return np.array((x, x, x + y))
+    return np.array((x, x, y) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else (x, y, z))
 
 
 def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:

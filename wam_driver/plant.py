@@ -22,6 +22,7 @@ from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
+from wam_description.parameters import each
 from wam_description.signals import Load, ObjectState
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
@@ -256,7 +257,7 @@ class Plant:
             for a part that is below 0, or for another number of them; nothing is changed then.
         """
         before = self._view.plastic.copy()
-        self._friction.set_circuits(self._circuits.tighten(list(shares) if len(shares) > 1 else [*shares] * self._n))
+        self._friction.set_circuits(self._circuits.tighten(list(each(tuple(shares), self._n))))
         position, plastic = self._kept
         self._kept = position, (plastic + (self._view.plastic - before)).tolist()
         self._is_set = False

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import aligned
+from wam_description.parameters import aligned, each
 from wam_description.signals import State
 from wam_driver.imperfections import SensorParameters
 
@@ -43,9 +43,7 @@ class Sensors:
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
         aligned("sensors", arm.motors.names, parameters)
-        resolution = parameters.joint_encoder_resolution
-        if len(resolution) == 1:
-            resolution *= len(arm.joints.names)
+        resolution = each(parameters.joint_encoder_resolution, len(arm.joints.names))
         self._motors = Encoders(parameters.encoder_resolution, parameters.encoder_noise, random)
         self._joints = Encoders(resolution, parameters.joint_encoder_noise, random)
         self._strain_noise = parameters.strain_noise

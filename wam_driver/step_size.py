@@ -19,6 +19,7 @@ from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError, rows
 from wam_description.world import World
+from wam_driver.loads import half_lengths
 from wam_driver.thresholds import PLANT
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def _loosest(model: Any, data: Any, name: str) -> Array:
     jacobian, found, most = np.zeros((3, model.nv)), np.zeros(model.nv), -1.0
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
-    half = _half_lengths(model, geom)
+    half = half_lengths(model, geom)
     rotation = data.geom_xmat[geom].reshape(3, 3)
     for signs in itertools.product((-1.0, 1.0), repeat=3):
         mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[geom] + rotation @ (half * signs), body)
@@ -137,12 +138,3 @@ def _loosest(model: Any, data: Any, name: str) -> Array:
             if mobility > most:
                 found, most = reach.copy(), mobility
     return found
-
-
-def _half_lengths(model: Any, geom: int) -> Array:
-    """Half of the size of a geom along its axes, (3,), m."""
-    size: Array = np.array(model.geom_size[geom])
-    kind = int(model.geom_type[geom])
-    if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
-        return size[[0, 0, 0]]
-    return size[[0, 0, 1]] if kind == int(mujoco.mjtGeom.mjGEOM_CYLINDER) else size

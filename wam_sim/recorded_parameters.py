@@ -13,7 +13,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, like
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build_part, fields, flatten, require
+from wam_description.parameters import ParameterError, build_part, dotted, fields, require
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
@@ -132,7 +132,7 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
         if not isinstance(tree, dict):
             raise ValueError("it has no sections")
         recorded = {
-            str(name).removeprefix(f"{namespace}/"): _own(flatten(body[PARAMETERS]))
+            str(name).removeprefix(f"{namespace}/"): _own(dict(dotted(body[PARAMETERS])))
             for name, body in tree.items()
             if str(name).rpartition("/")[0] == namespace
         }

@@ -201,7 +201,7 @@ def test_obstacles_need_names_of_their_own() -> None:
     twice = {f.name: getattr(FOAM, f.name) * 2 for f in dataclasses.fields(FOAM)}
     with pytest.raises(ParameterError, match="is 'block', 'block'; give each a name of its own"):
         Obstacles(**twice)
-    with pytest.raises(ParameterError, match="'outer_link' has the name of a cover"):
+    with pytest.raises(ParameterError, match="'outer_link' has the name of a part of the arm"):
         ideal_mjcf(WAM, 5e-4, dataclasses.replace(FOAM, names=("outer_link",)))
 
 

@@ -39,7 +39,7 @@ from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_description.event import Level
-from wam_description.parameters import ParameterError, flatten
+from wam_description.parameters import ParameterError, dotted
 from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.messages import diagnostic_status, message_type, read_status
@@ -54,7 +54,7 @@ ROOT = Path(__file__).parents[2]
 
 def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: Any) -> Any:
     sections = yaml.safe_load(CONFIG.read_text())
-    shared = flatten(sections["/**"]["ros__parameters"]) | sections["/**/recorder"]["ros__parameters"]
+    shared = dict(dotted(sections["/**"]["ros__parameters"])) | sections["/**/recorder"]["ros__parameters"]
     changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
     return {**shared, **changed}
 

@@ -37,10 +37,9 @@ class ContactEstimatorParameters:
     detect: float = parameter(
         "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice "
         "this value in one",
-        low=0.0,
         high=1e6,
     )
-    release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
+    release: float = parameter("the same, below which the contact has ended", high=1e6)
 
     def __post_init__(self) -> None:
         require(

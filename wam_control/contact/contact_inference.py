@@ -8,7 +8,7 @@ moment only.
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.inference_parameters import InferenceParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, require
+from wam_description.parameters import aligned, require, rows
 from wam_description.reasons import NO_REASON, Reason
 from wam_description.rigid_body import RigidBody
 from wam_description.small_matrices import inverse
@@ -98,8 +98,8 @@ class ContactInference:
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
-        self._covers = covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
-        lengths("inference", arm.covers.names, {"weights": parameters.weights})
+        self._covers = covers = [_cover(arm, body, cover) for cover in rows(arm.covers)]
+        aligned("inference", arm.covers.names, parameters)
         start, end = ([at[0] for at in ends] for ends in zip(*((c.start, c.end) for c in covers), strict=True))
         self._fit = ContactFit(start, end, arm.covers.radius, parameters)
         # of the one joint between a cover of which a moment alone is measured and one that is located
@@ -253,10 +253,8 @@ def _cross(a: Triple, b: Triple) -> Triple:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
-    covers = arm.covers
-    name = covers.names[i]
-    start, end = np.array(covers.start[3 * i : 3 * i + 3]), np.array(covers.end[3 * i : 3 * i + 3])
+def _cover(arm: Arm, body: RigidBody, cover: Any) -> _Cover:
+    name, start, end = cover.name, np.array(cover.start), np.array(cover.end)
     require(
         end[0] > start[0],
         f"cover '{name}': end x {end[0]:g} m is not beyond start x {start[0]:g} m; x runs along the link",
@@ -277,6 +275,6 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
         end=end.tolist(),
         wrenches=np.hstack((forces, moments)),
         across=across.T.tolist(),
-        joints=arm.links.names.index(covers.links[i]) + 1,
+        joints=arm.links.names.index(cover.link) + 1,
         is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
     )

@@ -14,29 +14,26 @@ class InferenceParameters:
     )
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
-        "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
+        "sd of the distance between the line of the force and the tube's axis, per radius", high=2.0
     )
-    friction: float = parameter("sd of the friction force along a cover, per force", low=0.0, high=2.0)
-    end_weight: float = parameter("relative frequency of contacts where two links meet, on each", low=0.0, high=1e3)
+    friction: float = parameter("sd of the friction force along a cover, per force", high=2.0)
+    end_weight: float = parameter("relative frequency of contacts where two links meet, on each", high=1e3)
     along_weight: float = parameter(
         "relative frequency of forces along the last link: on its surface, and on its end",
-        low=0.0,
         high=1e3,
     )
     payload_weight: float = parameter(
         "relative frequency of a mass that is picked up at the tool; the weights of all links are 2.65, "
         "so 0.1 is one contact of 28",
-        low=0.0,
         high=1e3,
     )
     fusion_time: float = parameter(
         "time over which the torques of a contact are combined; 0: the present moment alone",
         "s",
-        low=0.0,
         high=10.0,
     )
     positions: int = parameter("contact positions tried along a link", low=9, high=200)
     identification_threshold: float = parameter(
         "probability from which the link in contact is identified", low=0.5, high=1.0
     )
-    largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0, high=1e6)
+    largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", high=1e6)

@@ -13,49 +13,37 @@ class ObserverParameters:
     detection_time: float = parameter(
         "the same of a second, faster estimate for the detection from the motors; 0: none",
         "s",
-        low=0.0,
         high=1.0,
     )
     mass_scale: tuple[float, ...] = parameter(
         "nominal mass and inertia of each link per configured one", low=0.1, high=10.0
     )
-    friction_scale: float = parameter("nominal friction per configured friction", low=0.0, high=10.0)
-    mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", low=0.0, high=1.0)
-    centre_uncertainty: float = parameter(
-        "sd of each coordinate of the centre of mass of each link", "m", low=0.0, high=1.0
-    )
+    friction_scale: float = parameter("nominal friction per configured friction", high=10.0)
+    mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", high=1.0)
+    centre_uncertainty: float = parameter("sd of each coordinate of the centre of mass of each link", "m", high=1.0)
     moving_uncertainty: float = parameter(
-        "sd of the friction of a moving shaft before any motion, per dynamic friction", low=0.0, high=10.0
+        "sd of the friction of a moving shaft before any motion, per dynamic friction", high=10.0
     )
     asymmetry_uncertainty: float = parameter(
-        "sd of the difference from that in each direction, per dynamic friction", low=0.0, high=10.0
+        "sd of the difference from that in each direction, per dynamic friction", high=10.0
     )
     load_uncertainty: float = parameter(
         "sd of the friction of a motor, and of a joint that several drive, per transmitted torque",
-        low=0.0,
         high=1.0,
     )
-    torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, per constant", low=0.0, high=1.0)
+    torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, per constant", high=1.0)
     torque_delay_uncertainty: float = parameter(
         "sd of the time by which the motors' torques are older than their angles, of all together",
         "s",
-        low=0.0,
         high=0.1,
     )
     shape_uncertainty: float = parameter(
         "sd of the friction of a shaft that has just reversed or is slow, per static friction",
-        low=0.0,
         high=10.0,
     )
-    payload_uncertainty: float = parameter(
-        "sd of the mass at the tool where no payload is declared", "kg", low=0.0, high=50.0
-    )
-    drift: float = parameter(
-        "change of these errors of the model within a second, per standard deviation", low=0.0, high=10.0
-    )
-    rest_uncertainty: float = parameter(
-        "sd of the friction of a shaft at rest, per static friction", low=0.0, high=10.0
-    )
+    payload_uncertainty: float = parameter("sd of the mass at the tool where no payload is declared", "kg", high=50.0)
+    drift: float = parameter("change of these errors of the model within a second, per standard deviation", high=10.0)
+    rest_uncertainty: float = parameter("sd of the friction of a shaft at rest, per static friction", high=10.0)
     motor_rest_velocity: float = parameter(
         "motor speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
     )
@@ -66,16 +54,13 @@ class ObserverParameters:
         "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
     )
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
-    motor_torque_fraction: float = parameter("sd of the motor torques per torque", low=0.0, high=1.0)
+    motor_torque_fraction: float = parameter("sd of the motor torques per torque", high=1.0)
     motor_noise: float = parameter(
         "sd of a moving motor's torque at the start, per dynamic friction; then it is followed",
-        low=0.0,
         high=10.0,
     )
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)
-    payload: tuple[float, ...] = parameter(
-        "smallest and largest mass that the tool may carry", "kg", low=0.0, high=50.0
-    )
+    payload: tuple[float, ...] = parameter("smallest and largest mass that the tool may carry", "kg", high=50.0)
 
     def __post_init__(self) -> None:
         low, high = self.payload if len(self.payload) == 2 else (1.0, 0.0)

@@ -12,7 +12,17 @@ from wam_control.force.contact_place import torque_of_position
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.task.motion import FASTEST, GoalMotion, LineMotion, PostureMotion
 from wam_control.task.scenario_settings import NONE, Setting, checked_settings, require_settings, settings_of
-from wam_control.task.scenario_values import is_one_of, known, number, numbers, plain, require_list, require_made
+from wam_control.task.scenario_values import (
+    frame,
+    is_one_of,
+    known,
+    number,
+    numbers,
+    plain,
+    require_list,
+    require_made,
+    triple,
+)
 from wam_control.task.task_text import as_of_file, require_task, task_of_text, torque_task
 from wam_control.thresholds import MOTION
 from wam_description import yaml_text
@@ -363,10 +373,7 @@ def _require_motions(
     A force, a task or a detected contact leaves the arm wherever it is.
     """
     for step in steps:
-        for setting in step.settings:
-            if (setting.node, setting.name) == (FORCE_LOOP, FOLLOWED):
-                assert isinstance(setting.value, (int, float))
-                followed = setting.value
+        followed = _set_to(step, FOLLOWED, followed)
         try:
             motion = motion_of(step, start, shared, followed) if start else None
         except ParameterError as error:
@@ -477,13 +484,18 @@ def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: C
     _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))
 
 
+def _set_to(step: ScenarioStep, name: str, before: float) -> float:
+    """The number of a parameter of the force loop that a step sets, the one before where it sets none."""
+    found = [setting.value for setting in step.settings if (setting.node, setting.name) == (FORCE_LOOP, name)]
+    value = found[-1] if found else before
+    assert isinstance(value, (int, float))
+    return value
+
+
 def _require_forces(where: str, steps: Sequence[ScenarioStep], limit: float) -> None:
     """Refuse forces that the force loop would refuse in each pose; `limit` is its largest force, N, at the start."""
     for step in steps:
-        for setting in step.settings:
-            if (setting.node, setting.name) == (FORCE_LOOP, LARGEST_FORCE):
-                assert isinstance(setting.value, (int, float))
-                limit = setting.value
+        limit = _set_to(step, LARGEST_FORCE, limit)
         largest = math.hypot(*step.force.force) + (abs(step.chirp.newtons) if step.chirp else 0.0)
         require(
             largest <= limit,
@@ -511,7 +523,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
         settings=tuple(settings_of(where, body["set"])) if "set" in body else (),
         task=_task(where, body, arm),
         trajectory=_trajectory(where, body["trajectory"]) if "trajectory" in body else None,
-        tip=_tip(where, body["tip"]) if "tip" in body else None,
+        tip=triple(where, "tip", body["tip"]) if "tip" in body else None,
         rise=body.get("force", {}).get("rise", 0.0),
     )
     return _checked(where, step, shared)
@@ -545,7 +557,7 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
     until = number(where, "until_force", step.until_force)
     require(until >= 0.0, f"{where}: until_force is {until:g}; it must be 0 (no contact expected) or above")
-    _frame(where, step.force.frame, arm)
+    frame(where, step.force.frame, arm)
     for key, values in (("newtons", step.force.force), ("torque", step.force.torque)):
         numbers(where, key, values, 3)
     if step.chirp is not None:
@@ -553,7 +565,7 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
         require(any(step.force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
     require_list(where, "posture", step.posture, "joint angles")
     if step.tip is not None:
-        _tip(where, step.tip)
+        triple(where, "tip", step.tip)
     moves = [key for key, given in zip(MOTIONS, (step.posture, step.trajectory, step.tip), strict=True) if given]
     forces = ["force"] * (step.force != NO_FORCE)
     if step.task is not None:
@@ -597,11 +609,6 @@ def _trajectory(where: str, body: Any) -> PosturePath:
     return PosturePath(tuple(PathPoint(one, (), time) for one, time in zip(postures, times, strict=True)))
 
 
-def _tip(where: str, body: Any) -> Triple:
-    x, y, z = numbers(where, "tip", body, 3)
-    return x, y, z
-
-
 def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
     if "torque" in body:
         return torque_task(where, body["torque"], arm)
@@ -615,29 +622,22 @@ def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
         require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
 
 
-def _frame(where: str, frame: Any, arm: Arm) -> str:
-    frames = (BASE, *arm.covers.names)
-    require(is_one_of(frame, frames), f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
-    return str(frame)
-
-
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     known(where + ", force", body, ("frame", "newtons", "contact_position", "rise"), ("frame", "newtons"))
-    frame = _frame(where, body["frame"], arm)
-    x, y, z = numbers(where, "newtons", body["newtons"], 3)
+    link, newtons = frame(where, body["frame"], arm), triple(where, "newtons", body["newtons"])
     if "contact_position" not in body:
-        return ForceCommand(frame, (x, y, z))
+        return ForceCommand(link, newtons)
     place = number(where, "contact_position", body["contact_position"])
     require(
-        frame != BASE and any((y, z)),
+        link != BASE and any(newtons[1:]),
         f"{where}: contact_position is given; it needs the frame of a link and a force across it",
     )
-    length = arm.covers.length_of(frame)
+    length = arm.covers.length_of(link)
     require(
         0.0 < place <= length,
-        f"{where}: contact_position is {place:g} m; allowed: above 0, up to {length:g} m of {frame}",
+        f"{where}: contact_position is {place:g} m; allowed: above 0, up to {length:g} m of {link}",
     )
-    return ForceCommand(frame, (x, y, z), torque_of_position((x, y, z), place))
+    return ForceCommand(link, newtons, torque_of_position(newtons, place))
 
 
 def _chirp(where: str, body: Any) -> Chirp:
@@ -658,7 +658,8 @@ def _require_chirp(where: str, chirp: Chirp) -> None:
 def _push(where: str, body: Any, seconds: Any) -> Push:
     needed = ("cover", "contact_position", "newtons")
     known(where + ", push", body, (*needed, "begin", "end"), needed)
-    return Push(*(body[key] for key in needed), body.get("begin", 0.0), body.get("end", seconds))
+    cover, place, newtons = (body[key] for key in needed)
+    return Push(cover, place, newtons, body.get("begin", 0.0), body.get("end", seconds))
 
 
 def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> None:

@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
 
+from wam_description.arm import Arm
 from wam_description.number_text import as_number
 from wam_description.parameters import ParameterError, is_finite, require
+from wam_description.signals import BASE, Triple
 
 
 def known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:
@@ -31,6 +33,19 @@ def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
     require_list(where, key, value, f"{length} numbers")
     require(len(value) == length, f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
     return tuple(number(where, key, element) for element in value)
+
+
+def triple(where: str, key: str, value: Any) -> Triple:
+    """A list of three finite numbers."""
+    x, y, z = numbers(where, key, value, 3)
+    return x, y, z
+
+
+def frame(where: str, value: Any, arm: Arm, more: str = "") -> str:
+    """The name of a frame in which the world is pressed."""
+    frames = (BASE, *arm.covers.names)
+    require(is_one_of(value, frames), f"{where}: frame is {value!r}; allowed: {', '.join(frames)}{more}")
+    return str(value)
 
 
 def plain(value: Any) -> Any:

@@ -14,13 +14,13 @@ One task as an example::
         - {line: outer_link, point: [0.4, 0, -0.2], along: [0, 1, 0], hold: [start_up, end_up]}
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 import pinocchio as pin
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
-from wam_control.task.scenario_values import is_one_of, known, number, numbers, plain, require_list
+from wam_control.task.scenario_values import frame, is_one_of, known, number, numbers, plain, require_list, triple
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require
 from wam_description.signals import BASE, Triple
@@ -45,15 +45,15 @@ def task_of_text(where: str, body: Any, arm: Arm) -> TaskCommand:
         names the step, the axis and the value that is not allowed.
     """
     known(f"{where}, task", body, ("frame", "axes"), ("axes",))
-    frame, rotation = _frame(where, body.get("frame", BASE), arm)
+    own, rotation = _frame(where, body.get("frame", BASE), arm)
     axes = body["axes"]
     require(isinstance(axes, list) and len(axes) > 0, f"{where}: axes of the task is {axes!r}; give a list of them")
     found: list[TaskAxis] = []
     for i, one in enumerate(axes):
         place = f"{where}, axis {i + 1}"
         require(isinstance(one, Mapping), f"{place} is {one!r}; it must be a mapping")
-        found += _line(place, one, frame, arm) if "line" in one else [_axis(place, one, rotation, arm)]
-    return checked_task(TaskCommand(frame, tuple(found)), where)
+        found += _line(place, one, own, arm) if "line" in one else [_axis(place, one, rotation, arm)]
+    return checked_task(TaskCommand(own, tuple(found)), where)
 
 
 def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
@@ -66,7 +66,7 @@ def require_task(where: str, task: TaskCommand, arm: Arm) -> None:
     """
     require(isinstance(task, TaskCommand), f"{where}: task is {task!r}; give a TaskCommand")
     require_list(where, "axes of the task", task.axes, "TaskAxis")
-    require(is_one_of(task.frame, (BASE, *arm.covers.names)), _no_frame(where, task.frame, arm))
+    frame(where, task.frame, arm)
     require(len(task.axes) > 0, f"{where}: the task has no axes; give at least one, or no task")
     for i, axis in enumerate(task.axes):
         _require_axis(f"{where}, axis {i + 1}", axis, arm)
@@ -107,10 +107,6 @@ def _require_axis(where: str, axis: TaskAxis, arm: Arm) -> None:
     checked(where, axis, arm)
 
 
-def _no_frame(where: str, given: Any, arm: Arm) -> str:
-    return f"{where}: frame is {given!r}; allowed: {', '.join((BASE, *arm.covers.names))}"
-
-
 def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
     """Frame of the table, and the rotation into it from the frame in which the axes are written."""
     angles: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -118,20 +114,19 @@ def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
         known(f"{where}, frame", given, ("of", "rpy"), ("of", "rpy"))
         angles = numbers(where, "rpy", given["rpy"], 3)
         given = given["of"]
-    require(given in (BASE, *arm.covers.names), f"{_no_frame(where, given, arm)}, or of one of them with rpy")
-    return given, pin.rpy.rpyToMatrix(*angles)
+    return frame(where, given, arm, ", or of one of them with rpy"), pin.rpy.rpyToMatrix(*angles)
 
 
-def _line(where: str, body: Mapping[str, Any], frame: str, arm: Arm) -> list[TaskAxis]:
+def _line(where: str, body: Mapping[str, Any], own: str, arm: Arm) -> list[TaskAxis]:
     known(where, body, ("line", "point", "along", "hold"), ("line", "point", "along"))
-    require(frame == BASE, f"{where}: a line is given in the base frame; the task is in that of {frame}")
+    require(own == BASE, f"{where}: a line is given in the base frame; the task is in that of {own}")
     cover = _cover(where, body["line"], arm)
     held = body.get("hold", list(PARTS))
     require(
         isinstance(held, list) and len(held) > 0 and all(part in PARTS for part in held),
         f"{where}: hold is {held!r}; allowed: a list of {', '.join(PARTS)}",
     )
-    point, along = _triple(where, "point", body["point"]), _direction(where, body["along"])
+    point, along = triple(where, "point", body["point"]), _direction(where, body["along"])
     return [axis for part, axis in zip(PARTS, line_axes(arm, cover, point, along), strict=True) if part in held]
 
 
@@ -167,12 +162,6 @@ def _cover(where: str, name: Any, arm: Arm) -> str:
 
 
 def _direction(where: str, body: Any) -> Triple:
-    direction = _triple(where, "along", body)
+    direction = triple(where, "along", body)
     require(any(direction), f"{where}: along is {body!r}; give a direction that is not zero")
     return unit(direction)
-
-
-def _triple(where: str, key: str, body: Any) -> Triple:
-    values: Sequence[float] = numbers(where, key, body, 3)
-    x, y, z = values
-    return x, y, z

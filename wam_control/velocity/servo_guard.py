@@ -17,7 +17,7 @@ from wam_control.force.sampled_loop import Feedback, SampledLoop
 from wam_control.force.stability_guard import rounded_down, rounded_up
 from wam_control.thresholds import VELOCITY
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.parameters import ParameterError, lengths, parameter, require
+from wam_description.parameters import ParameterError, aligned, parameter, require
 from wam_description.transmission_map import TransmissionMap
 from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
@@ -39,7 +39,6 @@ class ServoGuardParameters:
     )
     extra_delay: int = parameter(
         "inner periods of extra delay of a current in realtime, with which the gains have to be stable",
-        low=0,
         high=10,
     )
     velocity_by_difference: bool = parameter(
@@ -76,7 +75,7 @@ class ServoGuard:
         ParameterError
             names the gains, their limit and the smallest or largest that would be taken.
         """
-        lengths("servo", self._arm.motors.names, vars(servo))
+        aligned("servo", self._arm.motors.names, servo)
         if self._parameters.mode == "off":
             return
         self._require_holding(servo)

@@ -22,7 +22,6 @@ class TorqueLoopParameters:
 
     gain: tuple[float, ...] = parameter(
         "torque of each motor per error of its torque, by the strain gauges; friction F leaves F/(1 + gain)",
-        low=0.0,
         high=100.0,
     )
 

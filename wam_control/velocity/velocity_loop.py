@@ -9,7 +9,7 @@ from wam_control.thresholds import VELOCITY
 from wam_control.velocity.dither import DitherParameters
 from wam_control.velocity.servo_guard import ServoGuardParameters
 from wam_description.arm import Servo
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import aligned, parameter
 from wam_description.parts import Motors
 from wam_description.wiring import Input, reaction
 
@@ -53,7 +53,7 @@ class VelocityLoop:
         ParameterError
             where there is not one of each gain per motor; the gains in use stay.
         """
-        lengths("servo", self._motors.names, vars(servo))
+        aligned("servo", self._motors.names, servo)
         self._kp, self._ki = servo.proportional_gain, servo.integral_gain
         self._acceleration, self._torque_rate = parameters.acceleration_limit, parameters.torque_rate_limit
 
