@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from wam_description.event import Code, Event, Level, Value, refused
 from wam_description.signals import NodeStatus
@@ -111,8 +112,8 @@ def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]])
     """The status that these pairs describe; unknown keys become facts, an unknown level the highest."""
     facts = dict(given)
     events = _events(facts)
-    texts = {key: facts.pop(key, "") for key in _TEXTS}
-    numbers = {key: _number(facts.pop(key, "")) for key in _NUMBERS}
+    own: dict[str, Any] = {key: facts.pop(key, "") for key in _TEXTS}
+    own |= {key: _number(facts.pop(key, "")) for key in _NUMBERS}
     return NodeStatus(
         level=Level(level) if level in Level._value2member_map_ else Level.ERROR,
         message=message,
@@ -120,8 +121,7 @@ def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]])
         connected=facts.pop("peers", "") == _CONNECTED[True],
         facts=facts,
         events=events,
-        **texts,
-        **numbers,
+        **own,
     )
 
 
