@@ -75,15 +75,14 @@ class DriverSample(NamedTuple):
 def _require_springs(arm: Arm, world: World) -> None:
     """Refuse a spring on a link without a cover, or beyond the ends of it: no message could give its force."""
     links = dict(zip(arm.joints.names, arm.links.names, strict=True))
-    covers = {cover.link: cover for cover in reversed(rows(arm.covers))}
-    covered = [name for name, link in links.items() if link in covers]
+    covered = [name for name, link in links.items() if link in arm.covers.links]
     for spring in world.springs.present:
         require(
             spring.joint in covered,
             f"world.springs acts on {spring.joint}, whose link {links[spring.joint]} has no cover, so that sim/contact "
             f"could not contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
         )
-        cover = covers[links[spring.joint]]
+        cover = next(one for one in rows(arm.covers) if one.link == links[spring.joint])
         place = float(rotation_xyz(*cover.rotation)[:, 0] @ (np.array([spring.lever, 0.0, 0.0]) - cover.origin))
         require(
             -DRIVER.rounding <= place <= cover.length + DRIVER.rounding,

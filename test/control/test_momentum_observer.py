@@ -129,11 +129,13 @@ def test_torques_that_come_late_are_no_external_ones() -> None:
             plant.step(motor, NONE)
             late.append(motor)
             assert observer.observe(State(*plant.motors(late[max(0, k - 2)])), DT)
+            if k % 5:
+                continue
             rows.append(observer.torques()[0])
             if k == 300:
                 sds[name] = np.sqrt(observer.torques()[1].diagonal())
             observer.follow(0.0, False)
-        worst[name] = np.abs(rows[2000:]).max(axis=0)
+        worst[name] = np.abs(rows[400:]).max(axis=0)
         if sd:
             assert observer.model_errors["delay of the torques"].value == pytest.approx(2e-3, rel=0.2)
     assert np.all(worst["with"] < 0.5 * worst["without"])

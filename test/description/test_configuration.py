@@ -119,11 +119,8 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("a: [1,", "is not YAML"),
         ("? [a]\n: 1", "is not YAML"),
         ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
-        ("/**: 2001-99-99", "is not YAML: one of its values does not fit its tag, or is no date: month must"),
-        ("/**: !!timestamp x", "is not YAML: one of its values does not fit its tag"),
         ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
         ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
-        ("/**:\n  ros__parameters:\n    a: &a {b: [*a]}", r"is not YAML: \*a is inside of what it refers to"),
         ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
         (
             "/**:\n  ros__parameters:\n    a: {b: {}, c: 1}",
@@ -154,24 +151,11 @@ def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: 
         Configuration.load(path)
 
 
-def test_a_replaced_value_is_not_blamed_on_the_file() -> None:
-    loaded = Configuration.load(packaged("wam"))
-    with pytest.raises(
-        ParameterError, match=r"^an option or a replaced value in place of that in .*wam\.yaml, section"
-    ):
-        loaded.with_values({"timing.real_time_factor": -3.0}).shared  # noqa: B018 - it is built here
-
-
 def test_a_value_of_the_file_is_blamed_on_it(tmp_path: Path) -> None:
     path = tmp_path / "odd.yaml"
     path.write_text("base: wam\n/**: {ros__parameters: {timing: {real_time_factor: -3.0}}}\n")
     with pytest.raises(ParameterError, match=rf"^{path}, section"):
         Configuration.load(path).with_values({"timing.timeout": 3.0}).shared  # noqa: B018 - it is built here
-
-
-def test_missing_file_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"none\.yaml is not a file"):
-        Configuration.load(tmp_path / "none.yaml")
 
 
 def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) -> None:
@@ -187,6 +171,8 @@ def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) ->
 
 def test_unknown_packaged_configuration_is_refused_with_those_that_exist() -> None:
     assert packaged("wam").name == "wam.yaml"
+    with pytest.raises(ParameterError, match=r"none\.yaml is not a file"):
+        Configuration.load("none.yaml")
     with pytest.raises(ParameterError, match=r"no configuration 'wum' comes with wam_stack; there are: .*wam"):
         packaged("wum")
 
@@ -221,12 +207,6 @@ def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str
         check=True,
     )
     assert Path(found.stdout.strip()) == share / "wam.yaml"
-
-
-def test_every_packaged_configuration_is_plain_yaml_with_a_shared_part() -> None:
-    for path in packaged("wam").parent.glob("*.yaml"):
-        if "/**" in (yaml.safe_load(path.read_text()) or {}):
-            assert Configuration.load(path).shared.arm.motors.names
 
 
 def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
@@ -277,26 +257,11 @@ def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path
         Simulation(found, [])
 
 
-def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "deep.yaml").write_text("{" * 3_000)
-    with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: it is nested more than 50 levels deep$"):
-        Configuration.load(tmp_path / "deep.yaml")
-
-
 def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_path: Path) -> None:
     for k in range(100):
         (tmp_path / f"{k}.yaml").write_text(f"base: {k + 1}.yaml\n")
     with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; put some"):
         Configuration.load(tmp_path / "0.yaml")
-
-
-@pytest.mark.parametrize(("divisor", "age"), [(36, 0.035), (5, 0.004)])
-def test_an_outer_period_after_which_every_input_is_absent_is_refused(divisor: int, age: float) -> None:
-    """It braked in the first period with the advice to list a node that runs."""
-    values = {"timing.outer_divisor": divisor, "ages.feedback": age}
-    with pytest.raises(ParameterError, match=f"ages.feedback is {age} s, less than an outer period, 0.0"):
-        WAM.with_values(values).shared  # noqa: B018 - refuses
-    assert WAM.with_values({**values, "ages.feedback": divisor * 1e-3}).shared.ages.feedback == divisor * 1e-3
 
 
 def test_a_section_may_be_empty(tmp_path: Path) -> None:
@@ -306,24 +271,15 @@ def test_a_section_may_be_empty(tmp_path: Path) -> None:
     assert Configuration.load(path).sections == WAM.sections
 
 
-@pytest.mark.parametrize("factor", [1e-300, 9e-4])
-def test_a_real_time_factor_at_which_nothing_seems_to_move_is_refused(factor: float) -> None:
-    """The driver ended with a traceback of rclpy, whose timers count nanoseconds."""
-    with pytest.raises(ParameterError, match=r"timing.real_time_factor is .*; allowed: 0.001 to 100, or 0 for as fast"):
-        _ = WAM.with_values({"timing.real_time_factor": factor}).shared
-    assert WAM.with_values({"timing.real_time_factor": 0.001}).shared.timing.real_time_factor == 0.001
-
-
-@pytest.mark.slow
-def test_a_configuration_without_nodes_is_refused() -> None:
-    empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
-    with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):
-        empty.shared  # noqa: B018
+IN_PLACE = f"an option or a replaced value in place of that in {WAM.path}, section '/**': "
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
+        ({"nodes": []}, f"{IN_PLACE}parameter 'nodes' is empty; list the nodes to start, for example"),
+        ({"timing.real_time_factor": 9e-4}, "timing.real_time_factor is 0.0009; allowed: 0.001 to 100, or 0 for"),
+        ({"timing.outer_divisor": 36, "ages.feedback": 0.035}, "ages.feedback is 0.035 s, less than an outer period"),
         ({"arm.tool": [0.3, 0.0, 0.0]}, "by arm.covers.length it ends at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
         ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
@@ -331,16 +287,17 @@ def test_a_configuration_without_nodes_is_refused() -> None:
         ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "by arm.joints.offset of joint3, at (0, 0, -0.7)"),
     ],
 )
-def test_a_link_whose_numbers_do_not_meet_is_refused_with_the_others_to_change(
-    values: dict[str, list[float]], message: str
+def test_values_that_do_not_fit_each_other_are_refused_with_the_others_to_change(
+    values: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ParameterError) as refused:
         _ = WAM.with_values(values).shared
     assert message in str(refused.value)
-    assert "a longer " in str(refused.value)
+    assert ("a longer " in str(refused.value)) == next(iter(values)).startswith("arm.")
 
 
-def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:
+def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:
+    assert WAM.with_values({"timing.real_time_factor": 0.001, "ages.feedback": 0.005}).shared.ages.feedback == 0.005
     longer = {"arm.covers.length": [0.5588, 0.5], "arm.covers.end": [0.5588, 0.0, 0.04064, 0.5, 0.0, 0.0]}
     assert WAM.with_values({**longer, "arm.tool": [0.6, 0.0, 0.0]}).shared.arm.covers.length == (0.5588, 0.5)
 

@@ -16,11 +16,6 @@ def in_mode(mode: Mode) -> Safety:
     return safety
 
 
-def test_starts_braked_without_a_fault() -> None:
-    assert Safety().mode is Mode.BRAKED
-    assert not Safety().fault
-
-
 @pytest.mark.parametrize(
     ("mode", "request_name", "after", "success"),
     [
@@ -61,23 +56,9 @@ def test_first_fault_is_kept_until_reset() -> None:
     assert safety.fault == "third"
 
 
-def test_enable_with_a_latched_fault_says_what_to_do() -> None:
-    answer = in_mode(Mode.FAULT).enable("")
-    assert not answer.success
-    assert "'first'" in answer.message
-    assert "reset_fault first, then enable" in answer.message
-
-
 def test_enable_is_refused_while_something_speaks_against_it() -> None:
     safety = Safety()
     answer = safety.enable("two publishers; stop one")
     assert (answer.success, answer.message) == (False, "refused: two publishers; stop one")
     assert safety.mode is Mode.BRAKED
     assert safety.enable("").success
-
-
-def test_reset_never_enables() -> None:
-    safety = in_mode(Mode.ENABLED)
-    safety.trip(fault("test", reason="while enabled"))
-    assert "call enable" in safety.reset_fault().message
-    assert safety.mode is Mode.BRAKED
