@@ -14,7 +14,6 @@ from wam_description.signals import BASE, Answer, Point, State, Wrench
 from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.driver import Driver
 from wam_driver.lockstep import Lockstep
-from wam_driver.pacer import Pacer
 from wam_driver.realtime import Realtime
 from wam_driver.thresholds import DRIVER
 from wam_ros.long_steps import STEPS
@@ -46,13 +45,11 @@ class DriverNode(ArmDriver):
             self.time = Lockstep(
                 self.driver,
                 timing,
-                self._senders(),
-                interface.unanswered,
+                interface,
                 self.session,
                 self._publish,
                 self.announce,
                 self.trip,
-                Pacer(timing.real_time_factor, time.perf_counter),
                 time.perf_counter,
             )
             self.create_timer(DRIVER.watch, self._watch_lockstep, clock=steady)
@@ -76,11 +73,6 @@ class DriverNode(ArmDriver):
         self.create_timer(timing.period, self.time.tick, clock=steady)
         self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
         self.time.start()
-
-    def _senders(self) -> dict[str, str]:
-        """Who answers the state of a period in lockstep, by topic."""
-        topics = ["motor_current_command", *(["sim/disturbance"] if "scenario" in self.shared.nodes else [])]
-        return {topic: " and ".join(self.interface.publishers(topic)) or "its publisher" for topic in topics}
 
     def destroy_node(self) -> None:
         """Put on the brakes and report it."""

@@ -1,9 +1,10 @@
 """The arm's time in lockstep: a period passes when the present state has been answered and the next one is due."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from wam_description.arm import Timing
 from wam_description.event import Event, fault
+from wam_description.interface import Interface
 from wam_description.signals import Answer
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
 from wam_driver.driver import Driver
@@ -31,37 +32,38 @@ class Lockstep:
     ----------
     driver : to be advanced.
     timing : periods, pace and time-out.
-    senders : by topic that a state is answered with, the node that sends it; `sim/disturbance` in outer periods only.
-    unanswered : the nodes that are the reason why topics do not come, as `Interface.unanswered`.
+    interface : of the bring-up, whose nodes answer each state; a scenario answers those of outer periods.
     session : that the nodes follow.
     publish : called after each period, to publish the new state.
     announce : called to publish the session.
     stop : called with the reason, to stop the arm.
-    pacer : determines when a period is due; also measures.
     now : steady clock, s.
+
+    Attributes
+    ----------
+    pacer : determines when a period is due; also measures.
     """
 
     def __init__(
         self,
         driver: Driver,
         timing: Timing,
-        senders: Mapping[str, str],
-        unanswered: Callable[[Collection[str], Mapping[str, Collection[str]]], Mapping[str, Sequence[str]]],
+        interface: Interface,
         session: Session,
         publish: Callable[[], None],
         announce: Callable[[], None],
         stop: Callable[[Event], None],
-        pacer: Pacer,
         now: Callable[[], float],
     ) -> None:
-        self._driver, self._timing, self._senders = driver, timing, senders
-        self._unanswered = unanswered
+        self._driver, self._timing, self._interface = driver, timing, interface
+        self._is_played = "scenario" in interface.names
+        topics = ["motor_current_command", *["sim/disturbance"] * self._is_played]
+        self._senders = {topic: " and ".join(interface.publishers(topic)) or "its publisher" for topic in topics}
         self._session, self._announce = session, announce
         self._publish, self._stop, self._now = publish, stop, now
-        self.pacer = pacer
+        self.pacer = Pacer(timing.real_time_factor, now)
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
-        self._is_played = "sim/disturbance" in senders
         self._started = self.is_paused = False
         self._patience = timing.timeout
         self._roll_call = timing.timeout - min(DRIVER.roll_call, 0.5 * timing.timeout)
@@ -137,7 +139,7 @@ class Lockstep:
         """The node that is the reason, and what to do about it."""
         if silent := ", ".join(self._session.silent):
             return f"{silent} has stopped or is very slow, start it again"
-        found = self._unanswered(missing, self._session.awaited)
+        found = self._interface.unanswered(missing, self._session.awaited)
         if not found or found.keys() - self._session.awaited.keys():
             return f"check that {' and '.join(self._senders[topic] for topic in missing)} runs"
         return unpublished(found)

@@ -299,7 +299,10 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
         ({**WHOLE, "posture": 0.4}, "posture is 0.4; it must be a list of 4 numbers"),
         ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
-        ({**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]}, "posture of joint2 is -9 rad; allowed: -2.35619 to 2.35619 rad"),
+        (
+            {**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]},
+            "posture: joint2 is to be at -9 rad; allowed: -2.356 to",
+        ),
         ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
         ({**WHOLE, "until_force": math.inf}, "until_force is inf; it must be a finite number"),
         ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable"),

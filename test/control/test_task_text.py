@@ -90,7 +90,7 @@ def test_a_torque_is_a_force_of_each_joint(tmp_path: Path) -> None:
             {"tip": [0.5, 0.0, 0.0], "task": {"axes": [{"position": 0, "joint": f"joint{k}"} for k in (1, 2, 3, 4)]}},
             "tip and task are given; the task leaves no joint free to move; give one of them, or a task with fewer",
         ),
-        ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture of joint1 is 9 rad"),
+        ({"trajectory": {"postures": [[9.0, 0.0, 0.0, 0.0]]}}, "posture: joint1 is to be at 9 rad"),
         ({"trajectory": {"postures": [START], "times": [1.0, 2.0]}}, "times is"),
     ],
 )

@@ -114,18 +114,14 @@ class Bench:
         self.sent.append(self.driver.stamp)
 
     def lockstep(self) -> Lockstep:
-        senders = {"motor_current_command": "velocity_loop"}
-        pacer = Pacer(self.timing.real_time_factor, self.clock)
         found = Lockstep(
             self.driver,
             self.timing,
-            senders,
-            Interface(CONFIGURATION.shared).unanswered,
+            Interface(CONFIGURATION.shared),
             self.session,
             self.publish,
             self.call_the_roll,
             self.driver.fault,
-            pacer,
             self.clock,
         )
         found.start()

@@ -117,7 +117,7 @@ class CommandAdmission:
             force = None
         self._torque.step(torque, "joint_torque_command" in refusals, own.torque_limit, dt)
         if posture is not None and (beyond := self._joints.beyond(posture)):
-            refusals["joint_posture_command"] = beyond
+            refusals["joint_posture_command"] = f"{beyond}; the last good posture remains in use"
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
         self._add_without_effect(refusals, own.mode, q, force, posture, torque, task)
         posture = None if self._is_ignored else posture

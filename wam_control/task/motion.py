@@ -204,12 +204,8 @@ class PostureMotion:
         require(not any(first.velocity), "the trajectory starts with a velocity; allowed: 0 rad/s, the arm is at rest")
 
     def _require_inside(self, posture: Sequence[float]) -> None:
-        joints = self._joints
-        for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
-            require(
-                low <= angle <= high,
-                f"{name} of the trajectory is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad",
-            )
+        beyond = self._joints.beyond(posture)
+        require(not beyond, f"the trajectory: {beyond}")
 
     def _require_within(self, order: int, sizes: Sequence[float]) -> None:
         """Refuse a derivative, of this order and size (n,), that is beyond the limits."""
@@ -313,14 +309,10 @@ class LineMotion:
 
     def _slope(self, arm: Arm, body: RigidBody, along: Array, distance: float) -> Array:
         """Joint velocity per speed of the tool (n,), rad/m, at the last node."""
-        q, joints = self._angles[-1], arm.joints
+        q = self._angles[-1]
         where = f"at {distance:.3g} m of the line of {self._length:.3g} m"
-        for name, low, angle, high in zip(joints.names, joints.lower, q, joints.upper, strict=True):
-            require(
-                low <= angle <= high,
-                f"{where} {name} would be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad: start in another "
-                "posture, or go another way",
-            )
+        beyond = arm.joints.beyond(q.tolist())
+        require(not beyond, f"{where} {beyond}: start in another posture, or go another way")
         result: Array = np.linalg.pinv(body.tool_jacobian(q)) @ along
         steepest = float(np.abs(result).max())
         require(

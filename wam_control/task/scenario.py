@@ -616,10 +616,8 @@ def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
 
 
 def _require_posture(where: str, given: Sequence[float], arm: Arm) -> None:
-    joints = arm.joints
-    posture = numbers(where, "posture", given, len(joints.names))
-    for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
-        require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
+    beyond = arm.joints.beyond(numbers(where, "posture", given, len(arm.joints.names)))
+    require(not beyond, f"{where}: posture: {beyond}")
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
