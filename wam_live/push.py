@@ -33,8 +33,7 @@ def push(stack: StackClient, shared: Shared, wrench: Wrench, seconds: float) -> 
     hold = HeldTopic(stack.node, "sim/disturbance", shared)
     begin = stamp = 0
     try:
-        paused = partial(_raise_if_paused, statuses)
-        for message in stack.messages("joint_states", CALL_LIMITS.silence, paused):
+        for message in stack.messages("joint_states", partial(_raise_if_silent, statuses)):
             driver = statuses["driver"]
             if driver.mode != "enabled":
                 stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
@@ -60,9 +59,11 @@ def release(hold: HeldTopic, stamp: int) -> None:
         hold.end()
 
 
-def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
+def _raise_if_silent(statuses: Mapping[str, NodeStatus], silent: float) -> None:
     if PAUSED in statuses["driver"].facts:
         raise TimeoutError("the arm is paused; wam call resume")
+    if silent > CALL_LIMITS.silence:
+        raise TimeoutError(f"no joint_states for {CALL_LIMITS.silence:g} s")
 
 
 def _state(driver: NodeStatus) -> str:

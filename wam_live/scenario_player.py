@@ -55,7 +55,7 @@ class ScenarioPlayer:
         except ParameterError as error:
             return str(error)
         text = parameter_text({f"/**/{NODE}": {**values(self._shared), "script": str(Path(file).resolve())}})
-        self._node = NodeProcess(Configuration(file, {}, text), NODE, self._namespace)
+        self._node = NodeProcess(Configuration(file, {}, text), [NODE], self._namespace)
         return ""
 
     def ended(self) -> str:

@@ -5,11 +5,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final
 
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -72,6 +72,77 @@ def node_names(configuration: Configuration) -> dict[str, str]:
     return {entry: declared(entry).name for entry in configuration.shared.nodes}
 
 
+class NodeProcess(Closing):
+    """Nodes of a configuration as a process, which can be ended by SIGTERM and started again.
+
+    Parameters
+    ----------
+    configuration : values for the nodes.
+    entries : of the parameter `nodes`.
+    namespace : of the nodes.
+    log_level : least severity of what they print.
+    place : environment in which the process finds its processors.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        entries: Sequence[str],
+        namespace: str,
+        log_level: str = "error",
+        place: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        prepare_logging_directory()
+        self._stack = ExitStack()
+        file = self._stack.enter_context(parameter_file(configuration))
+        self._command = [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", "--params-file", str(file)]
+        self._command += ["-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
+        self._environment = {**os.environ, PARENT: str(os.getpid()), **place}
+        self.start()
+
+    def start(self) -> None:
+        """Start the nodes, in a session of their own: Ctrl-C reaches the parent alone, which stops them in order."""
+        self._process = subprocess.Popen(self._command, start_new_session=True, env=self._environment)
+
+    @property
+    def code(self) -> int | None:
+        """Exit code where it has ended."""
+        return self._process.poll()
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal; without effect where it has ended."""
+        self._process.send_signal(number)
+
+    def has_ended(self, seconds: float) -> bool:
+        """Whether it ends within this time."""
+        try:
+            self._process.wait(max(0.0, seconds))
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def kill(self) -> None:
+        """End it the hard way."""
+        os.killpg(self.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def stop(self) -> None:
+        """End it, the hard way where it does not end by itself."""
+        self.send(signal.SIGTERM)
+        if not self.has_ended(PROCESS_LIMITS.end):
+            self.kill()
+
+    def close(self) -> None:
+        """End it for good."""
+        self.stop()
+        self._stack.close()
+
+
 class Processes(Closing):
     """Nodes in processes of their own; leaving the context stops them all, brakes first, bag last.
 
@@ -84,6 +155,7 @@ class Processes(Closing):
 
     Attributes
     ----------
+    processes : by the names of their nodes.
     killed : nodes that did not end by themselves.
     bag_failure : after the end, why the bag is not whole; '' where it is, or where nothing was recorded.
     """
@@ -99,16 +171,14 @@ class Processes(Closing):
     ) -> None:
         names = node_names(configuration)
         self.killed: list[str] = []
-        self._stack = ExitStack()
-        arguments = self._stack.enter_context(_arguments(configuration, namespace, log_level))
-        self._processes = {
-            " or ".join(names[entry] for entry in group): _start(group, arguments, place)
+        self.processes = {
+            " or ".join(names[entry] for entry in group): NodeProcess(configuration, group, namespace, log_level, place)
             for group, place in placed_groups(configuration.shared, processes)
         }
 
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
-        codes = {name: process.poll() for name, process in self._processes.items()}
+        codes = {name: process.code for name, process in self.processes.items()}
         return {name: 0 if code == -HELD_UP else code for name, code in codes.items() if code is not None}
 
     def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
@@ -125,125 +195,44 @@ class Processes(Closing):
     def close(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
 
-        All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
+        All nodes but the recorder have one deadline together.
         """
         deadline = time.monotonic() + PROCESS_LIMITS.end
-        was_first = self.ended().get(LAST) == 0
-        first = [name for name in self._processes if FIRST in name.split()]
-        others = [name for name in self._processes if name not in (*first, LAST)]
-        if any(code < 0 for code in self.ended().values()):
-            for process in self._processes.values():
-                process.send_signal(LISTENER_GONE)
+        before = self.ended()
+        first = [name for name in self.processes if FIRST in name.split()]
+        others = [name for name in self.processes if name not in (*first, LAST)]
+        if any(code < 0 for code in before.values()):
+            for process in self.processes.values():
+                process.send(LISTENER_GONE)
         for names in (first, others):
             for name in names:
-                self._processes[name].terminate()
+                self.processes[name].send(signal.SIGTERM)
             for name in names:
-                if not _has_ended(self._processes[name], deadline):
+                if not self.processes[name].has_ended(deadline - time.monotonic()):
                     self._kill(name, "did not end")
-        if recorder := self._processes.get(LAST):
-            recorder.terminate()
-            self._wait_for_recorder(recorder)
+        if recorder := self.processes.get(LAST):
+            self._end_recorder(recorder)
         if (code := self.ended().get(LAST)) and code not in NOT_BEGUN:
             self.bag_failure = f"the recorder ended with code {code}; the bag may lack messages"
-        elif was_first and others:
+        elif before.get(LAST) == 0 and others:
             self.bag_failure = "the recorder ended before the other nodes; the bag lacks what they published after it"
-        self._stack.close()
+        for process in self.processes.values():
+            process.close()
 
-    def _wait_for_recorder(self, process: subprocess.Popen[bytes]) -> None:
-        begin = now = moved = time.monotonic()
-        state, printed = _work_of(process.pid), begin
-        while process.poll() is None:
-            time.sleep(0.02)
-            now = time.monotonic()
-            if (work := _work_of(process.pid)) != state:
-                state, moved = work, now
-            if now - moved > PROCESS_LIMITS.recorder_end:
-                self._kill(
-                    LAST, f"has done nothing for {PROCESS_LIMITS.recorder_end:.0f} s; 'wam bag repair' closes its bag"
-                )
-            elif now - printed > PROCESS_LIMITS.recorder_reports:
-                printed = now
-                LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
+    def _end_recorder(self, recorder: NodeProcess) -> None:
+        begin = time.monotonic()
+        recorder.send(signal.SIGTERM)
+        while not recorder.has_ended(PROCESS_LIMITS.recorder_reports):
+            seconds = time.monotonic() - begin
+            if seconds > PROCESS_LIMITS.recorder_end:
+                self._kill(LAST, f"did not end within {seconds:.0f} s; 'wam bag repair' closes its bag")
+            else:
+                LOGGER.warning(f"waiting for the recorder to write the bag, {seconds:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
         LOGGER.error(f"node {name} is killed: it {reason}")
         self.killed.append(name)
-        _kill(self._processes[name])
-
-
-class NodeProcess:
-    """One node of a configuration as a process, which can be ended by SIGTERM and started again.
-
-    Parameters
-    ----------
-    configuration : values for the node.
-    entry : of the parameter `nodes`.
-    namespace : of the node.
-    log_level : least severity of what it prints.
-    """
-
-    def __init__(self, configuration: Configuration, entry: str, namespace: str, log_level: str = "error") -> None:
-        self._stack = ExitStack()
-        self._arguments = self._stack.enter_context(_arguments(configuration, namespace, log_level))
-        self._entry = entry
-        self.start()
-
-    def start(self) -> None:
-        """Start the node."""
-        self._process = _start([self._entry], self._arguments)
-
-    @property
-    def code(self) -> int | None:
-        """Exit code where it has ended."""
-        return self._process.poll()
-
-    def send(self, number: signal.Signals) -> None:
-        """Send it a signal; without effect where it has ended."""
-        self._process.send_signal(number)
-
-    def stop(self) -> None:
-        """End the node, the hard way where it does not end by itself."""
-        self._process.terminate()
-        if not _has_ended(self._process, time.monotonic() + PROCESS_LIMITS.end):
-            _kill(self._process)
-
-    def close(self) -> None:
-        """End the node for good."""
-        self.stop()
-        self._stack.close()
-
-
-@contextmanager
-def _arguments(configuration: Configuration, namespace: str, log_level: str) -> Iterator[list[str]]:
-    """Arguments of ROS for the processes of a configuration."""
-    prepare_logging_directory()
-    with parameter_file(configuration) as file:
-        yield ["--params-file", str(file), "-r", f"__ns:=/{namespace.strip('/')}", "--log-level", log_level]
-
-
-def _start(
-    entries: Sequence[str], arguments: Sequence[str], place: Mapping[str, str] = MappingProxyType({})
-) -> subprocess.Popen[bytes]:
-    # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
-    return subprocess.Popen(
-        [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", *arguments],
-        start_new_session=True,
-        env={**os.environ, PARENT: str(os.getpid()), **place},
-    )
-
-
-def _has_ended(process: subprocess.Popen[bytes], deadline: float) -> bool:
-    """Whether a process ends before a time of the monotonic clock."""
-    try:
-        process.wait(max(0.0, deadline - time.monotonic()))
-    except subprocess.TimeoutExpired:
-        return False
-    return True
-
-
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+        self.processes[name].kill()
 
 
 def _ending(code: int) -> str:
@@ -254,32 +243,6 @@ def _ending(code: int) -> str:
     name = signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
     cause = "; the system does that if memory is short" if name == "SIGKILL" else ""
     return f"was ended from outside by {name}{cause}"
-
-
-def _work_of(pid: int) -> tuple[str, ...]:
-    """What changes while a process works: its time of computing, what it has written, whether it waits for a disk."""
-    folder = Path("/proc", str(pid))
-    try:
-        state, *fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        written = (folder / "io").read_text()
-    except OSError:
-        return ()
-    return (*fields[10:12], written, str(time.monotonic()) * (state == "D"))
-
-
-class PlayedScenario(NamedTuple):
-    """How the scenario of a composition went.
-
-    Attributes
-    ----------
-    is_done : whether it came to its end, as it is written or by a failure.
-    failure : why it failed, '' where it did not.
-    fault : of the driver, '' for none.
-    """
-
-    is_done: bool
-    failure: str
-    fault: str
 
 
 class Composition(Connection):
@@ -351,11 +314,18 @@ class Composition(Connection):
         self.spin(lambda: until(self.ended()))
         return self.ended()
 
-    def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> PlayedScenario:
-        """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it."""
-        scenario, driver = cast(Any, self.nodes["scenario"]), cast(Any, self.nodes["driver"]).driver
-        self.spin(lambda: is_stopped(driver.stamp / 1e9) or bool(scenario.done))
-        return PlayedScenario(bool(scenario.done), str(scenario.failure), driver.safety.fault)
+    def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> str:
+        """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it.
+
+        Returns
+        -------
+        str
+            why the scenario failed, '' where it did not.
+        """
+        scenario: Any = self.nodes["scenario"]
+        driver: Any = self.nodes["driver"]
+        self.spin(lambda: is_stopped(driver.driver.stamp / 1e9) or bool(scenario.done))
+        return str(scenario.failure)
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""

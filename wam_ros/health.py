@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 
 from wam_bag.printable import printable
 from wam_description.agreement import DIGESTS, digests
@@ -206,9 +205,6 @@ class Diagnostics:
         self.facts: dict[str, str] = {}
         self._next = self._last = 0
         self._refused = 0  # messages by the last report
-        self._steps = self._seconds_without_step = 0
-        if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
-            node.create_timer(1.0, self._report_standstill, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def are_due(self, stamp: int) -> bool:
         """Whether the next report will be published."""
@@ -227,31 +223,17 @@ class Diagnostics:
         self._report(**{ENDED: "yes"})
 
     def _report(self, **more: str) -> None:
-        refused = sum(count for key, count in self._health.counts.items() if key.startswith(REFUSED_ON))
-        status = self._health.status
-        level = max(status.level, Level.WARN) if refused > self._refused else status.level
-        self._refused = refused
-        self._publish(level, status.message, more)
-
-    def _report_standstill(self) -> None:
-        """Once in a second of the wall clock: report where the node has had nothing to do for long."""
-        health, steps = self._health, self._health.counts["steps"]
-        self._seconds_without_step = 0 if steps != self._steps else self._seconds_without_step + 1
-        self._steps = steps
-        if self._seconds_without_step >= NODE_LIMITS.stale_after:
-            idle = f"no step for {self._seconds_without_step} s"
-            self._publish(Level.STALE, idle if health.is_ready else health.status.message, {})
-
-    def _publish(self, level: Level, text: str, more: Mapping[str, str]) -> None:
         """Publish a report, with how many messages were published on each topic, this one included."""
         node, outlets, health = self._node, self._outlets, self._health
+        refused = sum(count for key, count in health.counts.items() if key.startswith(REFUSED_ON))
+        level = max(health.status.level, Level.WARN) if refused > self._refused else health.status.level
+        self._refused = refused
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
         facts = {key: str(count) for key, count in sorted(health.counts.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
-        name = diagnosed_name(node.get_namespace(), node.get_name())
-        status = NodeStatus(
-            level, text, name, health.is_ready, fault=health.status.fault, facts={**facts, **self.facts, **more}
-        )
+        name, present = diagnosed_name(node.get_namespace(), node.get_name()), health.status
+        facts |= {**self.facts, **more}
+        status = NodeStatus(level, present.message, name, health.is_ready, fault=present.fault, facts=facts)
         report = DiagnosticArray(header=header(self._last), status=[diagnostic_status(status, self._arm)])
         outlets.send(DIAGNOSTICS, report)

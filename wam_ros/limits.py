@@ -8,13 +8,10 @@ class NodeLimits:
     """A node, its messages and its status."""
 
     loss_repeated: int = 10  # steps, after which a loss is reported again while the arm is enabled
-    slow_step: float = 0.5  # s, from which a step is reported
     long_step: float = 0.02  # s, from which a step holds up the other nodes of its process; a driver waits 0.025 s
     long_step_look: float = 0.01  # s between two looks for one
     long_step_recent: float = 1.0  # s, in which what the others lack is the consequence of one
-    slow_step_reports: float = 5.0  # s between two of these reports
     service_wait: float = 2.0  # s, after which a request reports that it still waits for its service
-    stale_after: int = 5  # s without a step, as long as aggregators of diagnostics wait
     newest_kept: int = 2  # messages; one alone would be lost when the next comes just as it is taken
     claim_period: float = 0.1  # s, between looks for second publishers of topics on which nothing comes
     status_on_its_way: float = 0.2  # s, for a status that is to be repeated; a driver has 0.25 s for it
@@ -41,7 +38,7 @@ class ProcessLimits:
     delivery: float = 4.0
     short_delivery: float = 0.4  # s, where a listener was killed: the middleware waits for it as for one that is frozen
     end: float = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
-    recorder_end: float = 30.0  # s without any sign of work, before a recorder that does not end is killed
+    recorder_end: float = 120.0  # s, for a recorder to write its bag, usually less than one; a disk may have to wake up
     recorder_reports: float = 2.0  # s between two lines about a recorder that is still writing
     processors: int = 3  # processors, of which the driver may have one to itself in realtime
     load_look: float = 0.05  # s, in which the idlest processor is found

@@ -19,7 +19,7 @@ from wam_description.agreement import live_facts
 from wam_description.configuration import BASE, Configuration, packaged
 from wam_description.event import Event, Level, fault
 from wam_description.event_text import sentence
-from wam_description.interface import Feed, declared, is_packaged
+from wam_description.interface import Feed, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
@@ -168,8 +168,6 @@ class AdaptedNode(StackNode):
             self._failing.add(feed.work)
             raise
         self._failing.discard(feed.work)
-        if (taken := time.monotonic() - began) > NODE_LIMITS.slow_step:
-            self._warn_of_slow_step(taken)
         if feed.essential and self._is_realtime:
             self._watch(feed)
 
@@ -210,15 +208,6 @@ class AdaptedNode(StackNode):
             self.get_logger().warning(status.message)
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
-
-    def _warn_of_slow_step(self, taken: float) -> None:
-        is_own = not is_packaged(self._declaration)
-        self.get_logger().warning(
-            f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
-            "brakes if they wait too long: "
-            f"{'make its steps faster' if is_own else 'the machine is busy, end other programs'}",
-            throttle_duration_sec=NODE_LIMITS.slow_step_reports,
-        )
 
     def _watch(self, feed: Feed) -> None:
         """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""

@@ -335,10 +335,10 @@ class RunningArm:
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
             raise ValueError("the arm has been started already; call play in its place, with what start takes")
         assert self._composition is not None
-        played = self._composition.play()
+        failure = self._composition.play()
         self.close()
-        if played.failure:
-            raise ArmFault(played.failure)
+        if failure:
+            raise ArmFault(failure)
         recorder = self.configuration.sections["recorder"]
         return read(Path(recorder["directory"], recorder["name"]))
 

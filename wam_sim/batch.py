@@ -13,8 +13,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from multiprocessing.connection import Connection
-from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -116,9 +114,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     workers : number; None for one per core.
     """
     count = workers or os.cpu_count() or 1
-    context = multiprocessing.get_context("spawn")
-    end, ours = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_worker, initargs=(end,))
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_worker)
     # workers inherit the mask: only this process handles a Ctrl-C of the terminal, which goes to all of them
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     for _ in range(count):
@@ -127,22 +123,22 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
-        ours.close()
+        for worker in pool._processes.values():
+            worker.kill()
         # Python before 3.12 keeps this end open, and then waits indefinitely until somebody reads what is on its way
         pool._call_queue._reader.close()  # type: ignore[attr-defined]
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        ours.close()
-        end.close()
 
 
-def _worker(end: Connection) -> None:
-    """End when the parent process closes its end of the pipe, or dies."""
+def _worker() -> None:
+    """End when the parent process dies."""
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
-        wait_for([end] if parent is None else [end, parent.sentinel])
+        if parent is not None:
+            parent.join()
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

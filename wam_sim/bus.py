@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from wam_description.defects import Check
 from wam_description.interface import Feed, is_packaged
-from wam_description.signals import Point, State, Table, Wrench
 from wam_description.synchroniser import Inlet, OutOfTime
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs, mask
@@ -42,7 +41,7 @@ class Bus:
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
-        self._routes[topic].takers.append((take, _nothing, {}))
+        self._routes[topic].takers.append(take)
 
     def connect(
         self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
@@ -61,14 +60,10 @@ class Bus:
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
             outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route()).publish
         # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
-        inlet = _inlet if is_packaged(declaration) else _masked_inlet
+        is_masked = not is_packaged(declaration)
         for topic, found in feeds.items():
-            reactions = [(inlet(feed, topic), feed.work) for feed in found]
-            takers = self._routes.setdefault(topic, _Route()).takers
-            if len(reactions) > 1:
-                takers.append((_together(reactions), _outputs, outlets))
-            else:
-                takers.extend((*reaction, outlets) for reaction in reactions)
+            reactions = [(_inlet(feed, topic, is_masked), feed.work) for feed in found]
+            self._routes.setdefault(topic, _Route()).takers.append(_taker(reactions, outlets))
 
     def publish_of(self, node: str, stamp: int, outputs: Outputs) -> None:
         """Publish what a connected node returned elsewhere than in a step, as its steps' outputs are published."""
@@ -158,28 +153,18 @@ class _Route:
     __slots__ = ("kept", "takers")
 
     def __init__(self, kept: _Kept | None = None) -> None:
-        self.takers: list[_Taker] = []
+        self.takers: list[_Take] = []
         self.kept = kept
 
     def publish(self, stamp: int, value: Any) -> None:
-        """Keep the numbers of a value of a stamp, ns, hand it to the takers, and publish what they answer.
-
-        A taker whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.
-        """
+        """Keep the numbers of a value of a stamp, ns, and hand it to the takers."""
         if self.kept is not None:
             self.kept.add(stamp, value)
-        for inlet, work, outlets in self.takers:
-            try:
-                for inputs in inlet(stamp, value) or ():
-                    for name, output in work(inputs).items():
-                        outlets[name](inputs.stamp, output)
-            except OutOfTime:
-                continue
+        for take in self.takers:
+            take(stamp, value)
 
 
-Work = Callable[[Any], Outputs]
-# where its inputs go, its step, the topics that it may publish
-_Taker = tuple[Callable[[int, Any], Sequence[Any] | None], Work, "Mapping[str, _Outlet]"]
+_Take = Callable[[int, Any], object]
 _Outlet = Callable[[int, Any], None]
 
 
@@ -195,20 +180,9 @@ class _Outlets(dict[str, _Outlet]):
         raise KeyError(topic)
 
 
-class _Done(NamedTuple):
-    """A step that was done before others of the same node."""
-
-    stamp: int
-    outputs: Outputs
-
-
-def _inlet(feed: Feed, topic: str) -> Inlet:
-    return feed.synchroniser.inlet(topic)
-
-
-def _masked_inlet(feed: Feed, topic: str) -> Inlet:
-    """What takes of a JointState only what an input declares."""
-    inlet, masked = _inlet(feed, topic), mask(feed.arrays)
+def _inlet(feed: Feed, topic: str, is_masked: bool) -> Inlet:
+    """Where a reaction takes a topic; masked, it gets of a JointState only what it declares."""
+    inlet, masked = feed.synchroniser.inlet(topic), mask(feed.arrays) if is_masked else None
     return inlet if masked is None else lambda stamp, value: inlet(stamp, masked(value))
 
 
@@ -217,48 +191,31 @@ def _checked(publish: _Outlet, check: Check | None) -> _Outlet:
     return publish if check is None else lambda stamp, value: publish(stamp, check(value))
 
 
-def _together(reactions: Sequence[tuple[Inlet, Work]]) -> Callable[[int, Any], list[_Done]]:
-    def take(stamp: int, value: Any) -> list[_Done]:
-        done: list[_Done] = []
+def _taker(reactions: Sequence[tuple[Inlet, Callable[[Any], Outputs]]], outlets: _Outlets) -> _Take:
+    """What hands a message to the reactions of a node, and publishes what they answer when all have worked.
+
+    One whose newest state is too old refuses it, as over topics; the driver brakes then and names the node.
+    """
+
+    def take(stamp: int, value: Any) -> None:
+        done: list[tuple[int, Outputs]] = []
         try:
             for inlet, work in reactions:
-                done += [_Done(inputs.stamp, work(inputs)) for inputs in inlet(stamp, value)]
-        except OutOfTime:  # the reactions before have worked all the same, as over topics
+                done += [(inputs.stamp, work(inputs)) for inputs in inlet(stamp, value)]
+        except OutOfTime:  # the reactions before have worked all the same
             pass
-        return done
+        for at, outputs in done:
+            for name, output in outputs.items():
+                outlets[name](at, output)
 
     return take
 
 
-def _outputs(done: _Done) -> Outputs:
-    return done.outputs
-
-
-def _nothing(_: Any) -> Outputs:
-    return {}
-
-
-def _state_row(stamp: int, value: State) -> _Row:
-    return stamp, *value[0], *value[1], *value[2]
-
-
-def _wrench_row(stamp: int, value: Wrench) -> _Row:
-    return stamp, *value.force, *value.torque
-
-
-def _point_row(stamp: int, value: Point) -> _Row:
-    return stamp, *value.position
-
-
-def _table_row(stamp: int, value: Table) -> _Row:
-    return stamp, *chain.from_iterable(value.rows)
-
-
 _ROWS: dict[str, Callable[[int, Any], _Row]] = {
-    JOINT_STATE: _state_row,
-    WRENCH: _wrench_row,
-    POINT: _point_row,
-    TABLE: _table_row,
+    JOINT_STATE: lambda stamp, value: (stamp, *value[0], *value[1], *value[2]),
+    WRENCH: lambda stamp, value: (stamp, *value.force, *value.torque),
+    POINT: lambda stamp, value: (stamp, *value.position),
+    TABLE: lambda stamp, value: (stamp, *chain.from_iterable(value.rows)),
 }
 _FRAMED = {WRENCH, POINT, TABLE}
 

@@ -1,14 +1,14 @@
-"""Finished pieces of a batch in a file of JSON lines: reading one runs no code, unlike a pickle.
+"""Finished pieces of a batch in a file of lines: reading one runs no code of the file.
 
-A line has the key of the piece, its value and a hash of that, so that a damaged one is computed again.  The key is a
-hash of the function, of its input and of the code that it depends on, so that a result of other code is never used.
-Numbers are exact to the bit.
+A line is JSON with the key of the piece, its value and a hash of that, so that a damaged one is computed again.  The
+key is a hash of the function, of its input and of the code that it depends on, so that a result of other code is never
+used.  The value is a pickle of which plain values alone are read.  Numbers are exact to the bit.
 """
 
-import ast
 import base64
 import hashlib
 import inspect
+import io
 import json
 import os
 import pickle
@@ -25,9 +25,9 @@ import numpy as np
 from wam_description.configuration import packaged
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
-_STACK: Final = ("wam_theory", "wam_description", "wam_driver", "wam_control", "wam_sim")  # it loads nodes by name
-_NUMERIC: Final = "biufc"  # kinds of numpy arrays that are plain numbers
 _BEGIN: Final = '{"key": '  # of every line
+_PLAIN: Final = (tuple, Enum, np.ndarray, np.dtype)  # types of values, besides those that have no name in a pickle
+_OF_NUMPY: Final = [value.__reduce__()[0] for value in (np.zeros(1), np.float64(0.0))]  # what makes arrays and scalars
 
 
 def default_file(name: str) -> Path:
@@ -52,7 +52,7 @@ class FinishedPieces:
 
     def __init__(self, file: Path) -> None:
         self._file = file
-        self._trees = dict[str, Any]()
+        self._values = dict[str, str]()
         self._is_cut = False
         if not file.exists():
             return
@@ -67,17 +67,17 @@ class FinishedPieces:
 
     def _take(self, line: str) -> None:
         try:
-            tree = json.loads(line)
-            if tree["hash"] == _hash(json.dumps(tree["value"])):
-                self._trees[tree["key"]] = tree["value"]
-        except (ValueError, KeyError, TypeError):
+            piece = json.loads(line)
+            if piece["hash"] == _hash(piece["value"]):
+                self._values[piece["key"]] = piece["value"]
+        except (ValueError, LookupError, TypeError, AttributeError):
             return  # damaged
 
     def get(self, key: str) -> tuple[Any] | None:
         """The value of a piece, None if there is none or it is damaged."""
         try:
-            return (_decoded(self._trees[key]),)
-        except (KeyError, ValueError, TypeError):
+            return (_read(self._values[key]),)
+        except Exception:  # a pickle that is damaged may raise any
             return None
 
     def add(self, key: str, value: object) -> None:
@@ -88,13 +88,17 @@ class FinishedPieces:
         TypeError
             if the value has anything but numbers, texts, arrays, lists, tuples, mappings, NamedTuples and enumerations.
         """
-        tree = _encoded(value)
-        line = json.dumps({"key": key, "hash": _hash(json.dumps(tree)), "value": tree})
+        text = base64.b64encode(pickle.dumps(value, protocol=4)).decode("ascii")
+        try:
+            _read(text)
+        except pickle.UnpicklingError as error:
+            raise TypeError(f"a piece cannot hold {error}") from None
+        line = json.dumps({"key": key, "hash": _hash(text), "value": text})
         self._file.parent.mkdir(parents=True, exist_ok=True)
         with self._file.open("a", encoding="utf-8") as stream:
             stream.write("\n" * self._is_cut + line + "\n")
         self._is_cut = False
-        self._trees[key] = tree
+        self._values[key] = text
 
 
 def key_of(function: Callable[..., Any], given: Any) -> str:
@@ -111,77 +115,30 @@ def code_of(function: Callable[..., Any]) -> str:
 
 @cache
 def sources(file: Path | None) -> str:
-    """Hash of the stack, of a source file with all that it imports of ours, and of the versions of NumPy and MuJoCo."""
-    found = {path for package in _STACK for path in _ROOT.glob(f"{package}/**/*.py")}
+    """Hash of all packages of ours, of a source file and those next to it, and of the versions of NumPy and MuJoCo."""
+    found = {*_ROOT.glob("wam_*/**/*.py"), *packaged("testbed").parent.glob("*.yaml")}
     if file is not None:
-        _add_imported(file, found)
+        found |= {file, *file.parent.glob("*.py")}
     digest = hashlib.sha256(f"{version('numpy')} {version('mujoco')}".encode())
-    for path in [*sorted(found), *sorted(packaged("testbed").parent.glob("*.yaml"))]:
+    for path in sorted(found):
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def _add_imported(file: Path, found: set[Path]) -> None:
-    """Add a source file, and those of this repository that it imports, directly or not."""
-    if file in found:
-        return
-    found.add(file)
-    for node in ast.walk(ast.parse(file.read_bytes())):
-        names = [f".{alias.name}" for alias in node.names] if isinstance(node, (ast.Import, ast.ImportFrom)) else []
-        if isinstance(node, ast.ImportFrom):
-            names = [node.module or "", *(f"{node.module}{name}" for name in names)]
-        for name in names:
-            path = _ROOT.joinpath(*name.strip(".").split("."))
-            for each in (path.with_suffix(".py"), path / "__init__.py") if name.strip(".") else ():
-                if each.is_file():
-                    _add_imported(each, found)
 
 
 def _hash(content: str) -> str:
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def _encoded(value: Any) -> Any:
-    """A value as JSON: numbers and texts as they are, everything else as one pair of kind and content."""
-    kind = type(value)
-    if isinstance(value, Enum):
-        return {"enum": [kind.__module__, kind.__qualname__, value.value]}
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    if isinstance(value, np.ndarray) and value.dtype.kind in _NUMERIC:
-        data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
-        return {"array": [value.dtype.str, list(value.shape), data]}
-    if isinstance(value, np.generic) and value.dtype.kind in _NUMERIC:
-        return _encoded(value.item())
-    if kind in (list, tuple):
-        return {kind.__name__: [_encoded(item) for item in value]}
-    if kind is dict:
-        return {"dict": [[_encoded(key), _encoded(item)] for key, item in value.items()]}
-    if hasattr(value, "_fields"):
-        return {"named": [kind.__module__, kind.__qualname__, {n: _encoded(getattr(value, n)) for n in value._fields}]}
-    raise TypeError(f"a piece cannot hold {kind.__name__} ({value!r})")
+class _Reader(pickle.Unpickler):
+    """Reads plain values: what else a pickle names is refused, and nothing is imported for it."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """A type of plain values."""
+        found = getattr(sys.modules.get(module), name, None)
+        if found in _OF_NUMPY or (isinstance(found, type) and issubclass(found, _PLAIN)):
+            return found
+        raise pickle.UnpicklingError(f"{module}.{name}")
 
 
-def _decoded(tree: Any) -> Any:
-    if not isinstance(tree, dict):
-        return tree
-    ((kind, content),) = tree.items()
-    if kind == "array":
-        dtype, shape, data = content
-        if np.dtype(dtype).kind not in _NUMERIC:
-            raise ValueError(f"array of {dtype}")
-        return np.frombuffer(base64.b64decode(data), dtype).reshape(shape).copy()
-    if kind in ("named", "enum"):
-        module, name, value = content
-        found = getattr(sys.modules.get(module), name, None)  # nothing is imported for a file
-        if kind == "enum" and isinstance(found, type) and issubclass(found, Enum):
-            return found(value)
-        if kind == "named" and isinstance(found, type) and issubclass(found, tuple) and hasattr(found, "_make"):
-            return found(**{name: _decoded(item) for name, item in value.items()})
-        raise ValueError(f"no type of values {module}.{name}")
-    if kind == "dict":
-        return {_decoded(key): _decoded(item) for key, item in content}
-    if kind in ("list", "tuple"):
-        items = [_decoded(item) for item in content]
-        return items if kind == "list" else tuple(items)
-    raise ValueError(f"unknown kind {kind}")
+def _read(text: str) -> Any:
+    return _Reader(io.BytesIO(base64.b64decode(text))).load()

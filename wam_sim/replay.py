@@ -9,9 +9,10 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,18 +22,20 @@ from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointCol
 from wam_bag.losses import losses
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
+from wam_description.defects import owners
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
 from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.synchroniser import Inputs
-from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
+from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs
 from wam_sim.bus import Bus, TopicValue, flat
 from wam_sim.recording import RecordedRun, recorded_run
 
-_AXES = ("x", "y", "z")
+# fields of messages with three axes, and their units
+_FIELDS = {WRENCH: (("force.", "N"), ("torque.", "N m")), POINT: (("", "m"),)}
 NOTHING: Mapping[str, Any] = {}
 Numbers = JointColumns | WrenchColumns | PointColumns | TableColumns
 
@@ -169,14 +172,11 @@ def replay(
     )
     changes, lost_changes = _changes(run, shared, declaration, present)
     published = _run(bag, namespace, shared, declaration, own, changes)
-    names = _names(shared)
     compared = []
-    for topic in outputs:
-        columns = bag.topics.get(f"{namespace}/{topic}")
-        order = names.get(rows[topic].side, [])
-        recorded = _rows(rows[topic], columns, order) if columns is not None else []
-        compared.append(_compare(rows[topic], recorded, published.get(topic, []), order, _units(topic, columns)))
-    if not any(topic.compared or topic.only_recorded or topic.only_replayed for topic in compared):
+    for topic in map(rows.__getitem__, outputs):
+        columns = bag.topics.get(f"{namespace}/{topic.name}")
+        compared.append(_compare(topic, columns, published.get(topic.name, []), owners(topic, shared.arm)))
+    if not any(one.compared or one.only_recorded or one.only_replayed for one in compared):
         raise BagError(
             f"{path}: {declaration.name} publishes nothing from what is recorded, and no message of it is there: "
             "nothing to compare; a bag of the stack's recorder with all topics can be replayed"
@@ -251,12 +251,11 @@ def _changes(
     group = declaration.shared_group
     for after, settings in given:
         mine = {key.removeprefix(prefix): value for key, value in settings.items() if key.startswith(prefix)}
-        if not mine:
-            continue
         present |= mine
-        if any(not group or not name.startswith(f"{group}.") for name in mine):
+        of_group = {name for name in mine if group and name.startswith(f"{group}.")}
+        if mine.keys() - of_group:
             found.append(Change(after, "tune", build_part(declaration.parameter_class, present)))
-        if group and any(name.startswith(f"{group}.") for name in mine):
+        if of_group:
             found.append(Change(after, "retune", build_part(type(getattr(shared, group)), present, f"{group}.")))
     numbers = [one.number for one in reported]
     lost = sum(max(b - a - 1, 0) for a, b in pairwise(numbers))
@@ -292,35 +291,21 @@ def _run(
     bus = Bus({name: interface.topics[name] for name in declaration.outputs if name in interface.topics})
     bus.connect(declaration, feeds, interface.checks(declaration))
     recorded = [interface.topics[topic] for topic in feeds if topic not in declaration.outputs]
-    for topic, stamp, value in _messages(bag, namespace, recorded, shared):
+    for _, topic, stamp, value in _messages(bag, namespace, recorded, shared):
         bus.publish(topic, stamp, value)
     return bus.rows
 
 
-def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared) -> Iterator[tuple[str, int, Any]]:
-    """Topic, stamp and value of every input in the order in which they came."""
-    names = _names(shared)
-    found: list[tuple[int, int, str, int, Any]] = []
+def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared) -> list[tuple[int, str, int, Any]]:
+    """Log time, topic, stamp and value of every input in the order in which they came."""
+    found: list[tuple[int, str, int, Any]] = []
     for topic in inputs:
         columns = bag.topics.get(f"{namespace}/{topic.name}")
-        if isinstance(columns, Messages) and topic.type == TRAJECTORY:
-            for time, message in zip(columns.log_time_ns.tolist(), columns.messages, strict=True):
-                stamp = message.header.stamp
-                value = _trajectory(message, names["joints"])
-                found.append((time, len(found), topic.name, stamp.sec * 1_000_000_000 + stamp.nanosec, value))
-        if not isinstance(columns, Numbers):
-            continue
-        values = _values(columns, names.get(topic.side, []))
-        times = columns.log_time_ns.tolist()
-        for stamp, time, value in zip(columns.stamp_ns.tolist(), times, values, strict=True):
-            found.append((time, len(found), topic.name, stamp, value))
-    for _, _, name, stamp, value in sorted(found, key=lambda item: item[:2]):
-        yield name, stamp, value
-
-
-def _names(shared: Shared) -> dict[str, list[str]]:
-    """Names by side, in the order in which a JointState's arrays are compared."""
-    return {"joints": list(shared.arm.joints.names), "motors": list(shared.arm.motors.names)}
+        if columns is not None:
+            times = columns.log_time_ns.tolist()
+            values = _values(columns, owners(topic, shared.arm))
+            found += [(time, topic.name, *value) for time, value in zip(times, values, strict=True)]
+    return sorted(found, key=itemgetter(0))
 
 
 def _trajectory(message: Any, names: Sequence[str]) -> PosturePath:
@@ -339,17 +324,23 @@ def _trajectory(message: Any, names: Sequence[str]) -> PosturePath:
     return PosturePath(tuple(points))
 
 
-def _values(columns: Columns, names: Sequence[str]) -> list[Any]:
+def _values(columns: Columns, names: Sequence[str]) -> list[tuple[int, Any]]:
+    """Stamp and value of each recorded message."""
+    if isinstance(columns, Messages):
+        stamps = [message.header.stamp for message in columns.messages]
+        paths = [_trajectory(message, names) for message in columns.messages]
+        return [(stamp.sec * 1_000_000_000 + stamp.nanosec, path) for stamp, path in zip(stamps, paths, strict=True)]
+    found: Iterable[Any]
     if isinstance(columns, JointColumns):
-        arrays = [_array(columns, field, names) for field in State._fields]
-        return [State(*rows) for rows in zip(*arrays, strict=True)]
-    if isinstance(columns, WrenchColumns):
-        forces, torques = columns.force.tolist(), columns.torque.tolist()
-        return [Wrench(f, tuple(a), tuple(b)) for f, a, b in zip(columns.frames, forces, torques, strict=True)]
-    if isinstance(columns, TableColumns):
-        return tables(columns)
-    assert isinstance(columns, PointColumns)
-    return [Point(f, tuple(p)) for f, p in zip(columns.frames, columns.point.tolist(), strict=True)]
+        found = map(State, *(_array(columns, field, names) for field in State._fields))
+    elif isinstance(columns, WrenchColumns):
+        found = map(Wrench, columns.frames, map(tuple, columns.force.tolist()), map(tuple, columns.torque.tolist()))
+    elif isinstance(columns, TableColumns):
+        found = tables(columns)
+    else:
+        assert isinstance(columns, PointColumns)
+        found = map(Point, columns.frames, map(tuple, columns.point.tolist()))
+    return list(zip(columns.stamp_ns.tolist(), found, strict=True))
 
 
 def tables(columns: TableColumns) -> list[Table]:
@@ -372,66 +363,45 @@ def _array(columns: JointColumns, field: str, names: Sequence[str]) -> list[list
     return [[] if math.isnan(row[0]) else row for row in ordered.tolist()]
 
 
-def _rows(topic: Topic, columns: Columns, names: Sequence[str]) -> list[TopicValue]:
-    """Recorded messages as the simulation keeps them."""
-    assert isinstance(columns, Numbers)
-    values = _values(columns, names)
-    return [flat(topic, stamp, value) for stamp, value in zip(columns.stamp_ns.tolist(), values, strict=True)]
+def _labels(topic: Topic, columns: Columns, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Field and unit of each number of a message, of a table for one row."""
+    if topic.type == TABLE:
+        return [(column, "") for column in topic.columns]
+    if not isinstance(columns, JointColumns):
+        return [(f"{field}{axis}", unit) for field, unit in _FIELDS[topic.type] for axis in "xyz"]
+    units = zip(State._fields, ("rad", "rad/s", "A" if "current" in topic.name else "N m"), strict=True)
+    return [(name, unit) for field, unit in units if getattr(columns, field).shape[1] for name in names]
 
 
-def _compare(
-    topic: Topic,
-    recorded: Sequence[TopicValue],
-    replayed: Sequence[TopicValue],
-    names: Sequence[str],
-    units: Sequence[str],
-) -> Compared:
+def _compare(topic: Topic, columns: Columns | None, replayed: Sequence[TopicValue], names: Sequence[str]) -> Compared:
+    if columns is None:
+        return Compared(topic.name, 0, 0, len(replayed), 0, None, 0.0, "", None)
+    recorded = [flat(topic, stamp, value) for stamp, value in _values(columns, names)]
     known = {row.stamp: row for row in replayed}
     both = [(row, known[row.stamp]) for row in recorded if row.stamp in known]
-    first, different, largest, unit = None, 0, 0.0, ""
-    for old, new in both:
-        difference = _difference(topic, old, new, names)
-        if difference is None:
-            continue
-        different += 1
-        first = first or difference
-        if len(old.values) == len(new.values):
-            gaps = [abs(a - b) for a, b in zip(old.values, new.values, strict=True)]
-            for i, gap in enumerate(gaps):
-                if math.isfinite(gap) and gap > largest:
-                    largest, unit = gap, units[i] if len(units) == len(gaps) else ""
+    labels = _labels(topic, columns, names)
+    differing = [one for old, new in both if (one := _differences(topic, old, new, labels))]
+    first = differing[0][0][0] if differing else None
+    sizes = [(abs(one.recorded - one.replayed), unit) for one, unit in chain(*differing) if unit is not None]
+    largest, unit = max((one for one in sizes if 0.0 < one[0] < math.inf), key=itemgetter(0), default=(0.0, ""))
     missing = len(recorded) - len(both)
     alone = next((row.stamp for row in recorded if row.stamp not in known), None)
-    return Compared(topic.name, len(both), missing, len(replayed) - len(both), different, first, largest, unit, alone)
+    more = len(replayed) - len(both)
+    return Compared(topic.name, len(both), missing, more, len(differing), first, largest, unit, alone)
 
 
-def _units(topic: str, columns: Columns | None) -> list[str]:
-    """Unit of each number of a message."""
-    if isinstance(columns, WrenchColumns):
-        return ["N"] * 3 + ["N m"] * 3
-    if isinstance(columns, PointColumns):
-        return ["m"] * 3
-    if not isinstance(columns, JointColumns):
-        return []
-    units = dict(zip(State._fields, ("rad", "rad/s", "A" if "current" in topic else "N m"), strict=True))
-    return [unit for field, unit in units.items() for _ in range(getattr(columns, field).shape[1])]
-
-
-def _difference(topic: Topic, old: TopicValue, new: TopicValue, names: Sequence[str]) -> Difference | None:
+def _differences(
+    topic: Topic, old: TopicValue, new: TopicValue, labels: Sequence[tuple[str, str]]
+) -> list[tuple[Difference, str | None]]:
+    """Where two messages differ, with the unit of a number."""
     if old.frame != new.frame:
-        return Difference(old.stamp, "frame", old.frame, new.frame)
+        return [(Difference(old.stamp, "frame", old.frame, new.frame), None)]
     if len(old.values) != len(new.values):
-        return Difference(old.stamp, "number of values", len(old.values), len(new.values))
+        return [(Difference(old.stamp, "number of values", len(old.values), len(new.values)), None)]
+    found: list[tuple[Difference, str | None]] = []
     for i, (a, b) in enumerate(zip(old.values, new.values, strict=True)):
         if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
-            return Difference(old.stamp, _field(topic, i, names), a, b)
-    return None
-
-
-def _field(topic: Topic, i: int, names: Sequence[str]) -> str:
-    if topic.type == WRENCH:
-        return f"{'force' if i < 3 else 'torque'}.{_AXES[i % 3]}"
-    if topic.type == TABLE:
-        row, column = divmod(i, len(topic.columns))
-        return f"row {row}, {topic.columns[column]}"
-    return _AXES[i] if topic.type == POINT else names[i % len(names)]
+            row, column = divmod(i, len(labels))
+            field, unit = labels[column]
+            found.append((Difference(old.stamp, f"row {row}, {field}" if topic.type == TABLE else field, a, b), unit))
+    return found

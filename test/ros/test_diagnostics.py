@@ -8,7 +8,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from test_nodes import Hand, Listener, bad
 
 from wam_description.status import guidance
-from wam_ros.limits import NODE_LIMITS
 
 MS = 1_000_000
 
@@ -55,21 +54,6 @@ def test_a_refused_message_is_a_warning_for_two_reports_and_stays_counted(hand: 
     warn, ok = DiagnosticStatus.WARN, DiagnosticStatus.OK
     assert [report.level for report in found] == [warn, warn, ok], "up to a report before which none was refused"
     assert all({pair.key: pair.value for pair in one.values}[key] == "1" for one in found)
-
-
-def test_a_paused_arm_is_stale_in_realtime_until_it_goes_on(
-    ros: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    hand = Hand(ros, tmp_path, "realtime")
-    heard = Listener(hand.ros, "/diagnostics")
-    next_report(hand, heard)
-    hand.ask("pause", True)
-    while (report := next_report(hand, heard)).level != DiagnosticStatus.STALE:
-        pass
-    assert report.message == f"no step for {NODE_LIMITS.stale_after} s"
-    hand.ask("pause", False)
-    while reports(heard)[-1].level == DiagnosticStatus.STALE:
-        next_report(hand, heard)
 
 
 def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pytest.CaptureFixture[str]) -> None:

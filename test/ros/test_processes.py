@@ -196,7 +196,7 @@ def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -
 
 
 def pid_of(processes: Processes, name: str) -> int:
-    return processes._processes[name].pid
+    return processes.processes[name].pid
 
 
 def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
@@ -243,14 +243,14 @@ def test_a_recorder_that_is_ended_before_the_other_nodes_leaves_a_bag_that_is_no
     assert processes.bag_failure.startswith("the recorder ended before the other nodes; the bag lacks")
 
 
-def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
+def test_a_recorder_that_does_not_end_is_killed_and_named(
     recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
     monkeypatch.setattr(bring_up, "PROCESS_LIMITS", replace(bring_up.PROCESS_LIMITS, recorder_end=0.5))
     os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
     recording.close()
     assert recording.killed == ["recorder"]
-    assert "node recorder is killed: it has done nothing for" in capfd.readouterr().err
+    assert "node recorder is killed: it did not end within" in capfd.readouterr().err
     (bag,) = tmp_path.glob("bags/*")
     assert not (bag / "metadata.yaml").exists()
     main_without_exit("bag", "repair", str(bag))
@@ -279,7 +279,7 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     processes.close()
     assert processes.killed == []
     assert processes.bag_failure == ""
-    assert processes._processes["recorder"].returncode == -signal.SIGVTALRM
+    assert processes.processes["recorder"].code == -signal.SIGVTALRM
     assert processes.ended() == {"recorder": 0}
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
     printed = capfd.readouterr().err.splitlines()

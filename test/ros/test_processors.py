@@ -68,7 +68,7 @@ def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
             (os.sched_getscheduler(int(thread.name)), frozenset(os.sched_getaffinity(int(thread.name))))
             for thread in Path("/proc", str(process.pid), "task").iterdir()
         }
-        for name, process in processes._processes.items()
+        for name, process in processes.processes.items()
     }
 
 
@@ -143,7 +143,7 @@ def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_i
         expected = expected_priorities()
         while any(
             is_apart == (permitted in {where for _, where in of}) for of in placed(processes).values()
-        ) or expected != {name: priority(processes._processes[name].pid) for name in ENTRIES}:
+        ) or expected != {name: priority(processes.processes[name].pid) for name in ENTRIES}:
             assert time.monotonic() < end, "some threads are elsewhere, or have another priority"
             time.sleep(0.02)
         found = placed(processes)
@@ -174,6 +174,6 @@ def expected_priorities() -> dict[str, tuple[int, int]]:
 
 
 def environment_of(processes: Processes, name: str) -> bytes:
-    environment = Path("/proc", str(processes._processes[name].pid), "environ").read_bytes()
+    environment = Path("/proc", str(processes.processes[name].pid), "environ").read_bytes()
     assert PARENT.encode() in environment
     return environment

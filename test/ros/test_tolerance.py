@@ -2,7 +2,6 @@
 
 import contextlib
 import random
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -224,22 +223,6 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     sender.publish(state)
     ros.wait(lambda: not any(driver.peers.faults.values()), what="the node is well again")
     assert gravity.health.counts["steps"] == 2
-
-
-def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
-    ros: Any, tmp_path: Path, capfd: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("wam_ros.node.NODE_LIMITS", replace(NODE_LIMITS, slow_step=-1.0))  # every step is slow
-    gravity = make(ros, tmp_path, "gravity", ["gravity"])
-    sender = ros.node("sender").create_publisher(JointState, "joint_states", 10)
-    ros.wait(lambda: sender.get_subscription_count() == 1)
-    for stamp in (5_000_000, 10_000_000):
-        sender.publish(JointState(header=header(stamp), name=list(WAM.shared.arm.joints.names), position=[0.0] * 4))
-    ros.wait(lambda: gravity.health.counts["steps"] == 2)
-    told = capfd.readouterr().err
-    assert told.count("node gravity: a step took 0.0 s; the other nodes wait for it") == 1
-    assert "the machine is busy" in told  # the node is none of the user's
-    assert "faster" not in told
 
 
 def test_a_directory_that_cannot_be_written_is_a_warning_and_no_end(ros: Any, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ import difflib
 import math
 import re
 import sys
-import time
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any, Final
@@ -172,11 +171,10 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     """Print messages; report once that none comes and why, and end after a silence that is too long."""
     stack.follow_statuses()
-    taken, since, is_reported = 0, time.monotonic(), False
+    taken, is_reported = 0, False
 
-    def check() -> None:
+    def check(silent: float) -> None:
         nonlocal is_reported
-        silent = time.monotonic() - since
         of = f" of {given.count}" if given.count is not None else ""
         waits = f"waits for message {taken + 1}{of} of {given.topic}"
         if given.timeout is not None and silent > given.timeout:
@@ -190,7 +188,7 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
 
     try:
         for message in islice(stack.messages(given.topic, check=check), given.count):
-            taken, since, is_reported = taken + 1, time.monotonic(), False
+            taken, is_reported = taken + 1, False
             print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
             sys.stdout.flush()
     except TimeoutError as error:

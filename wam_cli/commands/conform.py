@@ -92,7 +92,7 @@ def run(given: argparse.Namespace) -> int:
     ):
         timing = configuration.shared.timing
         set_priority(max(timing.fifo_priority - 1, 0), timing.niceness)  # as the velocity loop, behind the driver
-        driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
+        driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[:1], given.namespace)
         try:
             if driver:
                 bench.end, bench.restart = driver.stop, driver.start

@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_bag.bag import read
 from wam_bag.errors import BagError
 from wam_cli.options import (
     configuration_of,
@@ -24,11 +23,9 @@ from wam_cli.options import (
 )
 from wam_control.task.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
-from wam_description.event import Code
 from wam_description.interface import Interface, require_parameters
 from wam_description.nodes import ONE
 from wam_ros.process_signals import Stop, end_at_once_on_signals
-from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
@@ -87,14 +84,13 @@ def run(given: argparse.Namespace) -> int:
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
-    stated = stoppable_report(bag, bool(failures), task)
+    stated, bag_word = stoppable_report(bag, bool(failures), task), shlex.quote(str(bag))
     if failures:
         stream = sys.stdout if stated.is_there else sys.stderr  # that of the report
-        print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=stream)
-        for command in _next(configuration.shared.timing.mode, bag if stated.is_there else None):
-            print(f"next: {command}", file=stream)
+        print(f"\nthe demonstration failed: {', '.join(failures)}", file=stream)
+        if stated.is_there:
+            print(f"next: wam analyse {bag_word}", file=stream)
         return 1
-    bag_word = shlex.quote(str(bag))
     print(f"next     wam live {bag_word}       # the recording in the browser")
     print(f"         wam analyse {bag_word}    # measured and compared with theory")
     return exit_code_of(stated.unmet)
@@ -170,24 +166,6 @@ def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
     stated = "\n".join([text(task, result), *["", "Wrong"][: 2 * bool(wrong)], *wrong])
     missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
     return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
-
-
-def _cause(bag: Path) -> str:
-    """Why the scenario ended, as it was recorded; '' where that is not known."""
-    try:
-        outcome = recorded_run(read(bag, ["status"], may_lack=True)).outcome
-    except (BagError, OSError):
-        return ""
-    return "" if outcome == Code.DONE else outcome
-
-
-def _next(mode: str, bag: Path | None) -> list[str]:
-    """What the user can do after a failure."""
-    commands = [f"wam analyse {shlex.quote(str(bag))}"] if bag else []
-    if mode == "realtime":
-        commands.append("wam demo    # without --realtime: lockstep waits for a busy machine")
-    other = "if something else runs in this ROS domain, end it, or set another ROS_DOMAIN_ID"
-    return commands or [f"correct what is named above; {other}; then wam demo"]
 
 
 class PlayedDemo(NamedTuple):

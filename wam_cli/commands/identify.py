@@ -29,13 +29,14 @@ from wam_cli.options import (
     take_configuration,
     writable_directory,
 )
+from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, files_of
 from wam_description.parameters import ParameterError
-from wam_ros.bring_up import Composition
 from wam_ros.process_signals import Stop
 from wam_sim.progress import Progress
 from wam_sim.recording import RecordedRun, recorded_run
+from wam_sim.simulated_bag import record
 from wam_studies.identification.excitation import scenario
 
 HEADING = "# Moves that show the arm's parameters"  # of a scenario that this command wrote
@@ -149,40 +150,20 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     command = f"wam identify --excite {shlex.quote(str(given.excite))} --seed {seed} --seconds {seconds:g}"
     given.excite.write_text(f"{HEADING}: {command}\n{text}", encoding="utf-8")
     still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
-    record = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
-    print(f"written: {given.excite}; on a real arm: {record}", flush=True)
+    on_arm = f"wam up --record --scenario {shlex.quote(str(given.excite))}{still}"
+    print(f"written: {given.excite}; on a real arm: {on_arm}", flush=True)
     if given.only_write:
         return None
-    folder = given.directory or writable_directory("bags")
-    name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    played = configuration.with_nodes("scenario", "recorder")
-    values = {
-        "timing.mode": "lockstep",
-        "timing.real_time_factor": 0.0,
-        "timing.dither_cycle": 0,
-        "scenario:script": str(given.excite.resolve()),
-        "recorder:directory": str(folder),
-        "recorder:name": name,
-    }
-    return folder / name if _play(played.with_values(values), seconds) else None
-
-
-def _play(configuration: Configuration, seconds: float) -> bool:
-    """Play the scenario in lockstep and record it; False where it was interrupted.
-
-    Raises
-    ------
-    ValueError
-        where it failed.
-    """
+    bag = (given.directory or writable_directory("bags")) / f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
-
-    def is_stopped(now: float) -> bool:
-        progress(min(int(now), int(seconds)), int(seconds))
-        return stop.is_set
-
-    with Composition(configuration) as composition:
-        played = composition.play(is_stopped)
-    if failure := played.failure or played.fault:
+    played = configuration.with_values({"timing.dither_cycle": 0})
+    failure = record(
+        played,
+        load_for(played, str(given.excite)),
+        bag,
+        report=lambda now, step: progress(min(int(now), int(seconds)), int(seconds)),
+        is_stopped=lambda: stop.is_set,
+    )
+    if failure:
         raise ValueError(f"the motion failed: {failure}")
-    return not stop.is_set
+    return None if stop.is_set else bag

@@ -45,7 +45,7 @@ class NodeProcesses(StackClient):
     def __init__(self, configuration: Configuration) -> None:
         super().__init__(name="watcher", shared=configuration.shared)
         self.processes = {
-            name: NodeProcess(configuration, name, NAMESPACE, "fatal")
+            name: NodeProcess(configuration, [name], NAMESPACE, "fatal")
             for name in ANSWERS
             if name in configuration.shared.nodes
         }

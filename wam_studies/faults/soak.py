@@ -65,7 +65,7 @@ def soak(case: SoakCase) -> SoakRecord:
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
         with Composition(configuration.with_values(own)) as composition:
             samples: list[_MemorySample] = []
-            failure = composition.play(partial(_sample, samples)).failure
+            failure = composition.play(partial(_sample, samples))
         found = contents(Path(folder, "soak"))
     first, last, early = samples[0], samples[-1], samples[len(samples) // 10].memory
     factor = (last.seconds - first.seconds) / max(last.wall - first.wall, 1e-9)
