@@ -1,7 +1,6 @@
 """A running stack as a program next to it sees it: requests, parameters, statuses, topics."""
 
 import importlib
-import math
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -163,7 +162,7 @@ class StackClient(Closing):
         return requested.found[node]
 
     def read_shared(self) -> Shared:
-        """The shared parameters of the stack, as its driver has them; of another node next to a driver without them.
+        """The shared parameters of the stack, as the first node has them that answers; all have the same.
 
         Raises
         ------
@@ -173,19 +172,12 @@ class StackClient(Closing):
             where they are those of another version.
         """
         requested = RemoteParameters(self.node, NODES)
-        first = math.inf
 
         def found() -> list[dict[str, Any]]:
-            return [requested.found[name] for name in NODES if MODE in requested.found.get(name, {})]
-
-        def is_answered() -> bool:
-            nonlocal first
             requested.ask()
-            if found():
-                first = min(first, time.monotonic())
-            return MODE in requested.found.get("driver", {}) or time.monotonic() - first > CALL_LIMITS.discovery
+            return [values for values in requested.found.values() if MODE in values]
 
-        self._require(is_answered, f"no node of a stack in {self.node.get_namespace()} answers")
+        self._require(found, f"no node of a stack in {self.node.get_namespace()} answers")
         return build_part(Shared, found()[0])
 
     def await_driver(self, until: Callable[[], bool], others: Iterable[str] = ()) -> Mapping[str, Mapping[str, Any]]:

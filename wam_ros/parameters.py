@@ -99,17 +99,14 @@ def follow_together(
         try:
             for i, (_, take, prefix) in enumerate(parts):
                 present[i] = _updated(present[i], given, prefix, take)
-        except ParameterError as error:
+        except Exception as error:
+            is_refused = isinstance(error, ParameterError)  # else of a node of one's own, which may have taken a part
             for i, (_, take, _) in enumerate(parts):
-                if present[i] is not before[i]:
-                    present[i] = before[i]
+                if present[i] is not before[i] or not is_refused:
                     take(before[i])
-            return SetParametersResult(successful=False, reason=str(error))
-        except Exception as error:  # of a node of one's own: it must not go on with a part of the set
             present[:] = before
-            for own, (_, take, _) in zip(before, parts, strict=True):
-                take(own)
-            return SetParametersResult(successful=False, reason=f"the node failed on it: {raised(error)}")
+            reason = str(error) if is_refused else f"the node failed on it: {raised(error)}"
+            return SetParametersResult(successful=False, reason=reason)
         if present != before:
             report(given)
         return SetParametersResult(successful=True)

@@ -4,7 +4,7 @@ import json
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_bag.contents import mode_of
@@ -17,6 +17,8 @@ from wam_description.topics import TOPICS
 from wam_sim.reactions import RecordedReaction, lasting
 from wam_sim.recorded_commands import RefusedCommands, several_runs, taken_commands
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
+
+Kind = TypeVar("Kind", JointColumns, WrenchColumns, PointColumns, TableColumns)
 
 
 class RecordedStep(NamedTuple):
@@ -160,23 +162,23 @@ class RecordedRun(NamedTuple):
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
-        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
-        return columns if isinstance(columns, JointColumns) and len(columns.stamp_ns) else None
+        return self._columns(topic, JointColumns)
 
     def wrench(self, topic: str) -> WrenchColumns | None:
         """Columns of a WrenchStamped topic of the arm, None if nothing was recorded."""
-        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
-        return columns if isinstance(columns, WrenchColumns) and len(columns.stamp_ns) else None
+        return self._columns(topic, WrenchColumns)
 
     def points(self, topic: str) -> PointColumns | None:
         """Columns of a PointStamped topic of the arm, None if nothing was recorded."""
-        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
-        return columns if isinstance(columns, PointColumns) and len(columns.stamp_ns) else None
+        return self._columns(topic, PointColumns)
 
     def table(self, topic: str) -> TableColumns | None:
         """Columns of a topic of tables of the arm, None if nothing was recorded."""
+        return self._columns(topic, TableColumns)
+
+    def _columns(self, topic: str, kind: type[Kind]) -> Kind | None:
         columns = self.bag.topics.get(f"{self.namespace}/{topic}")
-        return columns if isinstance(columns, TableColumns) and len(columns.stamp_ns) else None
+        return columns if isinstance(columns, kind) and len(columns.stamp_ns) else None
 
     def messages(self, topic: str) -> Sequence[Any]:
         """Decoded messages of a topic that is no column, none if it was not recorded."""

@@ -382,8 +382,8 @@ def _compare(topic: Topic, columns: Columns | None, replayed: Sequence[TopicValu
     labels = _labels(topic, columns, names)
     differing = [one for old, new in both if (one := _differences(topic, old, new, labels))]
     first = differing[0][0][0] if differing else None
-    sizes = [(abs(one.recorded - one.replayed), unit) for one, unit in chain(*differing) if unit is not None]
-    largest, unit = max((one for one in sizes if 0.0 < one[0] < math.inf), key=itemgetter(0), default=(0.0, ""))
+    sizes = [(size, unit) for _, size, unit in chain(*differing) if 0.0 < size < math.inf]
+    largest, unit = max(sizes, key=itemgetter(0), default=(0.0, ""))
     missing = len(recorded) - len(both)
     alone = next((row.stamp for row in recorded if row.stamp not in known), None)
     more = len(replayed) - len(both)
@@ -392,16 +392,17 @@ def _compare(topic: Topic, columns: Columns | None, replayed: Sequence[TopicValu
 
 def _differences(
     topic: Topic, old: TopicValue, new: TopicValue, labels: Sequence[tuple[str, str]]
-) -> list[tuple[Difference, str | None]]:
-    """Where two messages differ, with the unit of a number."""
+) -> list[tuple[Difference, float, str]]:
+    """Where two messages differ, by how much and in which unit."""
     if old.frame != new.frame:
-        return [(Difference(old.stamp, "frame", old.frame, new.frame), None)]
+        return [(Difference(old.stamp, "frame", old.frame, new.frame), 0.0, "")]
     if len(old.values) != len(new.values):
-        return [(Difference(old.stamp, "number of values", len(old.values), len(new.values)), None)]
-    found: list[tuple[Difference, str | None]] = []
+        return [(Difference(old.stamp, "number of values", len(old.values), len(new.values)), 0.0, "")]
+    found = []
     for i, (a, b) in enumerate(zip(old.values, new.values, strict=True)):
         if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
             row, column = divmod(i, len(labels))
             field, unit = labels[column]
-            found.append((Difference(old.stamp, f"row {row}, {field}" if topic.type == TABLE else field, a, b), unit))
+            named = f"row {row}, {field}" if topic.type == TABLE else field
+            found.append((Difference(old.stamp, named, a, b), abs(a - b), unit))
     return found

@@ -93,66 +93,6 @@ def test_a_number_that_cannot_be_changed_is_named(
 
 
 @pytest.mark.parametrize(
-    ("values", "reason"),
-    [
-        ("010,020", "'seed=010,020' is no NAME=VALUES: 010 is 8 in YAML; write that number"),
-        ("{a: 1, a: 2}", "'a' is given twice"),
-        ("0.01:inf:3", "'0.01:inf:3' is no LOW:HIGH:N with 0 < LOW < HIGH"),
-        ("0x" + "f" * 5000, "beyond every float"),
-        ("", "write for example servo.gain=1,2"),
-        ("1:2:1000000000", "'1:2:1000000000' has 1000000000 values; at most 100000 sets are played"),
-    ],
-)
-def test_values_of_a_sweep_are_refused_with_the_reason(values: str, reason: str, capsys: Any) -> None:
-    with pytest.raises(SystemExit):
-        main(["sweep", "t.csv", "--vary", f"seed={values}"])
-    printed = " ".join(capsys.readouterr().err.split())
-    assert reason in printed
-    assert len(printed) < 2000
-
-
-def test_nodes_that_do_not_fit_are_refused_before_the_demonstration_is_announced(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    code, out, err = said(capsys, "demo", "--set", "nodes=[driver, gravity, gravity]")
-    assert (code, out) == (1, "")
-    assert "two nodes of the configuration are named 'gravity'; list one of them" in err
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        ("force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
-        ("force_loop:contact_cover=hand", "contact_cover is 'hand'; allowed: inner_link, outer_link"),
-        ("driver:effects.added_coulomb_friction=[0.5]", "'effects.added_coulomb_friction' has 1 value; 4 names need 4"),
-    ],
-)
-def test_a_value_that_is_not_allowed_is_refused_before_the_demonstration_is_announced(
-    value: str, text: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    code, out, err = said(capsys, "demo", "--no-live", "--set", value)
-    assert (code, out) == (1, "")
-    assert text in err
-
-
-@pytest.mark.parametrize("task", [(), ("--task", "push-box")])
-@pytest.mark.parametrize("name", ["../x", "a/b"])
-def test_a_name_with_directories_is_refused_before_the_demonstration_is_announced(
-    name: str,
-    task: tuple[str, ...],
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    code, out, err = said(capsys, "demo", "--no-live", "--name", name, *task)
-    assert (code, out) == (1, "")
-    assert f"'name' is '{name}'; allowed: a name without directories" in err
-
-
-@pytest.mark.parametrize(
     "words",
     ["demo --scenario", "demo --task", "demo --name", "up --scenario", "sweep t.csv --vary seed=1 --scenario"],
 )
@@ -162,25 +102,6 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     code, out, err = said(capsys, *words.split(), "")
     assert (code, out) == (2, "")
     assert "it is empty; give a name or a file, or leave the option out" in err
-
-
-@pytest.mark.parametrize("command", ["model urdf", "demo --no-live", "up", "sweep t.csv --vary seed=1"])
-def test_a_parameter_with_two_values_is_refused(
-    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    code, out, err = said(capsys, *command.split(), "--set", "arm.payload=0.5", "--set", "arm.payload=1")
-    assert (code, out) == (1, "")
-    assert "--set has arm.payload twice, with two values; give one of them" in err
-
-
-def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    code, out, err = said(capsys, "up", "--scenario", "nosuch")
-    assert code == 1
-    assert "nosuch" in err
-    assert "started" not in out
 
 
 def test_a_library_of_the_system_that_is_missing_is_named(

@@ -50,6 +50,29 @@ REFUSED = [
     ("node elbow", "no node is named 'elbow'; nodes: driver, transform, velocity_loop"),
     ("demo --no-live --name here", "bag bags/here exists already; give another name as --name, or move it away"),
     ("bag record --name here", "bag bags/here exists already; give another name as --name, or move it away"),
+    ("up --scenario nosuch", "no scenario 'nosuch'"),
+    ("demo --no-live --name ../x", "'name' is '../x'; allowed: a name without directories"),
+    ("demo --set nodes=[driver,gravity,gravity]", "two nodes of the configuration are named 'gravity'; list one of"),
+    ("demo --set force_loop:force_gain=[-1.0]", "parameter 'force_gain' is -1.0 m/s/N; allowed: 0 to 100"),
+    ("demo --set force_loop:contact_cover=hand", "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+    ("demo --set driver:effects.added_coulomb_friction=[0.5]", "friction' has 1 value; 4 names need 4"),
+    *(
+        (f"{words} --set arm.payload=0.5 --set arm.payload=1", "--set has arm.payload twice, with two values")
+        for words in ("model urdf", "demo --no-live", "up", "sweep t.csv --vary seed=1")
+    ),
+    ("sweep t.csv --vary seed=010,020", "'seed=010,020' is no NAME=VALUES: 010 is 8 in YAML; write that number"),
+    ('sweep t.csv --vary seed={"a":1,"a":2}', "'a' is given twice"),
+    ("sweep t.csv --vary seed=0.01:inf:3", "'0.01:inf:3' is no LOW:HIGH:N with 0 < LOW < HIGH"),
+    (f"sweep t.csv --vary seed=0x{'f' * 5000}", "beyond every float"),
+    ("sweep t.csv --vary seed=", "write for example servo.gain=1,2"),
+    ("sweep t.csv --vary seed=1:2:1000000000", "'1:2:1000000000' has 1000000000 values; at most 100000 sets"),
+    ("sweep t.csv --vary seed=1 --vary seed=2", "--vary has seed 2 times"),
+    ("sweep t.csv --vary scenario:script=a,b", "give the scenario as --scenario"),
+    ("sweep t.csv --vary timing.mode=lockstep", "--vary timing.mode has no effect in runs without ROS"),
+    ("sweep t.csv --vary driver:late_periods=0.1", "--vary driver:late_periods has no effect in runs without ROS"),
+    ("sweep t.csv --vary seed=1 --set timing.niceness=2", "--set timing.niceness has no effect in runs without ROS"),
+    ("sweep t.csv --vary arm.payload=0 --set arm.payload=3", "--set arm.payload has no effect here: --vary sets it"),
+    ("sweep t.csv --vary seed=1:2:999 --vary arm.payload=1:2:999", "998001 sets in all, seed: 999, arm.payload: 999"),
 ]  # fmt: skip
 
 
@@ -63,7 +86,7 @@ def refused(words: str, capfd: pytest.CaptureFixture[str]) -> str:
     return printed.err.splitlines()[-1]
 
 
-@pytest.mark.parametrize(("words", "reason"), REFUSED, ids=[words for words, _ in REFUSED])
+@pytest.mark.parametrize(("words", "reason"), REFUSED, ids=[words[:60] for words, _ in REFUSED])
 def test_it_is_refused_with_the_reason_and_nothing_is_written(
     words: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

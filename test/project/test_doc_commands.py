@@ -13,7 +13,6 @@ A comment before a block says what happens to it.  The blocks of a page are play
 
 import os
 import re
-import select
 import shutil
 import signal
 import subprocess
@@ -302,26 +301,6 @@ def presses(printed: str) -> list[tuple[float, float]]:
     """Commanded and measured force of each line that the client prints, N."""
     lines = re.findall(r"commanded +(\S+) N, measured +(\S+) N", printed)
     return [(float(commanded), float(measured)) for commanded, measured in lines]
-
-
-@pytest.mark.slow
-def test_a_block_that_does_not_end_is_ended_with_its_children_and_named(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "alive")
-    reader = os.open(tmp_path / "alive", os.O_RDONLY | os.O_NONBLOCK)
-    block = Block("run", "sh", "sleep 1000 > alive & sleep 1000\n", "docs/page.md:7")
-    try:
-        with pytest.raises(pytest.fail.Exception, match=r"docs/page\.md:7: not ended within 2 s"):
-            Shell(tmp_path).run(block, limit=2.0)
-        assert select.select([reader], [], [], LONG)[0], "the child lives on"  # readable: nobody has it open
-    finally:
-        os.close(reader)
-
-
-def test_a_block_is_named_by_its_line() -> None:
-    page = ROOT / "docs" / "bags.md"
-    lines = page.read_text(encoding="utf-8").splitlines()
-    for block in blocks_of(page):
-        assert lines[int(block.where.partition(":")[2])].startswith(block.code.splitlines()[0])
 
 
 def test_what_was_not_printed_is_noticed() -> None:

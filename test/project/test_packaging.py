@@ -309,14 +309,24 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
     assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
 
 
-def test_launch_serves_the_trajectory_action_where_its_type_is(launch_file, monkeypatch):
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [("trajectory_action", ["--trajectories"]), ("tf", ["--tf", "--frame-prefix", "left/"])],
+)
+def test_launch_serves_next_to_the_stack_what_has_its_type(option, words, launch_file, monkeypatch):
     _, start = launch_file
-    (*_, server) = start({**CHOSEN, "processes": "false", "trajectory_action": "true"})
-    assert server.cmd[1:] == ["-m", "wam_cli.main", "live", "--trajectories", "--namespace", "left"]
-    assert server.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
-    for spec, processes in ((None, 1), (SimpleNamespace(), 2)):
-        monkeypatch.setattr(importlib.util, "find_spec", lambda name, spec=spec: spec)
-        assert len(start({**CHOSEN, "processes": "false", "trajectory_action": "auto"})) == processes
+    chosen = {**CHOSEN, "processes": "false", "frame_prefix": "left/"}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace())
+    for value in ("auto", "true"):
+        _, server = start({**chosen, option: value})
+        assert server.cmd[1:4] == ["-m", "wam_cli.main", "live"]
+        options = argparse.ArgumentParser()
+        live.arguments(options)
+        assert options.parse_args(server.cmd[4:]) == options.parse_args([*words, "--namespace", "left"])
+        assert server.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
+    assert len(start(chosen)) == 1
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert not any("live" in getattr(one, "cmd", []) for one in start({**chosen, option: "auto"}))
 
 
 def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(launch_file):
@@ -347,20 +357,6 @@ def test_launch_plays_a_scenario_into_a_bag_with_values_of_its_own(launch_file, 
         start({**CHOSEN, "scenario": "nosuch"})
     with pytest.raises(ParameterError, match="--set is 'gain'; write"):
         start({**CHOSEN, "overrides": "gain"})
-
-
-def test_launch_lets_the_stack_publish_its_frames_where_their_type_is(launch_file, monkeypatch):
-    _, start = launch_file
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace())
-    for tf in ("auto", "true"):
-        _, frames = start({**CHOSEN, "processes": "false", "tf": tf, "frame_prefix": "left/"})
-        assert frames.cmd[1:4] == ["-m", "wam_cli.main", "live"]
-        options = argparse.ArgumentParser()
-        live.arguments(options)
-        chosen = options.parse_args(frames.cmd[4:])
-        assert (chosen.namespace, chosen.frame_prefix) == ("left", "left/")
-        assert frames.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
-    assert len(start({**CHOSEN, "processes": "false"})) == 1
 
 
 def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file, monkeypatch):

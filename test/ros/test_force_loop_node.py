@@ -134,30 +134,6 @@ def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, t
     feeder.feed_until(lambda: "domain" in feeder.facts()[0].message)
 
 
-def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:
-    feeder = Feeder(ros, tmp_path)
-    feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
-    start(ros, tmp_path, ["velocity_loop"], timing__mode="realtime")
-    client = feeder.node.create_client(SetParametersAtomically, "velocity_loop/set_parameters_atomically")
-    ros.wait(client.service_is_ready, what="the parameter service")
-
-    def set_gain(factor: float) -> None:
-        gains = [factor * gain for gain in WAM.shared.servo.proportional_gain]
-        parameter = Parameter("servo.proportional_gain", value=gains).to_parameter_msg()
-        future = client.call_async(SetParametersAtomically.Request(parameters=[parameter]))
-        ros.wait(future.done, what="an answer to the set")
-        assert future.result().result.successful
-
-    set_gain(0.1)
-    ros.wait(lambda: "velocity_loop uses servo.* that are not accepted here" in feeder.facts()[0].message)
-    assert feeder.facts()[0].level == DiagnosticStatus.ERROR  # the driver brakes: nothing guards these gains
-    set_gain(1.05)
-    feeder.feed_until(lambda: "domain I" in feeder.facts()[0].message)
-    assert (
-        feeder.loop.node._loop._supervision.servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]
-    )
-
-
 def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
     assert feeder.set(mode="joint_torque", force_feedforward=1.0).successful

@@ -366,7 +366,7 @@ def test_a_node_that_runs_already_is_refused_and_the_first_one_does_not_notice(
     assert first.returncode == 0
 
 
-@pytest.mark.parametrize("name", ["driver", "velocity_loop", "recorder"])
+@pytest.mark.parametrize("name", ["driver", "recorder"])
 def test_a_renamed_node_is_refused_with_what_to_do_instead(
     name: str, programs: Callable[..., subprocess.Popen[str]], domain_id: int
 ) -> None:

@@ -179,37 +179,6 @@ def strict(ros: Any, tmp_path: Path) -> Hand:
     return Hand(ros, tmp_path, "realtime", **{"driver:late_periods": 0.05})
 
 
-def test_driver_starts_braked_and_lets_no_current_through(hand: Hand) -> None:
-    before = hand.driver.plant.theta
-    hand.currents = [2.0] * 4
-    hand.wait_periods(100)
-    assert hand.driver.safety.mode is Mode.BRAKED
-    assert hand.driver.currents == [0.0] * 4
-    assert hand.driver.plant.theta == pytest.approx(before, abs=1e-6)
-
-
-def test_enable_lets_currents_flow_and_disable_stops_them(hand: Hand) -> None:
-    hand.enable()
-    assert hand.driver.safety.mode is Mode.ENABLED
-    answer = hand.ask("enable", False)
-    assert answer.message == "braked: brakes on, currents zero"
-    assert hand.driver.currents == [0.0] * 4
-    hand.wait_periods(10)
-    assert hand.driver.currents == [0.0] * 4
-
-
-def test_enable_without_commands_is_refused(live: Hand) -> None:
-    hand = live
-    hand.is_answering = False
-    hand.wait_periods(100)
-    answer = hand.ask("enable", True)
-    assert not answer.success
-    assert answer.message == (
-        "refused: no motor_current_command comes in; start velocity_loop and its peers, then enable"
-    )
-    assert hand.driver.safety.mode is Mode.BRAKED
-
-
 def bad(names: list[str] = MOTORS, effort: list[float] | None = None, ahead: int = 0) -> Callable[[int], Any]:
     values = [3.0] * 4 if effort is None else effort
     return lambda stamp: joint_state(stamp + ahead, names, State([], [], values))
@@ -219,14 +188,9 @@ def bad(names: list[str] = MOTORS, effort: list[float] | None = None, ahead: int
     "message",
     [
         bad(effort=[3.0, math.nan, 3.0, 3.0]),
-        bad(effort=[math.inf, 3.0, 3.0, 3.0]),
-        bad(names=["motor1", "motor2", "motor3", "motor9"]),
-        bad(names=["motor1", "motor2", "motor3", "motor3"]),
-        bad(effort=[3.0] * 3),
         bad(names=MOTORS[:3], effort=[3.0] * 3),
-        bad(effort=[]),
     ],
-    ids=["nan", "inf", "unknown", "doubled", "short", "missing", "empty"],
+    ids=["nan", "missing"],
 )
 def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: Any, hand: Hand) -> None:
     heard = Listener(hand.ros, "/diagnostics")
@@ -243,14 +207,13 @@ def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: 
     assert reports[-1].status[0].level == DiagnosticStatus.WARN
 
 
-@pytest.mark.parametrize("stamp", [0, -5 * MS, 10_000 * MS], ids=["none", "before the begin", "of the future"])
-def test_a_command_that_answers_no_state_is_refused_in_realtime(stamp: int, live: Hand) -> None:
+def test_a_command_that_answers_no_state_is_refused_in_realtime(live: Hand) -> None:
     live.enable()
     live.is_answering = False
-    given = live.driver.stamp + stamp if stamp > 0 else stamp
+    stamps = [0, -5 * MS, live.driver.stamp + 10_000 * MS]
     refused = live.node.health.counts
-    while refused["refused on motor_current_command"] < 3:
-        live.publisher.publish(joint_state(given, MOTORS, State([], [], [3.0] * 4)))
+    while (count := refused["refused on motor_current_command"]) < 3:
+        live.publisher.publish(joint_state(stamps[count], MOTORS, State([], [], [3.0] * 4)))
         live.wait_periods(1)
     live.wait_periods(60)
     assert "command stale" in live.driver.safety.fault, "it does not feed the watchdog"
@@ -261,7 +224,7 @@ def counted(message: Any, key: str) -> str | None:
     return next((pair.value for pair in message.status[0].values if pair.key == key), None)
 
 
-def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Hand) -> None:
+def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_the_motors(live: Hand) -> None:
     heard = Listener(live.ros, "status")
     live.enable()
     other = live.ros.node("intruder")
@@ -270,7 +233,11 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
     assert live.driver.currents == [0.0] * 4
     text = "/wam/intruder and /wam/velocity_loop publish motor_current_command, but only one node may; stop the others"
     live.ros.wait(lambda: any(text in m.message and m.level == DiagnosticStatus.ERROR for m in heard.seen["status"]))
+    for _ in range(20):
+        second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
+    live.wait_periods(20)
     assert live.node.health.counts["refused on motor_current_command"] > 0
+    assert all(max(map(abs, sample.actual)) < 2.0 for sample in live.driver.recent)
     live.ask("reset_fault")
     assert "only one node may" in live.ask("enable", True).message
     other.destroy_publisher(second)
@@ -278,33 +245,6 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
     live.ros.wait(lambda: not live.node.health.problem)
     live.wait_periods(5)
     live.enable()
-
-
-def test_a_command_of_the_second_publisher_never_reaches_the_motors(live: Hand) -> None:
-    live.enable()
-    other = live.ros.node("intruder")
-    second = other.create_publisher(JointState, "motor_current_command", qos(BY_NAME["motor_current_command"]))
-    live.ros.wait(lambda: second.get_subscription_count() and live.driver.safety.mode is Mode.FAULT)
-    for _ in range(20):
-        second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
-    live.wait_periods(20)
-    assert all(max(map(abs, sample.actual)) < 2.0 for sample in live.driver.recent)
-    assert live.driver.currents == [0.0] * 4
-
-
-def test_enable_with_a_latched_fault_is_refused_until_it_is_reset(hand: Hand) -> None:
-    hand.enable()
-    answer = hand.ask("estop")
-    assert answer.success
-    assert hand.driver.currents == [0.0] * 4
-    refused = hand.ask("enable", True)
-    assert not refused.success
-    assert refused.message == ("refused: fault 'emergency stop' is latched; call reset_fault first, then enable")
-    hand.wait_periods(10)
-    assert hand.driver.currents == [0.0] * 4
-    assert "call enable to move" in hand.ask("reset_fault").message
-    assert hand.driver.safety.mode is Mode.BRAKED, "reset never enables"
-    hand.enable()
 
 
 def last_flow_after(hand: Hand, stamp: int) -> int:
@@ -362,24 +302,6 @@ def test_in_realtime_the_driver_is_connected_when_its_computer_has_kept_the_peri
     strict.node.create_timer(0.001, note)
     strict.ros.wait(lambda: connected, what="a driver that is connected")
     assert connected[0] >= 1000 * MS
-
-
-def test_a_command_that_answers_an_old_state_again_and_again_is_stale_too(live: Hand) -> None:
-    live.enable()
-    live.stamp = repeated = live.last
-    live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="the watchdog")
-    live.wait_periods(20)
-    assert last_flow_after(live, repeated) <= 50 * MS
-    assert "command stale" in live.driver.safety.fault
-
-
-def test_what_was_commanded_before_enable_is_discarded(live: Hand) -> None:
-    live.currents = [2.0] * 4
-    live.wait_periods(20)
-    live.is_answering = False
-    assert live.ask("enable", True).success
-    live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="the watchdog")
-    assert not any(any(sample.actual) for sample in live.driver.recent)
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])

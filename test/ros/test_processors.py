@@ -22,11 +22,8 @@ OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
 
 
-def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest() -> None:
+def test_the_inner_loop_has_the_idlest_processor_and_all_others_the_rest_if_there_is_any() -> None:
     assert divided({0: 0.1, 3: 0.9, 5: 0.4}) == ({3}, {0, 5})
-
-
-def test_where_only_one_is_permitted_all_have_it() -> None:
     assert divided({2: 0.0}) == ({2}, {2})
 
 

@@ -278,12 +278,11 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
     assert attached["/wam/recorder"]["ros__parameters"]["timing"]["period"] == 0.001
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
+def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path) -> None:
     with recorder_process(ros, tmp_path) as process:
         sending(ros, 500)
         ros.wait(lambda: len(recovered(tmp_path / "bag" / "bag_0.mcap")) >= 500)
-        process.send_signal(stop)
+        process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=LONG)
         assert process.returncode == 0, said
     assert "none lost" in said

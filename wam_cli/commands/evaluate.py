@@ -135,13 +135,8 @@ def _words(given: argparse.Namespace, study: Study[Any, Any]) -> str:
     for one in _options(type(study)):
         value, name = getattr(study, one.name), f"--{one.name.replace('_', '-')}"
         if value != one.default:
-            words += [name] if value is True else [name, *_texts(value)]
+            words += [name] if value is True else [name, *map(str, value if isinstance(value, tuple) else (value,))]
     return shlex.join(words)
-
-
-def _texts(value: Any) -> tuple[str, ...]:
-    """The words of a value."""
-    return value if isinstance(value, tuple) else (value if isinstance(value, str) else f"{value:g}",)
 
 
 def _write(given: argparse.Namespace, measured: Measurement) -> None:
