@@ -206,7 +206,7 @@ def require_option(given: argparse.Namespace, needed: str, *options: str) -> Non
 
 
 def _is_given(given: argparse.Namespace, option: str) -> bool:
-    value = getattr(given, option.removeprefix("--").replace("-", "_").lower())
+    value = getattr(given, option.removeprefix("--").replace("-", "_"))
     return value is not None and value is not False
 
 

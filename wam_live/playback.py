@@ -111,16 +111,13 @@ class BagSource:
         return Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
 
 
-def play(
-    recording: AnalysedRecording, port: int, at: float | None, until: Callable[[], bool], notify: Callable[[str], None]
-) -> None:
+def play(recording: AnalysedRecording, port: int, until: Callable[[], bool], notify: Callable[[str], None]) -> None:
     """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`.
 
     Parameters
     ----------
     recording : of the bag.
     port : to listen on.
-    at : time that is shown, s since the first state; None: it plays from there.
     until : whether it is over.
     notify : called with lines for people.
     """
@@ -130,10 +127,10 @@ def play(
         scene = Scene(server, source.recorded.arm, source.recorded.world, draggable=False)
         length = (source.end - source.begin) / 1e9
         name_page(server, recording.bag.path.name)
-        place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
+        place, then = 0.0, time.monotonic()
         slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
         speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
-        running = server.gui.add_checkbox("play", at is None)
+        running = server.gui.add_checkbox("play", True)
         panel = Controls(server, source.recorded.arm)
         notify(f"{recording.bag.path}: {url(port)}")
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 class NodeLimits:
     """A node, its messages and its status."""
 
-    loss_repeated: int = 10  # steps, after which a loss is reported again while the arm is enabled
     long_step: float = 0.02  # s, from which a step holds up the other nodes of its process; a driver waits 0.025 s
     long_step_look: float = 0.01  # s between two looks for one
     long_step_recent: float = 1.0  # s, in which what the others lack is the consequence of one

@@ -27,7 +27,6 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Declaration, Followed, Outputs, mask, needed_arrays
 from wam_ros.connections import StackNode
 from wam_ros.health import problem_of
-from wam_ros.limits import NODE_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.parameters import Follower, follow_together
@@ -215,15 +214,13 @@ class AdaptedNode(StackNode):
         ages = {topic: age for topic, age in feed.synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
             health.set_problem("inputs", None)
-        elif (is_new := "inputs" not in health.problems) or health.counts["steps"] % NODE_LIMITS.loss_repeated == 0:
+        elif "inputs" not in health.problems:
             lost, stopped = self.interface.silent(ages)  # on a busy machine another node may just have been late
             topics = " and ".join(lost)
             problem = fault("stopped", nodes=", ".join(stopped), topics=topics)
             if step := self.peers.held_up(stopped):
                 problem = fault("long_step", step=step, topics=topics)
             health.set_problem("inputs", problem)
-            if not is_new:
-                health.repeat()
 
     # what the other nodes report, live parameters, requests
 

@@ -126,16 +126,6 @@ def doubts(reactions: Sequence[RecordedReaction], step: StepSpan) -> list[Record
     return [] if missed else list({one.name: one for one in reversed(at_end)}.values())
 
 
-def doubts_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
-    """A sentence for each report at the end of a step that counts as met."""
-    return [
-        f"{one.name}, {why.name}: {why.reason}"
-        for one in played
-        if one.step.commands_arm
-        for why in doubts(reactions, one)
-    ]
-
-
 def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
     """A sentence for each reason why what a step commands is not met."""
     return [

@@ -25,7 +25,7 @@ from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode
 from wam_sim.bus import Bus, Rows, of_node
-from wam_sim.reactions import PlayedStep, RecordedReaction, doubts_in_words, lasting, unmet_in_words
+from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
 
 SCENARIO = "scenario"
 WITHOUT_EFFECT = frozenset(  # in a direct run: it is in lockstep, as fast as it can, and no node is a process
@@ -154,14 +154,6 @@ class Simulation:
     def unmet(self) -> str:
         """Which steps were played and yet not carried out, and why; '' where all were."""
         return "; ".join(unmet_in_words(self.reactions, self.played))
-
-    @property
-    def doubts(self) -> str:
-        """What the force loop reported at the end of steps that were carried out, '' where nothing.
-
-        The true force may be another than the measured one there, as where its position had to be assumed.
-        """
-        return "; ".join(doubts_in_words(self.reactions, self.played))
 
     @property
     def scenario(self) -> Any:

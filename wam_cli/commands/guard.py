@@ -21,7 +21,6 @@ PLANT = {  # option: what it is
 }
 LOOP = {  # option: default, what it is
     "limit": (math.inf, "saturation of the error; default: none"),
-    "deadband": (0.0, "deadband of the error; default: 0"),
     "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
@@ -83,7 +82,7 @@ def _assess(given: argparse.Namespace) -> int:
         name: default if getattr(given, name) is None else getattr(given, name) for name, (default, _) in LOOP.items()
     }
     stiction = value["friction"] if given.stiction is None else given.stiction
-    loop = IntegralLoop(value["gain"], error_limit=value["limit"], deadband=value["deadband"])
+    loop = IntegralLoop(value["gain"], error_limit=value["limit"])
     plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
     design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
     print(design.text())

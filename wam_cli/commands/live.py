@@ -30,7 +30,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     where = "namespace of the stack, default wam; or of the arm in the bag, default the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
-    parser.add_argument("--at", type=float, metavar="SECONDS", help="with a bag: show this time, do not play")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
     way.add_argument(
@@ -42,7 +41,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Show or serve until Ctrl-C."""
-    require_option(given, "BAG", "--at")
     require_option(given, "--tf", "--frame-prefix")
     if given.bag is not None and (given.tf or given.trajectories):
         raise ValueError("--tf and --trajectories are for a running stack; leave out the bag")
@@ -119,7 +117,7 @@ def _recording(given: argparse.Namespace) -> int:
         from wam_live.playback import play
     stop = Stop()
     port = free_port(given.port, _print)
-    play(_run_of(given), port, given.at, lambda: stop.is_set, _print)
+    play(_run_of(given), port, lambda: stop.is_set, _print)
     return 0
 
 
