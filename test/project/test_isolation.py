@@ -1,7 +1,6 @@
 """Tests test the tree, in ROS domains of their own, and disturb nobody."""
 
 import importlib
-import socket
 import sys
 from pathlib import Path
 
@@ -33,13 +32,6 @@ def test_domains_of_the_tests_are_none_that_a_user_takes() -> None:
         assert ports[0] not in LINUX_GIVES
         assert ports[-1] not in LINUX_GIVES
         assert len(ports) > 2 * 32  # two for each participant
-
-
-def test_a_domain_with_a_participant_is_seen() -> None:
-    with locked_domain() as number, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
-        assert not is_inhabited(number)
-        participant.bind(("127.0.0.1", 7400 + PORTS * number + 11))
-        assert is_inhabited(number)
 
 
 def test_every_port_of_a_domain_is_looked_at_and_no_other(tmp_path: Path) -> None:

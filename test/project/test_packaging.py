@@ -429,23 +429,6 @@ def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
             named_file("nosuch", "--params-file", files)
 
 
-@pytest.mark.parametrize(
-    ("config", "text"),
-    [
-        (
-            "nowhere",
-            r"no configuration 'nowhere' .* there are: barrett-wam4, .*position-loop, .*torque-loop, wam \(",
-        ),
-        ("demo_scenario", r"demo_scenario.yaml is a scenario, no configuration; play it with 'wam up --scenario"),
-        ("nowhere.yaml", r"nowhere.yaml is not a file; give the path of a ROS parameter file"),
-    ],
-)
-def test_launch_refuses_what_is_no_configuration_and_says_what_it_is(config, text, launch_file):
-    _, start = launch_file
-    with pytest.raises(ValueError, match=text):
-        start({**CHOSEN, "config": config})
-
-
 def test_launch_takes_a_file_that_changes_a_configuration(launch_file, tmp_path):
     _, start = launch_file
     changed = tmp_path / "changed.yaml"

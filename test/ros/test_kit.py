@@ -149,15 +149,6 @@ def test_a_value_that_cannot_be_is_refused_by_name(values: dict[str, Any], text:
         arm.start(**values)
 
 
-def test_a_scenario_gives_a_bag_with_the_numbers_of_the_simulation(arm: RunningArm) -> None:
-    bag = arm.play([{"name": "release", "seconds": 0.2, "request": "enable"}])
-    run = Simulation(Configuration.load(packaged("wam")), [ScenarioStep("release", 0.2, request="enable")])
-    assert run.play() == ""
-    there = np.array([row.values for row in run.rows["joint_states"]])
-    columns: Any = bag.topics["/wam/joint_states"]
-    assert there.tobytes() == np.hstack([columns.position, columns.velocity, columns.effort]).tobytes()
-
-
 def test_a_scenario_that_fails_is_an_exception(arm: RunningArm) -> None:
     with pytest.raises(ArmFault, match="driver refuses"):
         arm.play([{"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 9}}}])

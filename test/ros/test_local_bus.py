@@ -20,23 +20,6 @@ class FalseExecutor:
         self.tasks.popleft()()
 
 
-def test_messages_come_to_all_listeners_in_the_order_in_which_they_were_sent() -> None:
-    executor, heard = FalseExecutor(), list[tuple[str, bytes]]()
-    bus = LocalBus(executor, ["a", "b"])
-    for name in ("first", "second"):
-        bus.subscribe("/state", lambda data, name=name: heard.append((name, data)))
-    bus.subscribe("/answer", lambda data: heard.append(("answer", data)))
-    bus.subscribe("/state", lambda data: bus.send("/answer", b"to " + data))
-    bus.send("/state", b"1")
-    bus.send("/nobody", b"-")
-    bus.send("/state", b"2")
-    assert heard == []  # a listener never works inside the step of a publisher
-    executor.spin_once()
-    states = [(name, data) for data in (b"1", b"2") for name in ("first", "second")]
-    assert heard == [*states, ("answer", b"to 1"), ("answer", b"to 2")]
-    assert not executor.tasks
-
-
 def test_nodes_that_answer_each_other_without_end_leave_turns_to_everything_else() -> None:
     executor, count, others = FalseExecutor(), [0], list[int]()
     bus = LocalBus(executor, ["a"])

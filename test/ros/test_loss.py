@@ -103,8 +103,6 @@ class Stack:
 
 LOST = {
     "transform": "transform has stopped",
-    "gravity": "gravity has stopped",
-    "force_loop": "force_loop has stopped",
     "contact_estimator": "contact_estimator has stopped",
     "velocity_loop": "check that velocity_loop runs",
 }

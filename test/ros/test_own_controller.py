@@ -236,19 +236,6 @@ def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(
         run.play()
 
 
-def test_a_reaction_sees_the_arrays_that_it_takes_and_no_others(configured: Configuration, tmp_path: Path) -> None:
-    seen = []
-
-    class Watching(Echo):
-        @reaction(Input("joint_states", "position"), outputs=("echo",))
-        def step(self, inputs: Inputs) -> Outputs:
-            seen.append(inputs["joint_states"])
-            return {}
-
-    Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Watching}).step()
-    assert [len(array) for array in seen[0]] == [4, 0, 0]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["wam", "barrett-wam4", "testbed", "torque-loop", "position-loop"])
 def test_the_nodes_of_the_stack_read_no_array_that_they_do_not_declare(

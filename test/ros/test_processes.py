@@ -340,7 +340,6 @@ PROGRAMS = {
 @pytest.mark.parametrize(
     ("program", "library", "number"),
     [
-        ("up", "rclpy", signal.SIGTERM),
         ("node", "mujoco", signal.SIGINT),
         ("scorecard", "numpy", signal.SIGTERM),
         ("program", "pinocchio", signal.SIGINT),

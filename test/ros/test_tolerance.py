@@ -1,7 +1,5 @@
 """No message, request or timer ends a node: what a callback raises is a fault by its name, and the arm brakes."""
 
-import contextlib
-import random
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +7,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
-    DescribeParameters,
     GetParameters,
-    GetParameterTypes,
-    ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
-from rclpy._rclpy_pybind11 import RCLError
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
@@ -24,10 +18,10 @@ from wam_bag.printable import printable
 from wam_description.configuration import Configuration, packaged
 from wam_description.event import Level
 from wam_description.signals import NodeStatus
-from wam_description.topics import BY_NAME, TOPICS
+from wam_description.topics import BY_NAME
 from wam_driver.safety import Mode
 from wam_ros.limits import NODE_LIMITS
-from wam_ros.messages import Refused, diagnostic_status, message_type
+from wam_ros.messages import Refused, diagnostic_status
 from wam_ros.node import make_node
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import header, qos
@@ -71,68 +65,6 @@ def test_a_parameter_of_an_unknown_type_is_refused_and_the_node_goes_on(ros: Any
         assert not answer.successful
         assert text in answer.reason
     assert not node.health.problems.get("exception"), "a wrong request is no fault of the node"
-
-
-@pytest.mark.slow
-def test_no_request_about_parameters_ends_a_node(ros: Any, tmp_path: Path) -> None:
-    node = make(ros, tmp_path, "force_loop", ["force_loop"])
-    chance = random.Random(SEED)
-    names = ["", "arm", "timing.period", "mode", "a" * 10_000, "\x1b]0;x\x07", "..", "*", "/", "é", "mode\0x"]
-    kinds = {
-        SetParameters: "set_parameters",
-        SetParametersAtomically: "set_parameters_atomically",
-        GetParameters: "get_parameters",
-        GetParameterTypes: "get_parameter_types",
-        DescribeParameters: "describe_parameters",
-        ListParameters: "list_parameters",
-    }
-    operator = ros.node("operator")
-    clients = {kind: operator.create_client(kind, f"force_loop/{name}") for kind, name in kinds.items()}
-    for client in clients.values():
-        ros.wait(client.service_is_ready)
-
-    def value() -> ParameterValue:
-        number = chance.choice([0.0, -1.0, 1e308, float("nan"), float("inf")])
-        return ParameterValue(
-            type=chance.choice([*range(12), 77, 255]),
-            double_value=number,
-            integer_value=chance.choice([0, -1, 2**63 - 1]),
-            string_value=chance.choice(names).replace("\0", ""),
-            double_array_value=[number] * chance.randrange(6),
-        )
-
-    for _ in range(150):
-        kind = chance.choice(list(kinds))
-        chosen = [chance.choice(names).replace("\0", "") for _ in range(chance.randrange(4))]
-        if kind in (SetParameters, SetParametersAtomically):
-            asked = kind.Request(parameters=[Parameter(name=name, value=value()) for name in chosen])
-        elif kind is ListParameters:
-            asked = kind.Request(prefixes=chosen, depth=chance.choice([0, 1, 2**62]))
-        else:
-            asked = kind.Request(names=chosen)
-        future = clients[kind].call_async(asked)
-        ros.wait(future.done, what=f"an answer to {asked}")
-    assert not node.health.problems.get("exception")
-
-
-def test_no_bytes_on_any_topic_end_a_node(ros: Any, tmp_path: Path) -> None:
-    names = ["driver", "force_loop", "recorder"]
-    nodes = [make(ros, tmp_path, name, names, recorder__directory=str(tmp_path / "bags")) for name in names]
-    sender = ros.node("sender")
-    publishers = {row.name: sender.create_publisher(message_type(row), row.name, qos(row)) for row in TOPICS}
-    ros.wait(lambda: all(one.get_subscription_count() for one in publishers.values()))
-    chance = random.Random(SEED)
-    for one in publishers.values():
-        for _ in range(8):
-            noise = chance.randbytes(chance.randrange(300))
-            data = chance.choice([b"\0\1\0\0" + noise, b"\0\0\0\0" + noise, noise, b"\0\1\0\0" + b"\xff" * 40])
-            with contextlib.suppress(RCLError):  # some the middleware itself does not send
-                one.publish(data)
-            ros.executor.spin_once(timeout_sec=0.001)
-    client = sender.create_client(ListParameters, "force_loop/list_parameters")
-    ros.wait(client.call_async(ListParameters.Request()).done, what="an answer after all of it")
-    assert not nodes[1].health.problems.get("exception")
-    assert not nodes[2].failure
 
 
 class Clumsy(TolerantNode):

@@ -4,18 +4,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PointStamped, WrenchStamped
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState, PointCloud2, PointField
-from std_msgs.msg import Header
 
 from wam_bag import definitions
 from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
-from wam_bag.cdr import ExactLength, encoded
 from wam_bag.contents import contents
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_control.task.scenario_settings import Setting
@@ -128,39 +121,6 @@ def test_the_copied_definitions_are_those_that_ros_installs() -> None:
     for name, copy in copies.items():
         assert "\n".join(copy["text"]) + "\n" == definitions._file(name, ".msg").read_text(encoding="utf-8")
         assert copy["hash"] == definitions.type_hash(name)
-
-
-def header(frame: str) -> Any:
-    message = Header(frame_id=frame)
-    message.stamp.sec, message.stamp.nanosec = 3, 250_000_000
-    return message
-
-
-def test_messages_are_serialized_as_ros_does() -> None:
-    at = ((3, 250_000_000), "link")
-    joints = JointState(header=header("link"), name=["a", "motor2"], position=[1.0, -2.0], effort=[0.5, 0.25])
-    wrench = WrenchStamped(header=header("link"))
-    wrench.wrench.force.y, wrench.wrench.torque.z = 12.0, -0.5
-    point = PointStamped(header=header("link"))
-    point.point.x = 0.28
-    cloud = PointCloud2(
-        header=header("link"), height=1, width=1, point_step=8, row_step=8, data=bytes(range(8)), is_dense=True,
-        fields=[PointField(name="place", offset=0, datatype=8, count=1)],
-    )  # fmt: skip
-    status = DiagnosticStatus(level=b"\x01", name="n", message="text", values=[KeyValue(key="k", value="v")])
-    pairs = [
-        (joints, (at, ["a", "motor2"], [1.0, -2.0], [], [0.5, 0.25])),
-        (wrench, (at, ((0.0, 12.0, 0.0), (0.0, 0.0, -0.5)))),
-        (point, (at, (0.28, 0.0, 0.0))),
-        (cloud, (at, 1, 1, [("place", 0, 8, 1)], False, 8, 8, bytes(range(8)), True)),
-        (status, (1, "n", "text", "", [("k", "v")])),
-    ]
-    for message, fields in pairs:
-        package = type(message).__module__.partition(".")[0]
-        kind = f"{package}/msg/{type(message).__name__}"
-        data = encoded(kind, fields)
-        assert deserialize_message(data, type(message)) == message
-        assert len(data) == ExactLength(kind)(bytes(serialize_message(message)))  # its padding is not defined
 
 
 @pytest.mark.slow
