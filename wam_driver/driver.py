@@ -14,7 +14,7 @@ from wam_description.event import Event, fault
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require, rows
-from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
+from wam_description.signals import BASE, NO_LOAD, Answer, Load, Point, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
@@ -362,3 +362,15 @@ class Driver:
         """The simulator's state of every free body, door and moving obstacle; None where there are none."""
         states = self.plant.objects()
         return Table(BASE, tuple(states)) if states else None
+
+    def outer_values(self) -> dict[str, State | Wrench | Point | Table]:
+        """What is published in an outer period by topic: the currents, and what only a simulator knows."""
+        load, objects = self.true_contact, self.true_objects
+        frame = load.cover or BASE
+        found: dict[str, State | Wrench | Point | Table] = {
+            "motor_currents": State([], [], list(self.currents)),
+            "sim/joint_states": self.true_joint_state,
+            "sim/contact/wrench": Wrench(frame, load.force, load.moment),
+            "sim/contact/point": Point(frame, (load.position, 0.0, 0.0)),
+        }
+        return found if objects is None else {**found, "sim/objects": objects}

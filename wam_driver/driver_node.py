@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_description.event import Event
 from wam_description.interface import declared
-from wam_description.signals import BASE, Answer, Point, State, Wrench
+from wam_description.signals import Answer, Wrench
 from wam_driver.arm_driver_node import ArmDriver
 from wam_driver.driver import Driver
 from wam_driver.lockstep import Lockstep
@@ -188,18 +188,10 @@ class DriverNode(ArmDriver):
         publish("motor_states", stamp, driver.motor_state)
         self.health.counts["steps"] += 1
         if driver.is_outer:
-            load = driver.true_contact
-            frame = load.cover or BASE
             publish("/clock", stamp, None)
-            publish("motor_currents", stamp, State([], [], driver.currents))
-            publish("sim/joint_states", stamp, driver.true_joint_state)
-            publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
-            publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
-            if objects := driver.true_objects:
-                publish("sim/objects", stamp, objects)
-        if self.diagnostics.are_due(stamp):
-            self.diagnostics.facts |= self.time.facts()
-            self.diagnostics.report(stamp)
+            for topic, value in driver.outer_values().items():
+                publish(topic, stamp, value)
+        self.diagnostics.report(stamp, self.time.facts)
         self.announce()
 
     # the samples before a fault

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -204,17 +204,13 @@ class Diagnostics:
         self._node, self._outlets, self._health, self._arm = node, outlets, health, shared.arm.name
         self.facts: dict[str, str] = {}
         self._next = self._last = 0
-        self._refused = 0  # messages by the last report
 
-    def are_due(self, stamp: int) -> bool:
-        """Whether the next report will be published."""
-        return stamp >= self._next
-
-    def report(self, stamp: int) -> None:
-        """Publish the report where it is due: a warning while messages are refused."""
-        if self.are_due(stamp):
+    def report(self, stamp: int, facts: Callable[[], Mapping[str, str]] = dict) -> None:
+        """Publish the report where it is due, with further facts."""
+        if stamp >= self._next:
             self._next = stamp - stamp % SECOND + SECOND
             self._last = stamp
+            self.facts |= facts()
             self._report()
             self._health.look_at_refusals()
 
@@ -225,15 +221,12 @@ class Diagnostics:
     def _report(self, **more: str) -> None:
         """Publish a report, with how many messages were published on each topic, this one included."""
         node, outlets, health = self._node, self._outlets, self._health
-        refused = sum(count for key, count in health.counts.items() if key.startswith(REFUSED_ON))
-        level = max(health.status.level, Level.WARN) if refused > self._refused else health.status.level
-        self._refused = refused
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
         facts = {key: str(count) for key, count in sorted(health.counts.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
         name, present = diagnosed_name(node.get_namespace(), node.get_name()), health.status
         facts |= {**self.facts, **more}
-        status = NodeStatus(level, present.message, name, health.is_ready, fault=present.fault, facts=facts)
+        status = NodeStatus(present.level, present.message, name, health.is_ready, fault=present.fault, facts=facts)
         report = DiagnosticArray(header=header(self._last), status=[diagnostic_status(status, self._arm)])
         outlets.send(DIAGNOSTICS, report)

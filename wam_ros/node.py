@@ -194,10 +194,7 @@ class AdaptedNode(StackNode):
             else:
                 check = self._checks.get(topic)
                 self.outlets.publish(topic, stamp, check(value) if check else value)
-        if self.diagnostics.are_due(stamp):
-            if diagnostics := getattr(self.node, "diagnostics", None):
-                self.diagnostics.facts |= diagnostics()
-            self.diagnostics.report(stamp)
+        self.diagnostics.report(stamp, getattr(self.node, "diagnostics", dict))
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:
         self.health.publish(status)

@@ -17,7 +17,7 @@ from wam_description.configuration import Configuration
 from wam_description.event import Event, Level
 from wam_description.interface import Interface, require_sections
 from wam_description.parameters import ParameterError, build
-from wam_description.signals import BASE, NodeStatus, Point, State, Wrench
+from wam_description.signals import NodeStatus, State
 from wam_description.synchroniser import Inputs, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
@@ -192,7 +192,8 @@ class Simulation:
         """One inner period; True where the scenario is over."""
         driver, stamp = self.driver, self.driver.stamp
         if driver.is_outer:
-            self._publish_truth(stamp)
+            for topic, value in driver.outer_values().items():
+                self._publish(topic, stamp, value)
         if self._publish_sensors is not None:
             self._publish_sensors(stamp, driver.joint_sensors)
         self._publish_states(stamp, driver.motor_state)
@@ -214,16 +215,6 @@ class Simulation:
                 f"the scenario gets no {' and '.join(sorted(awaited))} for the state of {stamp} ns; "
                 f"{self._cause(sorted(awaited))}"
             )
-
-    def _publish_truth(self, stamp: int) -> None:
-        load = self.driver.true_contact
-        frame = load.cover or BASE
-        self._publish("motor_currents", stamp, State([], [], list(self.driver.currents)))
-        self._publish("sim/joint_states", stamp, self.driver.true_joint_state)
-        self._publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
-        self._publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
-        if objects := self.driver.true_objects:
-            self._publish("sim/objects", stamp, objects)
 
     def _command(self, stamp: int, command: State) -> None:
         currents = command.effort

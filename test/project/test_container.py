@@ -25,27 +25,6 @@ def test_every_target_of_make_exists() -> None:
     assert {"install", "dependencies"} <= called <= TARGETS
 
 
-def test_dependencies_are_a_layer_before_the_sources() -> None:
-    steps = [line.split()[0] + " " + " ".join(line.split()[1:3]) for line in INSTRUCTIONS if line]
-    assert steps.index("RUN make dependencies") < steps.index("COPY --chown=wam:wam .")
-    copied = "\n".join(INSTRUCTIONS[: INSTRUCTIONS.index("RUN make dependencies")])
-    read_by_setup = re.findall(r"HERE / \"(\w+)\" / \"(\w+\.py)\"", (ROOT / "setup.py").read_text(encoding="utf-8"))
-    assert read_by_setup
-    assert all("/".join(parts) in copied for parts in read_by_setup)
-
-
-def test_the_tests_find_their_browser_and_are_not_run_as_root() -> None:
-    assert "chromium" in DOCKERFILE
-    assert [line.split()[1] for line in INSTRUCTIONS if line.startswith("USER")] == ["wam"]
-    assert DEVCONTAINER["remoteUser"] == "wam"
-
-
-def test_the_editor_builds_the_same_container() -> None:
-    file = (ROOT / ".devcontainer" / DEVCONTAINER["build"]["dockerfile"]).resolve()
-    assert file == ROOT / "Dockerfile"
-    assert f"WORKDIR {DEVCONTAINER['workspaceFolder']}" in INSTRUCTIONS
-
-
 def test_nothing_that_the_tests_need_is_left_out() -> None:
     ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     assert {"!bags/sample", "!bags/README.md", "!bags/index.yaml"} <= set(ignored)

@@ -15,7 +15,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
-LARGEST_PICTURE = 1_000_000  # bytes
 NEEDED = ("sphinx", "myst_parser", "numpydoc", "furo")
 MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
 
@@ -97,15 +96,6 @@ def test_a_dead_link_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "a.html").write_text('<a href="b.html#here">b</a><a href="b.html#gone">b</a><a href="c.html">c</a>')
     (tmp_path / "b.html").write_text('<p id="here"></p>')
     assert dead_links(tmp_path) == ["a.html: b.html#gone", "a.html: c.html"]
-
-
-def test_the_moving_picture_is_small_and_moves() -> None:
-    from PIL import Image
-
-    file = ROOT / "docs" / "demo.webp"
-    assert file.stat().st_size < LARGEST_PICTURE
-    with Image.open(file) as picture:
-        assert getattr(picture, "n_frames", 1) > 50
 
 
 # notebooks

@@ -202,31 +202,24 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
     assert "argument --timeout: '-1' is not allowed" in called("echo", "status", "--timeout", "-1")[2]
 
 
-def test_where_the_arm_is_paused_a_silent_topic_ends_with_what_continues_it(stack: None) -> None:
-    assert called("pause")[0] == 0
-    code, out, err = called("echo", "force_measured", "--count", "1", "--timeout", "1")
+@pytest.mark.parametrize(
+    ("before", "words", "why"),
+    [
+        ("pause", "force_measured", "the arm is paused, and continues after 'wam call resume'"),
+        ("resume", "sim/disturbance", "no node publishes it now"),
+        ("resume", "force_measured --namespace nowhere", "no driver was found: start the stack with 'wam up'"),
+    ],
+)
+def test_a_topic_on_which_nothing_comes_ends_in_time_with_the_reason(
+    before: str, words: str, why: str, stack: None
+) -> None:
+    """The search for a topic took 10 s, whatever the timeout."""
+    assert called(before)[0] == 0
+    code, out, err = called("echo", *words.split(), "--timeout", "3")
     assert called("resume")[0] == 0
     assert (code, out) == (1, "")
-    waits = "waits for message 1 of 1 of force_measured; none for 1 s (--timeout)"
-    assert err == f"wam call: {waits}; the arm is paused, and continues after 'wam call resume'\n"
-
-
-def test_of_a_topic_that_no_node_publishes_that_is_told(stack: None) -> None:
-    code, out, err = called("echo", "sim/disturbance", "--timeout", "3")
-    assert (code, out) == (1, "")
-    waits = "waits for message 1 of sim/disturbance"
-    assert err.splitlines() == [
-        f"{waits}; no node publishes it now; Ctrl-C ends, --timeout S after S seconds",
-        f"wam call: {waits}; none for 3 s (--timeout); no node publishes it now",
-    ]
-
-
-def test_the_timeout_holds_where_there_is_no_such_arm(stack: None) -> None:
-    """The search for the topic took 10 s, whatever the timeout."""
-    code, out, err = called("echo", "force_measured", "--timeout", "3", "--namespace", "nowhere")
-    assert (code, out) == (1, "")
-    waits = "waits for message 1 of force_measured; none for 3 s (--timeout)"
-    assert err.splitlines()[-1] == f"wam call: {waits}; no driver was found: start the stack with 'wam up'"
+    waits = f"waits for message 1 of {words.partition(' ')[0]}"
+    assert err.splitlines()[-1] == f"wam call: {waits}; none for 3 s (--timeout); {why}"
 
 
 def test_messages_are_printed_and_the_time_is_stopped(stack: None) -> None:

@@ -2,14 +2,15 @@
 
 import contextlib
 import os
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -30,6 +31,7 @@ from wam_ros.network import (
     occupant,
     require_places,
 )
+from wam_ros.node import make_node
 
 WIDE_OPEN = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "192.0.2.77"}
 PARAMETERS = ("--ros-args", "--params-file", str(ROOT / "config" / "wam.yaml"))
@@ -135,9 +137,7 @@ def test_it_is_opened_on_purpose_only_and_by_one_switch() -> None:
     assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "OFF", "narrower than asked"
 
 
-@pytest.mark.parametrize(
-    "command", [PROGRAM, ("-m", "wam_cli.main", "node", "driver"), ("-m", "wam_cli.main", "up")], ids=" ".join
-)
+@pytest.mark.parametrize("command", [PROGRAM, ("-m", "wam_cli.main", "up")], ids=" ".join)
 def test_every_program_listens_on_the_loopback_interface_alone(
     command: tuple[str, ...], programs: Callable[..., subprocess.Popen[str]], domain_id: int
 ) -> None:
@@ -350,33 +350,19 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     require_places(["velocity_loop"], "wam")
 
 
-def test_a_node_that_runs_already_is_refused_and_the_first_one_does_not_notice(
-    programs: Callable[..., subprocess.Popen[str]], domain_id: int
+@pytest.mark.parametrize(
+    ("name", "more", "text"),
+    [
+        ("driver", (), r"node 'driver' runs already in namespace /wam .* \(process \d+\); stop it"),
+        ("driver", ("-r", "__node:=other"), "node 'driver' was renamed 'other'; .* namespace instead: -r __ns:=/other"),
+        ("recorder", ("-r", "__node:=other"), "node 'recorder' was renamed 'other'; other nodes and its parameters"),
+    ],
+)
+def test_a_node_that_runs_already_or_was_renamed_is_refused(
+    name: str, more: tuple[str, ...], text: str, ros: Any
 ) -> None:
-    first = programs(*PROGRAM)
-    wait_for_place(domain_id, "/wam", "driver", first)
-    second = programs(*PROGRAM)
-    text = said(second)
-    assert second.returncode == 1
-    assert re.fullmatch(
-        rf"error: node 'driver' runs already in namespace /wam .* \(process {first.pid}\); stop it.*\n", text
-    )
-    first.send_signal(signal.SIGINT)
-    assert "another driver" not in said(first)
-    assert first.returncode == 0
-
-
-@pytest.mark.parametrize("name", ["driver", "recorder"])
-def test_a_renamed_node_is_refused_with_what_to_do_instead(
-    name: str, programs: Callable[..., subprocess.Popen[str]], domain_id: int
-) -> None:
-    process = programs("-m", "wam_ros.program", name, *PARAMETERS, "-r", "__node:=other")
-    text = said(process)
-    assert process.returncode == 1
-    assert text.startswith(
-        f"error: node '{name}' was renamed 'other'; other nodes and its parameters use the name '{name}'"
-    )
-    assert "give the nodes of a second arm a namespace instead: -r __ns:=/other" in text
+    with closing(Place(ros.domain_id, "/wam", "driver")), pytest.raises(ParameterError, match=text):
+        make_node(name, context=ros.context, namespace="/wam", cli_args=[*PARAMETERS, *more])
 
 
 def test_enforced_security_without_the_middleware_s_part_for_it_ends_a_node_in_one_line(

@@ -330,7 +330,6 @@ def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(started: Any, 
 
 
 PROGRAMS = {
-    "up": ("wam_cli.main", "up"),
     "node": ("wam_cli.main", "node", "driver"),
     "scorecard": ("wam_cli.main", "model", "scorecard"),
     "program": ("wam_ros.program", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
