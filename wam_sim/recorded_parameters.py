@@ -123,10 +123,9 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
     bag : with the attachment ``parameters.yaml`` as the recorder writes it, or without.
     namespace : of the arm.
     """
-    attached = bag.attachments.get(ATTACHMENT)
+    attached, problem, recorded = bag.attachments.get(ATTACHMENT), "", dict[str, Values]()
     if attached is None:
         return RecordedParameters(str(bag.path), {}, "", f"no {ATTACHMENT} in the bag", ())
-    digest = hashlib.sha256(attached).hexdigest()
     try:
         tree = untrusted_yaml(attached)
         if not isinstance(tree, dict):
@@ -136,19 +135,17 @@ def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
             for name, body in tree.items()
             if str(name).rpartition("/")[0] == namespace
         }
+        if tree and not recorded:
+            there = ", ".join(sorted({str(name).rpartition("/")[0] for name in tree}))
+            problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
     except (ValueError, TypeError, LookupError, AttributeError) as error:
-        reason = " ".join(str(error).split())
-        return RecordedParameters(str(bag.path), {}, digest, f"{ATTACHMENT} in the bag cannot be read: {reason}", ())
-    if not recorded and tree:
-        there = ", ".join(sorted({str(name).rpartition("/")[0] for name in tree}))
-        problem = f"{ATTACHMENT} in the bag has no parameters of the arm {namespace}; it has those of {there}"
-        return RecordedParameters(str(bag.path), {}, digest, problem, ())
+        problem = f"{ATTACHMENT} in the bag cannot be read: {' '.join(str(error).split())}"
     differing = {node: _differences(node, values) for node, values in recorded.items()}
     words = "misses the parameters", "has the unknown parameters"
     lists = [_note(word, {node: names[row] for node, names in differing.items()}) for row, word in enumerate(words)]
     note = " and ".join(text for text in lists if text)
     notes = (f"the recording {note}: it is of another version, record it again",) if note else ()
-    return RecordedParameters(str(bag.path), recorded, digest, "", notes)
+    return RecordedParameters(str(bag.path), recorded, hashlib.sha256(attached).hexdigest(), problem, notes)
 
 
 def _own(values: Values) -> dict[str, Any]:

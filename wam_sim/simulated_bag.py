@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -89,11 +90,11 @@ class _Recording:
             if encode is not None and topic.type != TIME and (senders := interface.publishers(topic.name)):
                 bag.add_topic(self._full(topic.name), topic.type, _qos(topic))
                 if topic.name != DESCRIPTION:
-                    simulation.listen(topic.name, self._writer(topic, encode, senders[0]))
+                    simulation.listen(topic.name, partial(self._write_value, topic.name, encode, senders[0]))
         self._status = interface.topics[STATUS]
         bag.add_topic(self._full(STATUS), self._status.type, _qos(self._status))
         for node in simulation.nodes:
-            simulation.listen(STATUS, self._status_writer(node), node)
+            simulation.listen(STATUS, partial(self._write_status, node), node)
         self._write(DESCRIPTION, encoded(interface.topics[DESCRIPTION].type, [urdf(shared.arm)]), 0, "driver")
 
     def watch_driver(self) -> None:
@@ -101,7 +102,8 @@ class _Recording:
         status = self._simulation.driver_status
         if status != self._driver:
             self._driver = status
-            self._write_status(status._replace(stamp=self._simulation.driver.stamp), "driver")
+            stamp = self._simulation.driver.stamp
+            self._write_status("driver", stamp, status._replace(stamp=stamp))
 
     def counts(self) -> dict[str, str]:
         """The record of what is in the bag: everything."""
@@ -114,13 +116,10 @@ class _Recording:
     def _full(self, topic: str) -> str:
         return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
 
-    def _writer(self, topic: Topic, encode: Encode, sender: str) -> Callable[[int, Any], None]:
-        return lambda stamp, value: self._write(topic.name, encode(stamp, value), stamp, sender)
+    def _write_value(self, topic: str, encode: Encode, sender: str, stamp: int, value: Any) -> None:
+        self._write(topic, encode(stamp, value), stamp, sender)
 
-    def _status_writer(self, node: str) -> Callable[[int, Any], None]:
-        return lambda _, status: self._write_status(status, node)
-
-    def _write_status(self, status: NodeStatus, node: str) -> None:
+    def _write_status(self, node: str, _: int, status: NodeStatus) -> None:
         status = status._replace(node=node, connected=True, session=1)
         facts = pairs(status)
         fields = [status.level, node, status.message, self._arm.name, facts]

@@ -70,8 +70,9 @@ class Simulation:
         self._looked = 0  # ns, when the scenario was last seen to go on
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
         self.driver.stale_advice = self._cause
-        self._interface = Interface(shared, dict(controllers or {}))
-        self._settings = {"driver": dict(configuration.sections["driver"])}
+        own = dict(controllers or {})
+        self._interface = Interface(shared, own)
+        self._settings = {name: dict(flat) for name, flat in configuration.sections.items()}
         self._bus = Bus(self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
@@ -86,10 +87,12 @@ class Simulation:
         self._synchronisers: dict[str, set[Synchroniser]] = {}
         require_sections(configuration.sections, shared.nodes)
         for name, declaration in self._interface.declarations.items():
-            if name != "driver":
-                is_scenario = name == SCENARIO
-                more = (self._scenario(configuration, shared, dict(controllers or {})),) if is_scenario else ()
-                self._connect(name, declaration, configuration, shared, more)
+            if name == SCENARIO:  # what it sets has to fit the other values of its node
+                scenario = Scenario(steps, shared, own)
+                require_settings("the scenario", [step.settings for step in scenario.steps], configuration, own)
+                self._connect(declaration, configuration, shared, scenario)
+            elif name != "driver":
+                self._connect(declaration, configuration, shared)
         self._motors = len(shared.arm.motors.names)
         has_sensors = "joint_sensors" in self._interface.topics
         self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
@@ -97,25 +100,10 @@ class Simulation:
             self.listen(STATUS, lambda stamp, status: self._events.append((stamp, status.events)), FORCE_LOOP)
         self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
-    def _scenario(self, configuration: Configuration, shared: Shared, controllers: Mapping[str, Any]) -> Scenario:
-        """What is to be played; what it sets has to fit the other values of its node."""
-        scenario = Scenario(self._steps, shared, controllers)
-        require_settings("the scenario", [step.settings for step in scenario.steps], configuration, controllers)
-        return scenario
-
-    def _connect(
-        self,
-        name: str,
-        declaration: Declaration,
-        configuration: Configuration,
-        shared: Shared,
-        more: Sequence[Scenario],
-    ) -> None:
-        kind = declaration.parameter_class
+    def _connect(self, declaration: Declaration, configuration: Configuration, shared: Shared, *more: Scenario) -> None:
+        name, kind = declaration.name, declaration.parameter_class
         own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        node = declaration.make(shared, own, *more)
-        self.nodes[name] = node
-        self._settings[name] = dict(configuration.sections.get(name, {}))
+        node = self.nodes[name] = declaration.make(shared, own, *more)
         feeds = self._interface.feeds(declaration, node)
         self._synchronisers[name] = {feed.synchroniser for found in feeds.values() for feed in found}
         if hasattr(node, "requests"):
@@ -128,8 +116,11 @@ class Simulation:
 
         def step(inputs: Inputs) -> Outputs:
             outputs = work(inputs)
-            if node.requests and (refusal := self._make_all(node.requests)):
-                outputs = node.refused(refusal) if hasattr(node, "refused") else {}
+            if node.requests:
+                refusal = next(filter(None, map(self._make, node.requests)), "")
+                node.requests.clear()
+                if refusal:
+                    return node.refused(refusal) if hasattr(node, "refused") else {}
             return outputs
 
         return step
@@ -224,14 +215,6 @@ class Simulation:
             )
         self._currents = (stamp, currents)
 
-    def _make_all(self, requests: list[Call | SetParameters]) -> str:
-        """Carry out what a node requests of others; returns why one is refused, '' where none is."""
-        refusal = ""
-        for request in requests:
-            refusal = refusal or self._make(request)
-        requests.clear()
-        return refusal
-
     def _make(self, request: Call | SetParameters) -> str:
         if request.node != "driver" and request.node not in self.nodes:
             return f"no node is named '{request.node}'; nodes: driver, {', '.join(self.nodes)}"
@@ -253,8 +236,9 @@ class Simulation:
 
     def _tune(self, request: SetParameters) -> None:
         """Give a node new live parameters; where it refuses them, nothing has changed."""
-        values = {**self._settings[request.node], **request.values}
-        if values == self._settings[request.node]:
+        before = self._settings.get(request.node, {})
+        values = {**before, **request.values}
+        if values == before:
             return
         if request.node == "driver":
             self.driver.set_effects(build(DriverParameters, values).effects)
