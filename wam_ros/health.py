@@ -64,7 +64,7 @@ class Health:
         self._unusable_since: dict[str, str] = {}  # the last report
         self.session = 0
         self.is_ready = False
-        self._changes = (-1, 0, {CHANGES: ""})  # stamp of the step before, number of the report and its facts
+        self._changes: tuple[int, dict[str, str]] = (-1, {})  # stamp of the step before, and what was taken after it
         self._repeated = time.monotonic()  # when the status was, on that clock
 
     # the status
@@ -129,11 +129,10 @@ class Health:
         What was taken after one step is reported together, so that only the last message is needed.
         """
         texts = {name: str(listed(value)) for name, value in values.items()}
-        after, number, facts = self._changes
-        if stamp != after:
-            number, facts = number + 1, {CHANGES: str(number + 1)}
+        after, before = self._changes
+        facts = before if stamp == after else {CHANGES: "yes"}
         facts |= {f"{self._node.get_name()}:{name}": text for name, text in texts.items()}
-        self._changes = stamp, number, facts
+        self._changes = stamp, facts
         self.live |= {name: text for name, text in texts.items() if name in self.live}
         self.status = self._whole(self.status)
         self._send(self._with(self.status, facts)._replace(stamp=stamp))

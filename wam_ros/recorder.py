@@ -2,14 +2,14 @@
 
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.cdr import Reading, stamp_reader
 from wam_bag.errors import Damage
-from wam_bag.losses import LOST_AT_END, UNFINISHED
+from wam_bag.losses import LOST_AT_END, RECORDING, UNFINISHED, losses
 from wam_bag.printable import printable
 from wam_description.status import diagnosed_name
 from wam_description.topics import EVERY_NODE, Topic
@@ -284,6 +284,16 @@ class Recorder:
         """
         if self._held is not None:
             self._begin_at(0)
+        self._try(lambda: self._bag.metadata(RECORDING, self._record(unfinished)))
+        self._try(self._bag.close)
+
+    def summary(self, unfinished: Sequence[str] = ()) -> str:
+        """How many messages came, and which were lost, for people."""
+        lost = losses(self._bag.path, {RECORDING: self._record(unfinished)}, (), {}).sentences(0)
+        return f"{self._received} messages{'' if lost else ', none lost'}{''.join(f'. {one[:-1]}' for one in lost)}"
+
+    def _record(self, unfinished: Sequence[str]) -> dict[str, str]:
+        """Counts and losses as the bag has them."""
         values = {"mode": "lockstep" if self._lockstep else "realtime"}
         if unfinished:
             values[UNFINISHED] = ", ".join(unfinished)
@@ -292,8 +302,7 @@ class Recorder:
             values |= {f"{key} {name}": str(getattr(count, name)) for name in ("received", "dropped", "missed")}
             if count.lost_at_end:
                 values[f"{key} {LOST_AT_END}"] = str(count.lost_at_end)
-        self._try(lambda: self._bag.metadata("recording", values))
-        self._try(self._bag.close)
+        return values
 
     def _try(self, write: Callable[[], None]) -> bool:
         if not self.failure:
@@ -302,18 +311,6 @@ class Recorder:
             except RecordingError as error:
                 self.failure = f"recording into {self._bag.path} has stopped: {error}; then start a new recording"
         return not self.failure
-
-
-def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:
-    """One line for people: how many messages came, and of which topics some were lost, on the way and at the end."""
-    listed = list(counts)
-    lost = [f"{c.dropped} of {c.topic} from {c.publisher}" for c in listed if c.dropped]
-    at_end = [f"{c.lost_at_end} of {c.topic} from {c.publisher}" for c in listed if c.lost_at_end]
-    printed = [f"{sum(c.received for c in listed)} messages"]
-    printed += [f"lost: {', '.join(lost)}"] * bool(lost) + [f"lost at the end: {', '.join(at_end)}"] * bool(at_end)
-    silent = f"lost at the end: not known for {', '.join(unfinished)}, which published no final count"
-    printed += [silent] * bool(unfinished)
-    return ", ".join([*printed, *["none lost"] * (len(printed) == 1)])
 
 
 def _counts(channel: _Channel) -> Iterator[Count]:

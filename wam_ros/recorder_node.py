@@ -23,7 +23,7 @@ from wam_ros.messages import Refused, diagnostic_status, message_type, read_stat
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
 from wam_ros.recorded_stack import RecordedStack
-from wam_ros.recorder import Recorder, summary
+from wam_ros.recorder import Recorder
 from wam_ros.recorder_interface import EVERY, RecorderInterface, RecorderParameters
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DEPTH, DIAGNOSTICS, listening, qos, topic_name
@@ -161,8 +161,7 @@ class RecorderNode(TolerantNode):
         dropped = self.recorder.dropped()
         if dropped > self._dropped:
             self._dropped = dropped
-            so_far = (count._replace(lost_at_end=0) for count in self.recorder.counts())  # it may still come
-            self.get_logger().warning(f"the recorder was too slow: {summary(so_far)}")
+            self.get_logger().warning(f"the recorder was too slow: {dropped} messages are lost so far")
 
     def _report(self) -> None:
         state = self._state("recording")
@@ -179,9 +178,6 @@ class RecorderNode(TolerantNode):
             "dropped": str(sum(count.dropped for count in counts)),
             "lost_at_disk": str(self.recorder.lost_at_disk),
         }
-        for count in counts:
-            if count.dropped:
-                facts[f"dropped {count.topic} from {count.publisher}"] = str(count.dropped)
         level = Level.ERROR if self.recorder.failure or fault else Level.OK
         return diagnostic_status(
             NodeStatus(level, text, self.get_name(), connected=self.ready, fault=fault, facts=facts), self._arm
@@ -220,7 +216,7 @@ class RecorderNode(TolerantNode):
         self._attach_parameters()
         unfinished = sorted(self._unfinished)
         self.recorder.finish(unfinished)
-        counts = summary(self.recorder.counts(), unfinished)
+        counts = self.recorder.summary(unfinished)
         if self.recorder.failure:
             lost = f"{self.recorder.lost_at_disk} of the received messages are not in the bag"
             self.get_logger().error(f"{self.recorder.failure}; {lost}; received: {counts} on the way")

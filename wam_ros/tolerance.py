@@ -41,7 +41,6 @@ class TolerantNode(LeavingNode):
     """
 
     _has_ended = False
-    _exceptions = 0  # so far
     _exception_time = 0.0  # of the newest one, s
     _exception_fault = ""
     _exception_timer: Any = None
@@ -131,13 +130,12 @@ class TolerantNode(LeavingNode):
         )
 
     def _take_exception(self, what: str, error: Exception) -> None:
-        self._exceptions += 1
         self._exception_time = time.monotonic()
         if self._exception_fault:
             return
         self._exception_fault = printable(self._described(what, error), NODE_LIMITS.exception_length)
         trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * NODE_LIMITS.exception_length, "\n")
-        self.get_logger().error(f"{self._exception_fault} ({self._exceptions} so far)\n{trace}")
+        self.get_logger().error(f"{self._exception_fault}\n{trace}")
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._exception_timer = super().create_timer(NODE_LIMITS.fault_held, self._look_for_end, clock=steady)
         self.take_fault(self._exception_fault)

@@ -31,11 +31,10 @@ class RecordedStep(NamedTuple):
 
 
 class RecordedChange(NamedTuple):
-    """Live parameters that a node took after its step of a stamp, ns; `number` counts these changes from 1."""
+    """Live parameters that a node took after its step of a stamp, ns."""
 
     after: int
     settings: Mapping[str, Any]
-    number: int
 
 
 class RecordedFault(NamedTuple):
@@ -102,10 +101,10 @@ class RecordedRun(NamedTuple):
         """Live parameters that a node took while it ran, by 'node:parameter', as it reported them itself."""
         found: list[RecordedChange] = []
         for status in self.statuses:
-            if status.node == node and (number := status.facts.get(CHANGES, "")).isdecimal():
-                if found and found[-1].number == int(number[:9]):  # the same, and more
+            if status.node == node and CHANGES in status.facts:
+                if found and found[-1].after == status.stamp:  # the same, and more
                     found.pop()
-                found.append(RecordedChange(status.stamp, _settings(status), int(number[:9])))
+                found.append(RecordedChange(status.stamp, _settings(status)))
         return found
 
     def live_values(self, *nodes: str) -> list[tuple[int, Mapping[str, Any]]]:

@@ -11,12 +11,10 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, pairwise
+from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.losses import losses
@@ -80,15 +78,6 @@ class Change(NamedTuple):
     parameters: Any
 
 
-class Gap(NamedTuple):
-    """Stamps of an input between which messages are missing, ns, and how many periods that are."""
-
-    topic: str
-    begin: int
-    end: int
-    missing: int
-
-
 class ChangedValue(NamedTuple):
     """A parameter, as --set names it, that the replay has with another value than the recording."""
 
@@ -98,7 +87,7 @@ class ChangedValue(NamedTuple):
 
 
 class Replay(NamedTuple):
-    """A replay: mode of the recording, how each topic of the node came out, gaps in its inputs, what the bag lacks.
+    """A replay: mode of the recording, how each topic of the node came out, what the bag lacks.
 
     `changed` are the parameters of the node that a configuration has otherwise than the recording, its own first,
     `others` a sentence about other arms in the bag.
@@ -107,7 +96,6 @@ class Replay(NamedTuple):
     node: str
     mode: str
     topics: tuple[Compared, ...]
-    gaps: tuple[Gap, ...]
     lost: tuple[str, ...]
     changed: tuple[ChangedValue, ...] = ()
     others: str = ""
@@ -170,7 +158,7 @@ def replay(
     present = (
         configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
     )
-    changes, lost_changes = _changes(run, shared, declaration, present)
+    changes = _changes(run, shared, declaration, present)
     published = _run(bag, namespace, shared, declaration, own, changes)
     compared = []
     for topic in map(rows.__getitem__, outputs):
@@ -182,10 +170,9 @@ def replay(
             "nothing to compare; a bag of the stack's recorder with all topics can be replayed"
         )
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
-    gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
     changed = _changed_values(run, declaration, shared, own) if configuration else ()
-    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes), changed, run.others)
+    return Replay(declaration.name, mode, tuple(compared), tuple(lost), changed, run.others)
 
 
 def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:
@@ -197,19 +184,6 @@ def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:
                 f"{bag.path}: {name} was recorded as {recorded}; this version has it as {topic.type}: replay "
                 "the bag with the version that recorded it"
             )
-
-
-def _gaps(topic: str, columns: Columns | None) -> list[Gap]:
-    """Where stamps are further apart than a period, which is their median distance."""
-    if not isinstance(columns, Numbers) or len(columns.stamp_ns) < 3:
-        return []
-    steps = np.diff(columns.stamp_ns)
-    period = max(int(np.median(steps)), 1)
-    missing = np.rint(steps / period).astype(int) - 1
-    return [
-        Gap(topic, int(columns.stamp_ns[i]), int(columns.stamp_ns[i + 1]), int(missing[i]))
-        for i in np.flatnonzero(missing > 0)
-    ]
 
 
 def _parameters(run: RecordedRun, declaration: Declaration, configuration: Configuration | None) -> tuple[Shared, Any]:
@@ -240,11 +214,9 @@ def _changed_values(run: RecordedRun, declaration: Declaration, shared: Shared, 
     )
 
 
-def _changes(
-    run: RecordedRun, shared: Shared, declaration: Declaration, values: Mapping[str, Any]
-) -> tuple[list[Change], tuple[str, ...]]:
-    """What the node took while it ran, as it reported it or as a scenario set it, and what is lost of that."""
-    prefix, present, found = f"{declaration.name}:", dict(values), []
+def _changes(run: RecordedRun, shared: Shared, declaration: Declaration, values: Mapping[str, Any]) -> list[Change]:
+    """What the node took while it ran, as it reported it or as a scenario set it."""
+    prefix, present, found = f"{declaration.name}:", dict(values), list[Change]()
     reported = run.changes(declaration.name)
     steps = () if reported else (*run.steps, *([run.unfinished] if run.unfinished else []))
     given = [(one.after, one.settings) for one in reported] + [(step.begin - 1, step.settings) for step in steps]
@@ -257,9 +229,7 @@ def _changes(
             found.append(Change(after, "tune", build_part(declaration.parameter_class, present)))
         if of_group:
             found.append(Change(after, "retune", build_part(type(getattr(shared, group)), present, f"{group}.")))
-    numbers = [one.number for one in reported]
-    lost = sum(max(b - a - 1, 0) for a, b in pairwise(numbers))
-    return found, ((f"{lost} changes of parameters of {declaration.name} are not in the bag",) if lost else ())
+    return found
 
 
 def _run(

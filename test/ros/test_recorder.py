@@ -534,9 +534,9 @@ def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_pa
     said.publish(report("transform", True, "other_arm", motor_states=10**9))
     ros.wait(lambda: received(node, "/diagnostics") == 3)
     ros.remove(node)
-    lost = "lost at the end: 3 of /wam/motor_states from driver"
-    unknown = "lost at the end: not known for gravity, transform, which published no final count"
-    assert f"10 messages, {lost}, {unknown}" in capfd.readouterr().err
+    lost = "Lost at the end: 3 of /wam/motor_states from driver"
+    unknown = "Lost at the end: not known for gravity, transform, which published no final count"
+    assert f"10 messages. {lost}. {unknown}" in capfd.readouterr().err
     bag = read(tmp_path / "bag")
     assert bag.metadata["recording"]["/wam/motor_states driver lost_at_end"] == "3"
     found = losses(bag.path, bag.metadata, bag.attachments, bag.counts)

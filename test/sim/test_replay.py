@@ -254,14 +254,13 @@ def test_a_hole_in_an_input_is_named(bag: Path, tmp_path: Path, capsys: pytest.C
     said = capsys.readouterr().out
     assert "INCOMPLETE: The recorder received 10 messages (10 of /wam/joint_states) that are not in the bag." in said
     assert f"first only recorded at {stamps[40] / 1e9:.9f} s" in said
-    assert "the bag lacks inputs of gravity: " in said
-    assert f"joint_states: 10 missing between {stamps[39] / 1e9:.3f} s and {stamps[50] / 1e9:.3f} s" in said
+    assert "without an input gravity has no output" in said
 
 
 def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
     """25 of 101 messages differ, the largest by 0.97 N m."""
     different = Compared("gravity_effort", 101, 0, 0, 25, None, 0.97, "N m", None)
-    done = Replay("gravity", "realtime", (different,), (), ())
+    done = Replay("gravity", "realtime", (different,), ())
     assert stated(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
     (why,) = reasons(done)
     assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity used the newest inputs")

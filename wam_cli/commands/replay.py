@@ -10,7 +10,7 @@ ENDS = (
     "Without --config the values are those in the bag. "
     "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
 )
-LISTED = 8  # values or gaps that are named one by one
+LISTED = 8  # values that are named one by one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,18 +67,11 @@ def reasons(done: Replay) -> list[str]:
     if done.is_same:
         return []
     lines = []
-    gaps = done.gaps if done.mode != "realtime" or done.lost else ()  # else the driver left periods out itself
-    if gaps:
+    if done.lost:
         lines.append(
-            f"the bag lacks inputs of {done.node}: without one the node has no output, in lockstep perhaps for the "
-            "rest of the bag; after a gap its state differs"
+            f"without an input {done.node} has no output, in lockstep perhaps for the rest of the bag; after a gap its "
+            "state differs"
         )
-        lines += [
-            f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
-            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:LISTED]
-        ]
-        if len(gaps) > LISTED:
-            lines.append(f"    and {len(gaps) - LISTED} gaps that are not longer")
     different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
     if done.mode == "realtime" and different:
         lines.append(
