@@ -22,6 +22,7 @@ class RecordedStack:
 
     Attributes
     ----------
+    failure : how a node runs otherwise than the recorder takes it to, or that there are two runs; '' where neither.
     parameters : of the nodes.
     restarted : nodes that were started again and whose parameters have been requested.
     """
@@ -31,23 +32,16 @@ class RecordedStack:
         self._mode, self._listed = shared.timing.mode, frozenset(shared.nodes)
         self.parameters = RemoteParameters(node, names)
         self.restarted: dict[str, RemoteParameters] = {}
-        self._differing: dict[str, str] = {}  # how each node runs otherwise, '' where it does not
+        self.failure = ""
+        self._compared: set[str] = set()  # nodes
         self._lives: dict[str, str] = {}  # the node of each writer of a status that was seen
-        self._two_runs = ""  # which node was started again with others
-
-    @property
-    def failure(self) -> str:
-        """How nodes run otherwise than the recorder takes them to, or that there are two runs; '' where neither."""
-        if listed := "; ".join(filter(None, self._differing.values())):
-            return f"{listed}; start the recorder with 'wam bag record', which takes both from the running stack"
-        return self._two_runs
 
     def attend(self, writers: Mapping[str, str]) -> None:
         """Ask for parameters and look at those that came; `writers` are the nodes of the statuses by identity."""
-        before = self.failure
         self.parameters.ask()
-        for node in self.parameters.found.keys() - self._differing.keys():
-            self._differing[node] = self._difference(node)
+        for node in self.parameters.found.keys() - self._compared:
+            self._compared.add(node)
+            self._note(self._difference(node))
         for writer, node in writers.items():
             if writer not in self._lives and node in self._lives.values() and node in self.parameters.found:
                 self.restarted[node] = RemoteParameters(self._node, [node])
@@ -55,9 +49,12 @@ class RecordedStack:
         for node, again in list(self.restarted.items()):
             if again.complete():
                 del self.restarted[node]
-                self._compare(node, again.found[node])
-        if self.failure != before:
-            self._node.get_logger().error(self.failure)
+                self._note(self._change(node, again.found[node]))
+
+    def _note(self, failure: str) -> None:
+        if failure and not self.failure:
+            self.failure = failure
+            self._node.get_logger().error(failure)
 
     def _difference(self, node: str) -> str:
         """How a node has another mode or list of nodes than the recorder was given."""
@@ -66,14 +63,16 @@ class RecordedStack:
         others = listed.symmetric_difference(self._listed) - {RecorderInterface.name}
         found = [f"node {node} runs in {mode}, and this recorder in {self._mode}"] * (mode != self._mode)
         found += [f"node {node} and this recorder do not both have {', '.join(sorted(others))}"] * bool(others)
-        return "; ".join(found)
+        advice = "start the recorder with 'wam bag record', which takes both from the running stack"
+        return "; ".join([*found, advice]) if found else ""
 
-    def _compare(self, node: str, after: Mapping[str, object]) -> None:
-        """Keep that a node was started again with other parameters than those in the bag."""
+    def _change(self, node: str, after: Mapping[str, object]) -> str:
+        """That a node was started again with other parameters than those in the bag, '' where it was not."""
         before = self.parameters.found[node]
         others = [name for name in before.keys() - OF_ONE_PROCESS if str(before[name]) != str(after.get(name))]
-        if others and not self._two_runs:
-            self._two_runs = (
-                f"node {node} was started again, with another {', '.join(sorted(others))}, and {self._bag} has both "
-                "runs; record each with a recorder of its own"
-            )
+        if not others:
+            return ""
+        return (
+            f"node {node} was started again, with another {', '.join(sorted(others))}, and {self._bag} has both "
+            "runs; record each with a recorder of its own"
+        )
