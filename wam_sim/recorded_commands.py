@@ -142,10 +142,9 @@ def _stamped(columns: Commands, states: JointColumns, missing: Mask) -> Commands
 
 def _only(columns: Commands, kept: Mask) -> Commands:
     """Some of the messages, (k,)."""
-    frames = np.array(columns.frames, object)[kept]
-    columns = columns._replace(log_time_ns=columns.log_time_ns[kept], stamp_ns=columns.stamp_ns[kept], frames=frames)
-    if isinstance(columns, WrenchColumns):
-        return columns._replace(force=columns.force[kept], torque=columns.torque[kept])
-    rows = kept[columns.message]
-    values = {name: value[rows] for name, value in columns.columns.items()}
-    return columns._replace(message=(np.cumsum(kept) - 1)[columns.message[rows]], columns=values)
+    named: tuple[str, ...] = columns._fields
+    if isinstance(columns, TableColumns):
+        rows, named = kept[columns.message], ("log_time_ns", "stamp_ns", "frames")
+        values = {name: value[rows] for name, value in columns.columns.items()}
+        columns = columns._replace(message=(np.cumsum(kept) - 1)[columns.message[rows]], columns=values)
+    return columns._replace(**{name: np.array(getattr(columns, name))[kept] for name in named})
