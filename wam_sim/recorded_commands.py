@@ -1,7 +1,7 @@
 """Commands of programs in a bag as the stack took them: with the stamps that it gave them, without those it refused."""
 
 from collections import Counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,4 +147,5 @@ def _only(columns: Commands, kept: Mask) -> Commands:
         rows, named = kept[columns.message], ("log_time_ns", "stamp_ns", "frames")
         values = {name: value[rows] for name, value in columns.columns.items()}
         columns = columns._replace(message=(np.cumsum(kept) - 1)[columns.message[rows]], columns=values)
-    return columns._replace(**{name: np.array(getattr(columns, name))[kept] for name in named})
+    sliced: dict[str, Any] = {name: np.array(getattr(columns, name))[kept] for name in named}
+    return columns._replace(**sliced)
