@@ -18,7 +18,7 @@ from wam_studies.force_benchmark.controllers import Admittance, TorqueControl
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
 from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
-from wam_studies.force_benchmark.tasks import NOMINAL, RANGES, Task, TaskConditions, configured, draw, steps, triple
+from wam_studies.force_benchmark.tasks import RANGES, Task, configured, draw, steps, triple
 from wam_studies.force_benchmark.trial import ForceTrial, inertia, knowable, perform
 from wam_studies.harness import chosen_cases
 
@@ -55,16 +55,16 @@ def test_tasks_are_as_wide_as_the_page_says() -> None:
 
 
 def test_what_nobody_knows_is_in_the_true_arm_alone() -> None:
-    loaded = next(task for task in DRAWN if task.conditions.payload)
-    rough = next(task for task in DRAWN if task.conditions.asymmetry)
-    assert 0.05 <= loaded.conditions.payload <= 2.0
+    loaded = next(task for task in DRAWN if task.payload)
+    rough = next(task for task in DRAWN if task.asymmetry)
+    assert 0.05 <= loaded.payload <= 2.0
     for task in (loaded, rough):
         given = configured(CONFIGURATION, task)
         driver = given.node("driver", DriverParameters)
         assert given.shared.arm.payload == 0.0
-        assert driver.mismatch.payload == task.conditions.payload
+        assert driver.mismatch.payload == task.payload
         assert (driver.friction.law == "stribeck") is (task is rough)
-        assert set(driver.friction.motor_asymmetry) == {task.conditions.asymmetry}
+        assert set(driver.friction.motor_asymmetry) == {task.asymmetry}
 
 
 @pytest.mark.parametrize("number", [0, 3, 4, 8])
@@ -75,7 +75,7 @@ def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) ->
     assert driver.plant.data.ncon == 0
     assert driver.plant.q == pytest.approx(task.q)
     factors = [a / b for a, b in zip(driver.plant.model.body_mass[-4:], WAM.links.mass, strict=True)]
-    assert factors == pytest.approx(task.conditions.mismatch["mass"])
+    assert factors == pytest.approx(task.mismatch["mass"])
 
 
 @pytest.mark.slow
@@ -97,7 +97,7 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
 
 
 def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
-    task = TASK._replace(conditions=NOMINAL._replace(ramp=1.0))
+    task = TASK._replace(ramp=1.0)
     _, *ramp, press = steps(task, RANGES.seconds)
     forces = [math.hypot(*step.force.force) for step in ramp]
     assert sum(step.seconds for step in ramp) == pytest.approx(1.0)
@@ -107,7 +107,7 @@ def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
 
 
 def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
-    stepped = TASK._replace(before=30.0, conditions=NOMINAL._replace(ramp=0.5))
+    stepped = TASK._replace(before=30.0, ramp=0.5)
     _, *ramp, first, press = steps(stepped, RANGES.seconds)
     forces = [math.hypot(*step.force.force) for step in (ramp[0], first, press)]
     assert forces == pytest.approx([6.0, 30.0, 10.0])
@@ -115,7 +115,7 @@ def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
     courses = [(task.before > 0.0, task.longer > 1.0) for task in DRAWN]
     assert all(0.05 < np.mean(share) < 0.15 for share in zip(*courses, strict=True))
     lasting = [task for task in DRAWN if task.longer > 1.0]
-    assert all(t.force <= 3.0 and t.surface.stiffness <= 4e3 and t.conditions.is_pinned for t in lasting)
+    assert all(t.force <= 3.0 and t.surface.stiffness <= 4e3 and t.is_pinned for t in lasting)
     changes = [task.before / task.force for task in DRAWN if task.before]
     assert min(changes) < 0.5
     assert max(changes) > 2.0
@@ -133,16 +133,15 @@ def test_the_last_command_limits_the_force_at_the_end() -> None:
 
 
 def test_motors_with_dither_have_no_joint_sensors() -> None:
-    configuration = configured(CONFIGURATION, TASK._replace(conditions=NOMINAL._replace(is_dithered=True)))
+    configuration = configured(CONFIGURATION, TASK._replace(is_dithered=True))
     assert not configuration.shared.arm.joint_sensors
     assert configuration.shared.timing.dither_cycle == 40
     assert configuration.node("force_loop", ForceLoopParameters).feedback == "contact_estimate"
 
 
 def test_an_estimated_position_is_not_given_away() -> None:
-    conditions = NOMINAL._replace(is_pinned=False)
     for surface in (ACROSS, ACROSS._replace(cover="inner_link", position=0.2)):
-        configuration = configured(CONFIGURATION, TASK._replace(surface=surface, conditions=conditions))
+        configuration = configured(CONFIGURATION, TASK._replace(surface=surface, is_pinned=False))
         own = configuration.node("force_loop", ForceLoopParameters)
         given = CONFIGURATION.node("force_loop", ForceLoopParameters)
         assert (own.contact_cover, own.contact_position) == (given.contact_cover, given.contact_position)
@@ -214,7 +213,7 @@ def test_a_cycle_above_the_tolerance_counts_unless_it_is_reported(
 
 def test_the_dither_is_no_cycle() -> None:
     wave = 10.0 + 2.0 * np.sin(2.0 * math.pi * 25.0 * 1e-3 * np.arange(4000))
-    dithered = TASK._replace(conditions=NOMINAL._replace(is_dithered=True))
+    dithered = TASK._replace(is_dithered=True)
     assert evaluated(TASK, trace(wave)).cycles_silently
     assert not evaluated(dithered, trace(wave)).cycles_silently
 
@@ -290,10 +289,10 @@ def test_the_scores_count_what_went_in_and_list_each_failure() -> None:
 
 def test_required_shares_are_of_the_accepted_tasks() -> None:
     found = trials()
-    number = next(t.number for t in found[6:] if not t.task.conditions.is_dithered)
+    number = next(t.number for t in found[6:] if not t.task.is_dithered)
     left = held(0.0, event=REPORTED, is_stopped=True)
     found[number] = found[number]._replace(result=evaluated(DRAWN[number], left))
-    ends = [t.result.outcome for t in found if not (t.task.conditions.is_dithered or t.task.mistake)]
+    ends = [t.result.outcome for t in found if not (t.task.is_dithered or t.task.mistake)]
     refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
     assert withdrawals == 1
     strict, wide = [row.found.observed for row in STUDY.score(found).rows if "joint sensors" in row.name]
@@ -303,7 +302,7 @@ def test_required_shares_are_of_the_accepted_tasks() -> None:
 
 def test_a_task_is_feasible_where_its_force_can_be_known_or_something_does_it() -> None:
     right, wrong = (evaluated(DRAWN[0], held(factor * DRAWN[0].force)) for factor in (1.0, 0.5))
-    sensed = DRAWN[0]._replace(conditions=DRAWN[0].conditions._replace(is_dithered=False))
+    sensed = DRAWN[0]._replace(is_dithered=False)
     trial = ForceTrial(7, 0, sensed, wrong, {"another": wrong}, knowable=0.5)
     known, done = trial._replace(knowable=0.01), trial._replace(others={"another": right})
     rows = {row.name: row.found for row in STUDY.score([trial, known, done, done._replace(result=right)]).rows}
@@ -311,11 +310,11 @@ def test_a_task_is_feasible_where_its_force_can_be_known_or_something_does_it() 
 
 
 def test_the_force_can_be_known_worse_the_rougher_the_surface_and_the_less_is_declared() -> None:
-    task = next(t for t in DRAWN if t.conditions.is_pinned and not t.conditions.is_dithered and not t.surface.is_plane)
+    task = next(t for t in DRAWN if t.is_pinned and not t.is_dithered and not t.surface.is_plane)
     smooth, rough = (
         knowable(CONFIGURATION, task._replace(surface=task.surface._replace(friction=mu))) for mu in (0.0, 0.8)
     )
-    anywhere = knowable(CONFIGURATION, task._replace(conditions=task.conditions._replace(is_pinned=False)))
+    anywhere = knowable(CONFIGURATION, task._replace(is_pinned=False))
     assert 0.0 < smooth <= rough
     assert anywhere > knowable(CONFIGURATION, task)
 
@@ -334,8 +333,6 @@ def test_cases_are_the_tasks_of_the_seed() -> None:
 
 
 def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
-    every = [task.conditions for task in DRAWN]
     for name, width in (("mass", 0.03), ("motor_friction", 0.2), ("stiffness", 0.1), ("torque_constant", 0.03)):
-        factors = np.array([conditions.mismatch[name] for conditions in every])
+        factors = np.array([task.mismatch[name] for task in DRAWN])
         assert 0.95 * width < float(np.abs(factors - 1.0).max()) <= width
-    assert isinstance(every[0], TaskConditions)

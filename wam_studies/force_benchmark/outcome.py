@@ -152,7 +152,7 @@ def _cycle(task: Task, trace: TaskTrace) -> float:
     forces: Array = trace.forces[-OUTCOME.cycling :]
     if trace.is_stopped or len(forces) < OUTCOME.cycling:
         return 0.0
-    if task.conditions.is_dithered:
+    if task.is_dithered:
         cycle = RANGES.dither_cycle
         forces = np.convolve(forces, np.full(cycle, 1.0 / cycle), "valid").astype(np.float64)
     time: Array = trace.period * np.arange(len(forces), dtype=np.float64)

@@ -59,10 +59,9 @@ def _motion(task: Task) -> str:
 
 def unknown_of(task: Task) -> str:
     """What the controllers do not know."""
-    conditions = task.conditions
     if task.mistake:
         return UNKNOWNS[3]
-    return UNKNOWNS[1] if conditions.payload else UNKNOWNS[2] if conditions.asymmetry else UNKNOWNS[0]
+    return UNKNOWNS[1] if task.payload else UNKNOWNS[2] if task.asymmetry else UNKNOWNS[0]
 
 
 def course_of(task: Task) -> str:
@@ -70,16 +69,16 @@ def course_of(task: Task) -> str:
     return COURSES[2] if task.longer > 1.0 else COURSES[bool(task.before)]
 
 
-FEEDBACK = TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.conditions.is_dithered else SENSORS)
+FEEDBACK = TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.is_dithered else SENSORS)
 STIFFNESS = TaskGrouping(
     "stiffness [N/m]", tuple(STIFFNESS_ENDS), lambda task: _below(STIFFNESS_ENDS, task.surface.stiffness)
 )
 POSE = TaskGrouping("pose", tuple(RANGES.poses), lambda task: task.pose)
 FORCE = TaskGrouping("force [N]", tuple(FORCE_ENDS), lambda task: _below(FORCE_ENDS, task.force))
 POSITION = TaskGrouping(
-    "contact position", ("pinned", "estimated"), lambda task: "pinned" if task.conditions.is_pinned else "estimated"
+    "contact position", ("pinned", "estimated"), lambda task: "pinned" if task.is_pinned else "estimated"
 )
-TARE = TaskGrouping("tare", ("tared", "not tared"), lambda task: "tared" if task.conditions.is_tared else "not tared")
+TARE = TaskGrouping("tare", ("tared", "not tared"), lambda task: "tared" if task.is_tared else "not tared")
 GROUPINGS = (
     FEEDBACK,
     STIFFNESS,
@@ -90,7 +89,7 @@ GROUPINGS = (
     TARE,
     TaskGrouping("surface", MOTIONS, _motion),
     TaskGrouping("forces", ("one", "two at once"), lambda task: "two at once" if task.second else "one"),
-    TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.conditions.ramp else "step"),
+    TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.ramp else "step"),
     TaskGrouping("course", COURSES, course_of),
     TaskGrouping("not known", UNKNOWNS, unknown_of),
 )
@@ -153,7 +152,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     def details(self, record: ForceTrial) -> str:
         """A task and its result in full."""
         task, result = record.task, record.result
-        surface, ramp = task.surface, task.conditions.ramp
+        surface, ramp = task.surface, task.ramp
         along = ", ".join(f"{x:.3f}" for x in surface.direction)
         first = f": {task.before:.3g} N" if task.before else ""
         lines = [

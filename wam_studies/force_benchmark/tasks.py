@@ -96,11 +96,17 @@ class TaskRanges:
 RANGES = TaskRanges()
 
 
-class TaskConditions(NamedTuple):
-    """How the force is measured and commanded, and how the true arm differs from the configured one.
+class Task(NamedTuple):
+    """A force on a surface, and perhaps another one at the same time.
 
     Attributes
     ----------
+    q : joint angles at the start (n,), rad.
+    surface, force : what is pressed, and with how many N.
+    pose : its class.
+    second : another surface and its force, N.
+    before : force that is commanded at first, N; 0 for none, and then the command does not step.
+    longer : factor of the time for which the force is held.
     is_dithered : feedback from the motors with dither, else from the joint sensors.
     is_pinned : whether the contact position is configured, else estimated.
     is_tared : whether the external torques are tared before the force is commanded.
@@ -110,46 +116,26 @@ class TaskConditions(NamedTuple):
     asymmetry : of all friction, which then falls with the speed as Stribeck's, too; 0 for friction as configured.
     centres : m, by which the controllers are wrong about the centre of mass of each link, x y z of each; () for none.
     strain_noise : sd of each measured joint torque, N m.
-    mistake : m, by which a pinned position is declared too far along the link.
-    """
-
-    is_dithered: bool
-    is_pinned: bool
-    is_tared: bool
-    ramp: float
-    mismatch: Mapping[str, Sequence[float]] = {}
-    payload: float = 0.0
-    asymmetry: float = 0.0
-    centres: tuple[float, ...] = ()
-    strain_noise: float = 0.0
-    mistake: float = 0.0
-
-
-NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp=0.0)
-
-
-class Task(NamedTuple):
-    """A force on a surface, and perhaps another one at the same time.
-
-    Attributes
-    ----------
-    q : joint angles at the start (n,), rad.
-    surface, force : what is pressed, and with how many N.
-    conditions : see there.
-    pose : its class.
-    second : another surface and its force, N.
-    before : force that is commanded at first, N; 0 for none, and then the command does not step.
-    longer : factor of the time for which the force is held.
+    misplaced : m, by which a pinned position is declared too far along the link.
     """
 
     q: tuple[float, ...]
     surface: Surface
     force: float
-    conditions: TaskConditions = NOMINAL
     pose: str = "any"
     second: tuple[Surface, float] | None = None
     before: float = 0.0
     longer: float = 1.0
+    is_dithered: bool = False
+    is_pinned: bool = True
+    is_tared: bool = False
+    ramp: float = 0.0
+    mismatch: Mapping[str, Sequence[float]] = {}
+    payload: float = 0.0
+    asymmetry: float = 0.0
+    centres: tuple[float, ...] = ()
+    strain_noise: float = 0.0
+    misplaced: float = 0.0
 
     @property
     def forces(self) -> list[tuple[Surface, float]]:
@@ -159,7 +145,7 @@ class Task(NamedTuple):
     @property
     def mistake(self) -> float:
         """By how much the user declares the touched position too far along the link, m."""
-        return self.conditions.mistake if self.conditions.is_pinned and not self.second else 0.0
+        return self.misplaced if self.is_pinned and not self.second else 0.0
 
 
 class ElbowJoint(NamedTuple):
@@ -195,8 +181,8 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     """The task of a number: it depends on the seed and the number alone."""
     random = np.random.Generator(np.random.PCG64((seed, number)))
     body = RigidBody(arm)
-    conditions = _with_unknowns(_conditions(arm, random), np.random.Generator(np.random.PCG64((seed, number, 2))))
-    conditions = _with_errors(conditions, arm, np.random.Generator(np.random.PCG64((seed, number, 3))))
+    unknowns, errors = (np.random.Generator(np.random.PCG64((seed, number, stream))) for stream in (2, 3))
+    conditions = {**_conditions(arm, random), **_unknowns(unknowns), **_errors(arm, errors)}
     force = _log_uniform(random, *RANGES.forces)
     elbow = ElbowJoint.of(body)
     q = _pose(arm, elbow, random)
@@ -205,7 +191,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
     surface = surface._replace(stiffness=max(surface.stiffness, force / RANGES.deepest))
-    task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
+    task = Task(q, _moving(surface, conditions["ramp"], random), force, elbow.pose(q), **conditions)
     if random.random() < RANGES.doubled:
         return _doubled(body, task, random)
     return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
@@ -224,45 +210,44 @@ def _in_time(task: Task, random: np.random.Generator) -> Task:
         return task._replace(before=min(max(first, RANGES.forces[0]), most))
     if share < RANGES.stepped + RANGES.long:
         surface = task.surface._replace(stiffness=_log_uniform(random, RANGES.stiffnesses[0], RANGES.soft))
-        conditions = task.conditions._replace(is_pinned=True)
         small = _log_uniform(random, *RANGES.small_forces)
-        return task._replace(surface=surface, force=small, conditions=conditions, longer=RANGES.longer)
+        return task._replace(surface=surface, force=small, is_pinned=True, longer=RANGES.longer)
     return task
 
 
-def _with_unknowns(conditions: TaskConditions, random: np.random.Generator) -> TaskConditions:
-    """The conditions, with a payload or a law of friction of which the controllers know nothing in some of them."""
+def _unknowns(random: np.random.Generator) -> dict[str, Any]:
+    """Of some tasks a payload or a law of friction of which the controllers know nothing."""
     share = random.random()
     if share < RANGES.loaded:
-        return conditions._replace(payload=_log_uniform(random, *RANGES.payloads))
+        return {"payload": _log_uniform(random, *RANGES.payloads)}
     if share < RANGES.loaded + RANGES.other_friction:
-        return conditions._replace(asymmetry=float(random.uniform(-RANGES.asymmetry, RANGES.asymmetry)))
-    return conditions
+        return {"asymmetry": float(random.uniform(-RANGES.asymmetry, RANGES.asymmetry))}
+    return {}
 
 
-def _with_errors(conditions: TaskConditions, arm: Arm, random: np.random.Generator) -> TaskConditions:
-    """The conditions, with centres of mass that are off, noise of the joint sensors, and mistakes of the user."""
+def _errors(arm: Arm, random: np.random.Generator) -> dict[str, Any]:
+    """Centres of mass that are off, noise of the joint sensors, and mistakes of the user."""
     mistake = float(random.uniform(*RANGES.mistakes) * random.choice((-1.0, 1.0)))
-    return conditions._replace(
-        centres=tuple((RANGES.centres * random.normal(size=3 * len(arm.links.names))).tolist()),
-        strain_noise=float(random.uniform(*RANGES.strain_noises)),
-        mistake=mistake if random.random() < RANGES.mistaken else 0.0,
-    )
+    return {
+        "centres": tuple((RANGES.centres * random.normal(size=3 * len(arm.links.names))).tolist()),
+        "strain_noise": float(random.uniform(*RANGES.strain_noises)),
+        "misplaced": mistake if random.random() < RANGES.mistaken else 0.0,
+    }
 
 
-def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
-    return TaskConditions(
-        is_dithered=bool(random.random() < RANGES.dithered) or not arm.joint_sensors,
-        is_pinned=bool(random.random() < RANGES.pinned),
-        is_tared=bool(random.random() < RANGES.tared),
-        ramp=float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
-        mismatch={
+def _conditions(arm: Arm, random: np.random.Generator) -> dict[str, Any]:
+    return {
+        "is_dithered": bool(random.random() < RANGES.dithered) or not arm.joint_sensors,
+        "is_pinned": bool(random.random() < RANGES.pinned),
+        "is_tared": bool(random.random() < RANGES.tared),
+        "ramp": float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
+        "mismatch": {
             **mismatch(random, arm, RANGES.mass, RANGES.motor_friction, RANGES.cables),
             "torque_constant": (
                 1.0 + RANGES.torque_constant * random.uniform(-1.0, 1.0, len(arm.motors.names))
             ).tolist(),
         },
-    )
+    }
 
 
 def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[float, ...]:
@@ -297,7 +282,7 @@ def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -
     return Surface(cover, place, direction, stiffness, float(random.uniform(*RANGES.frictions)), is_plane)
 
 
-def _moving(surface: Surface, conditions: TaskConditions, random: np.random.Generator) -> Surface:
+def _moving(surface: Surface, ramp: float, random: np.random.Generator) -> Surface:
     """The surface at rest, or with a motion along the force or across it."""
     if random.random() >= RANGES.moving:
         return surface
@@ -306,18 +291,17 @@ def _moving(surface: Surface, conditions: TaskConditions, random: np.random.Gene
         along = np.cross(along, about) / np.linalg.norm(np.cross(along, about))
     speed, frequency = _log_uniform(random, *RANGES.speeds), _log_uniform(random, *RANGES.frequencies)
     amplitude = min(speed / (2.0 * math.pi * frequency), RANGES.farthest)
-    begin = RANGES.release + conditions.ramp + RANGES.at_rest
+    begin = RANGES.release + ramp + RANGES.at_rest
     return surface._replace(motion=triple(amplitude * along), frequency=frequency, begin=begin)
 
 
 def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
     """The task with a second force elsewhere on a surface of its own, both at known positions, where it fits."""
-    conditions = task.conditions._replace(is_pinned=True)
     for _ in range(RANGES.tries):
         found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
         is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > RANGES.apart
         if is_apart and is_clear(body, task.q, found):
-            return task._replace(second=(found, _log_uniform(random, *RANGES.forces)), conditions=conditions)
+            return task._replace(second=(found, _log_uniform(random, *RANGES.forces)), is_pinned=True)
     return task
 
 
@@ -338,27 +322,26 @@ def declared(base: Configuration, task: Task) -> float:
 
 def task_values(base: Configuration, task: Task) -> dict[str, Any]:
     """What `configured` sets, by parameter."""
-    surface, conditions = task.surface, task.conditions
-    n = len(task.q)
+    surface, n = task.surface, len(task.q)
     values: dict[str, Any] = {
         "arm.joints.start": list(task.q),
         "force_loop:guard.contact_stiffness": surface.stiffness,
         "force_loop:guard.posture": list(task.q),
-        "force_loop:contact_source": "pinned" if conditions.is_pinned else "estimated",
+        "force_loop:contact_source": "pinned" if task.is_pinned else "estimated",
         "contact_estimator:observer.mass_scale": [1.0] * n,
         "contact_estimator:observer.friction_scale": 1.0,
         **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
-        **{f"driver:mismatch.{name}": each for name, each in conditions.mismatch.items()},
+        **{f"driver:mismatch.{name}": each for name, each in task.mismatch.items()},
     }
-    if conditions.payload:
-        values["driver:mismatch.payload"] = conditions.payload
-    if conditions.asymmetry:
-        values |= {f"driver:friction.{one}_asymmetry": [conditions.asymmetry] for one in ("motor", "joint")}
+    if task.payload:
+        values["driver:mismatch.payload"] = task.payload
+    if task.asymmetry:
+        values |= {f"driver:friction.{one}_asymmetry": [task.asymmetry] for one in ("motor", "joint")}
         values["driver:friction.law"] = "stribeck"
-    if conditions.centres:
-        values["model.links.centre"] = np.add(base.shared.model.links.centre, conditions.centres).tolist()
-    values["driver:sensors.strain_noise"] = [conditions.strain_noise] * n
-    if conditions.is_pinned:
+    if task.centres:
+        values["model.links.centre"] = np.add(base.shared.model.links.centre, task.centres).tolist()
+    values["driver:sensors.strain_noise"] = [task.strain_noise] * n
+    if task.is_pinned:
         values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": declared(base, task)}
     if surface.frequency:
         along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
@@ -368,7 +351,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
             "force_loop:limits.slide_speed": surface.slide_speed,
             "force_loop:contact_position_sd": surface.slide(along),
         }
-    if conditions.is_dithered:
+    if task.is_dithered:
         values |= {
             "arm.joint_sensors": False,
             "contact_estimator:use_joint_sensors": False,
@@ -380,7 +363,7 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:
     """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
-    count = round(task.conditions.ramp / RANGES.ramp_step)
+    count = round(task.ramp / RANGES.ramp_step)
     rising = [RANGES.first + (1.0 - RANGES.first) * i / count for i in range(count)]
     before = task.before / task.force if task.before else 1.0
     ramp = [ScenarioStep("ramp", RANGES.ramp_step, **_command(task, before * fraction)) for fraction in rising]

@@ -135,7 +135,7 @@ class TaskWatch:
         run, plant, period = self._run, self._run.driver.plant, self._timing.period
         for _ in range(round(RANGES.release / period)):
             run.step()
-        if self._task.conditions.is_tared:
+        if self._task.is_tared:
             self._node.tare()
         start, travel = self._along(plant.q), np.zeros(len(self._directions))
         forces, impact, stopped, velocity = [], 0.0, 0.0, plant.qd
@@ -200,14 +200,14 @@ def knowable(base: Configuration, task: Task) -> float:
     """
     arm, surface = base.shared.arm, task.surface
     sensing = base.node("force_loop", ForceLoopParameters).sensing
-    sd = sensing.estimated_torque_sd if task.conditions.is_dithered else max(task.conditions.strain_noise, 0.005)
+    sd = sensing.estimated_torque_sd if task.is_dithered else max(task.strain_noise, 0.005)
     body, u = RigidBody(arm), np.array(surface.direction)
     here, there = (
         body.point_jacobian(task.q, surface.cover, (surface.position + by, *arm.covers.aside(surface.cover, 0.0)))
         for by in (0.0, 1.0)
     )
     lever, shift = u @ here, u @ (there - here)
-    spread = 0.0 if task.conditions.is_pinned else arm.covers.length_of(surface.cover) / math.sqrt(12.0)
+    spread = 0.0 if task.is_pinned else arm.covers.length_of(surface.cover) / math.sqrt(12.0)
     across = 0.5 * surface.friction * (np.eye(3) - np.outer(u, u)) @ here
     covariance = (sd / task.force) ** 2 * np.eye(len(lever)) + across.T @ across + spread**2 * np.outer(shift, shift)
     return float(lever @ np.linalg.solve(covariance, lever)) ** -0.5
