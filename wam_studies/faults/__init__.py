@@ -5,9 +5,9 @@ trials             what a trial is, the limits of motion, force and delay, the n
 message_faults     messages broken field by field, stamp by stamp, byte by byte
 bag_faults         bags broken at random, and what a reader makes of them
 messages, parameter_sets, disks, bags   trials on the nodes in one process
-losses             trials on nodes in processes of their own
+losses             nodes in processes of their own, and trials on them
 interruptions      Ctrl-C at random moments of the demonstration
 soak               a long run, its memory and its losses
-watched_stack, node_processes   the nodes and what is measured on them
+watched_stack      the nodes in one process and what is measured on them
 answered_clock     realtime that does not depend on the speed of the machine
 """

@@ -2,11 +2,131 @@
 
 import math
 import signal
+import time
+from collections import deque
+from functools import partial
 from random import Random
-from typing import Final
+from typing import Any, Final
 
-from wam_studies.faults.node_processes import ANSWERS, NodeProcesses
+from wam_description.configuration import Configuration
+from wam_description.signals import BASE, ZERO, NodeStatus, State, Wrench
+from wam_description.wiring import Call
+from wam_ros.bring_up import NodeProcess
+from wam_ros.client import StackClient
+from wam_ros.topics import NAMESPACE
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
+
+ANSWERS: Final = {  # a topic that each node publishes in every outer period or more often
+    "driver": "motor_states",
+    "transform": "joint_states",
+    "velocity_loop": "motor_current_command",
+    "gravity": "gravity_effort",
+    "force_loop": "joint_velocity_command",
+    "contact_estimator": "external_joint_torques",
+}
+
+
+class NodeProcesses(StackClient):
+    """The chain as processes, and what is seen of it over topics.
+
+    Parameters
+    ----------
+    configuration : of the nodes.
+
+    Attributes
+    ----------
+    processes : of the nodes by name.
+    stamps : newest stamp of the topic by which each node answers, ns.
+    current_stamp : newest stamp of a motor current that is not zero, ns.
+    q : true joint angles.
+    force : largest true force since it was set, N.
+    reports : last texts of all nodes.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        super().__init__(name="watcher", shared=configuration.shared)
+        self.processes = {
+            name: NodeProcess(configuration, [name], NAMESPACE, "fatal")
+            for name in ANSWERS
+            if name in configuration.shared.nodes
+        }
+        self.stamps = dict.fromkeys(self.processes, 0)
+        self.reports: deque[str] = deque(maxlen=200)
+        self.current_stamp = 0
+        self.q: list[float] = []
+        self.force = 0.0
+        self._hold: list[float] = []
+        self.follow_statuses()
+        for name in self.processes:
+            self.listen(ANSWERS[name], partial(self._answered, name))
+        self.listen("motor_currents", self._take_currents, "effort")
+        self.listen("sim/joint_states", self._take_angles, "position")
+        self.listen("sim/contact/wrench", self._take_force)
+
+    def close(self) -> None:
+        """End all nodes."""
+        for process in self.processes.values():
+            process.send(signal.SIGKILL)
+            process.close()
+        super().close()
+
+    @property
+    def ended(self) -> list[str]:
+        """Names of the nodes that do not run."""
+        return [name for name, process in self.processes.items() if process.code is not None]
+
+    def _answered(self, name: str, stamp: int, value: Any) -> None:
+        self.stamps[name] = stamp
+        if name == "transform" and self._hold:
+            self.send("joint_posture_command", stamp, State(self._hold, [], []))
+            self.send("force_command", stamp, Wrench(BASE, ZERO, ZERO))
+
+    def _take_currents(self, stamp: int, value: State) -> None:
+        if any(value.effort):
+            self.current_stamp = stamp
+
+    def _take_angles(self, stamp: int, value: State) -> None:
+        self.q = value.position
+
+    def _take_force(self, stamp: int, value: Wrench) -> None:
+        self.force = max(self.force, math.hypot(*value.force))
+
+    def take_status(self, status: NodeStatus) -> None:
+        """Keep its texts."""
+        self.reports.append(f"{status.node}: {status.message} {status.fault}")
+
+    def watch(self, seconds: float) -> None:
+        """Let time pass."""
+        self.wait(lambda: False, seconds)
+
+    def enabled(self) -> str:
+        """Do what an operator does; returns why the arm cannot be enabled, '' where it is and stays so."""
+        end = time.monotonic() + FAULTS.recovered
+        reason = ""
+        while time.monotonic() < end:
+            self._hold = []
+            self.request(Call("driver", "reset_fault"), FAULTS.answered)
+            reason = self.request(Call("driver", "enable", True), FAULTS.answered).message
+            silent = self._silent()
+            if not silent:
+                self._hold = list(self.q)
+                self.watch(0.1)
+                if self.mode == "enabled":
+                    return ""
+            found = self.statuses.get("driver")
+            reason += f"; silent: {', '.join(silent) or 'none'}; {found.message if found else 'no status'}"
+        return f"the arm cannot be enabled within {FAULTS.recovered:g} s: {reason}"
+
+    def _silent(self) -> list[str]:
+        """Nodes that do not answer within a second."""
+        before = dict(self.stamps)
+
+        def silent() -> list[str]:
+            return [name for name, stamp in before.items() if self.stamps[name] <= stamp]
+
+        self.wait(lambda: not silent(), 1.0)
+        return silent()
+
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
 # with the estimate fed back, the estimator belongs to the chain, too

@@ -52,6 +52,11 @@ class Driven(NamedTuple):
         """At the joint, N m/rad, as configured."""
         return self.ratio**2 * self.arm.circuits[0].stiffness
 
+    @property
+    def smooth(self) -> "Driven":
+        """With the friction of the cables, which is the same without load."""
+        return self._replace(friction=driven("cables").friction)
+
     def plant(self, rotor: float | None = None, world: World = EMPTY, dry: bool = False, play: bool = True) -> Plant:
         """A plant without gravity, released.
 
@@ -158,7 +163,7 @@ def measured(kind: str) -> TransmissionMeasures:
 
 def _deflection(it: Driven, torque: float) -> float:
     """Of the link under a torque, rad, the motor held: the mean over a period of its undamped oscillation."""
-    plant = it._replace(friction=driven("cables").friction).plant(rotor=IMMOVABLE)
+    plant = it.smooth.plant(rotor=IMMOVABLE)
     plant.data.qpos[1] = 0.5 * it.effects.play(0) / it.ratio  # the gap is closed at the start
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
     period = 2.0 * math.pi * math.sqrt(link_inertia(it.arm) / it.stiffness)
@@ -171,8 +176,7 @@ def _deflection(it: Driven, torque: float) -> float:
 
 def bandwidth(it: Driven, contact: float) -> float:
     """Lower frequency of the plant without play, rad/s, on a spring at the joint, N m/rad."""
-    smooth = it._replace(friction=driven("cables").friction)
-    return float(frequencies(smooth.plant(world=against_spring(contact), play=False), it.step)[0])
+    return float(frequencies(it.smooth.plant(world=against_spring(contact), play=False), it.step)[0])
 
 
 def _efficiency(it: Driven) -> float:
@@ -190,7 +194,7 @@ def _efficiency(it: Driven) -> float:
 
 def _inertia(it: Driven, torque: float = 5.0, seconds: float = 2.0) -> float:
     """Torque on the link over its acceleration, kg m^2, without friction and play."""
-    plant = it._replace(friction=driven("cables").friction).plant(play=False)
+    plant = it.smooth.plant(play=False)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
     plant.step([0.0], round(seconds / it.step))
     return torque * seconds / (plant.thetad[0] / it.ratio)
