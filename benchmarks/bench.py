@@ -54,14 +54,13 @@ class Benchmark(NamedTuple):
     measure : yields the values of one round after the other, of a quick run or of another.
     title : of the table, with the unit of its values.
     rows : of the table.
-    rounds, quick_rounds : by default.
+    rounds : by default; a quick run has one.
     """
 
     measure: Callable[[bool], Measured]
     title: str
     rows: Sequence[Row]
     rounds: int
-    quick_rounds: int = 1
 
 
 class Quartiles(NamedTuple):
@@ -163,8 +162,7 @@ def main() -> None:
             subprocess.run([sys.executable, __file__, *words], env={**os.environ, **tree}, check=True)
             continue
         benchmark = load(name)
-        usual = benchmark.quick_rounds if given.quick else benchmark.rounds
-        run(name, benchmark, given.rounds or usual, given.quick)
+        run(name, benchmark, given.rounds or (1 if given.quick else benchmark.rounds), given.quick)
 
 
 if __name__ == "__main__":

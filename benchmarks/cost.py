@@ -4,7 +4,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import wraps
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,18 +24,16 @@ from wam_sim.simulation import Simulation
 # parts of a direct run
 
 NODES = ("contact_estimator", "force_loop", "velocity_loop", "transform", "gravity", "scenario")
-WITHIN: Mapping[str, tuple[str, str]] = MappingProxyType({  # methods of an object of the simulation, by part
+WITHIN = {  # methods of an object of the simulation, by part
     "driver: substeps": ("driver.plant", "step"),
     "driver: measuring": ("driver", "_measure"),
     "driver: limits": ("driver", "_watch_limits"),
     "driver: amplifier": ("driver.amplifier", "step"),
     "contact_estimator: observe": ("nodes.contact_estimator._estimator", "observe"),
     "contact_estimator: estimate": ("nodes.contact_estimator._estimator", "estimate"),
-})  # fmt: skip
+}
 WHOLE, TRUTH, REST = "whole", "true state, published", "bus, synchronisers, scheduling"
-DRIVER: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {"driver": ("driver", "advance"), TRUTH: ("", "_publish_truth")}
-)
+DRIVER = {"driver": ("driver", "advance"), TRUTH: ("", "_publish_truth")}
 Spent = Counter[str]
 
 

@@ -174,7 +174,6 @@ PLANT = Benchmark(
         Row("testbed, moving", BARE + "testbed, moving", 1.5, 1.3),
     ),
     rounds=200,
-    quick_rounds=5,
 )
 
 

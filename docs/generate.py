@@ -22,7 +22,6 @@ from matplotlib.patches import Polygon
 
 from wam_analysis.drawing import INK, SHAFTS
 from wam_analysis.table import markdown
-from wam_control.force.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.task.scenario import STEP_KEYS
 from wam_control.velocity.dither import Dither
 from wam_control.velocity.velocity_loop import VelocityLoopParameters
@@ -31,7 +30,7 @@ from wam_description.configuration import Configuration
 from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
-from wam_description.parameters import Field, ParameterError, fields
+from wam_description.parameters import Field, fields
 from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input
@@ -157,19 +156,13 @@ def short(value: Any) -> str:
     return number(value)
 
 
-def parameters_of(node: str) -> type:
-    """The parameter class of a node."""
-    found: type = declared(node).parameter_class
-    return found
-
-
 def parameters(configuration: Configuration) -> str:
     """Every parameter of every node."""
     head = ["parameter", "in `wam`", "allowed", "meaning"]
     shared = list(parameter_rows(Shared, configuration.sections["/**"]))
     parts = ["## Shared by all nodes, section `/**`\n", markdown(head, shared)]
     for node in NODES:
-        rows = list(parameter_rows(parameters_of(node), configuration.sections[node]))
+        rows = list(parameter_rows(declared(node).parameter_class, configuration.sections[node]))
         parts += [f"## `{node}`\n", markdown(head, rows) if rows else "None of its own.\n"]
     return "\n".join(parts)
 
@@ -236,11 +229,6 @@ def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequen
 # pages
 
 
-def listing(name: str) -> str:
-    """A file of this repository as a block of code."""
-    return f"```python\n{(ROOT / name).read_text(encoding='utf-8')}```\n"
-
-
 plant_study = cache(effects.errors)
 
 
@@ -274,7 +262,6 @@ def blocks() -> dict[str, Callable[[], str]]:
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
         ),
         "dither": lambda: dither(configuration),
-        "refusals": refusals,
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
         "figures": figures,
         "equations": equations,
@@ -290,7 +277,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "verdict of barrett-wam7": partial(verdict, "barrett-demo.txt"),
         "joints of barrett-wam7": joints_of_today,
         "motors of barrett-wam7": motors_of_today,
-        "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
+        "examples/direct_run.py": lambda: f"```python\n{(ROOT / 'examples' / 'direct_run.py').read_text()}```\n",
     }
 
 
@@ -385,28 +372,6 @@ def dither(configuration: Configuration) -> str:
         ["heat of the hottest winding, over its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
     ]
     return markdown(["the dither", ""], rows)
-
-
-def refusals() -> str:
-    """Messages of the force loop for some unstable parameter sets."""
-    lines = []
-    for name, change in (
-        ("wam", {"force_loop:force_gain": [0.5]}),
-        ("wam", {"force_loop:mode": "joint_torque", "force_loop:torque_gain": [0.05]}),
-        ("testbed", {"force_loop:force_gain": [0.05]}),
-        ("testbed", {"force_loop:force_gain": [0.2]}),
-    ):
-        values = {**change, "force_loop:guard.mode": "refuse"}
-        configuration = Configuration.load(ROOT / "config" / f"{name}.yaml").with_values(values)
-        shared = configuration.shared
-        given = ", ".join(f"{key.removeprefix('force_loop:')} {value}" for key, value in change.items())
-        try:
-            ForceLoop(shared.arm, shared.servo, configuration.node("force_loop", ForceLoopParameters), shared.timing)
-        except ParameterError as error:
-            lines.append(f"{name}, {given}:\n  {error}")
-        else:
-            raise SystemExit(f"the guard accepts {given} on {name}; the page needs a refusal")
-    return "```\n" + "\n".join(lines) + "\n```\n"
 
 
 def measure_forces() -> None:
