@@ -53,7 +53,7 @@ def test_each_axis_has_a_law_of_its_own() -> None:
 
 def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> None:
     law = ForceLaw("torque", ("a", "b"), (0.0, 0.0), (0.1, 0.1), (5.0, 1.0), (0.0, 0.0))
-    assert law.velocities([3.0, 3.0], [0.0, 0.0], DT) == pytest.approx([0.3 / DT, 0.1 / DT])
+    assert [law.velocity(axis, 3.0, 0.0, DT) for axis in (0, 1)] == pytest.approx([0.3 / DT, 0.1 / DT])
 
 
 def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not_of_the_set_point() -> None:

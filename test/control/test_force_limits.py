@@ -16,10 +16,11 @@ from wam_control.force.limits import (
     approach_speed,
     calm,
     followed,
+    is_too_slow,
     joint_bounds,
     likeliest_link,
-    reach_time,
     resolution,
+    winding,
 )
 from wam_description.transmission_map import TransmissionMap
 
@@ -96,17 +97,24 @@ def test_an_approach_hits_no_harder_than_allowed_and_a_touch_rises_no_faster_tha
     assert approach_speed(axis_at(q), False, limited(own, impact=0.0)) == math.inf
 
 
-def test_a_surface_that_the_arm_does_not_reach_in_time_is_never_reached() -> None:
+def test_a_force_at_a_place_that_is_not_known_rises_as_fast_as_the_velocity_loops_wind_up() -> None:
     axis = axis_at(POSES[0])
     assert axis.place is not None
-    assert reach_time(axis, WOUND, MOTORS) == 0.0, "at a pinned place the torque is fed forward"
-    estimated = axis._replace(place=axis.place._replace(is_pinned=False))
-    assert reach_time(estimated, WOUND, OWN) == 0.0
-    late = reach_time(estimated, WOUND, MOTORS)
-    assert 0.0 < late < math.inf
-    assert reach_time(estimated, 2.0 * WOUND, MOTORS) == pytest.approx(late / 2.0)
-    assert reach_time(axis, WOUND, limited(surface_speed=1.0)) == math.inf
-    assert reach_time(axis, WOUND, limited(impact=1e-4)) == math.inf
+    assert winding(axis, WOUND, MOTORS) == 0.0, "at a pinned place the torque is fed forward"
+    estimated = axis._replace(place=axis.place._replace(is_pinned=False, is_known=False))
+    assert winding(estimated, WOUND, OWN) == 0.0
+    yielding = winding(estimated, WOUND, MOTORS)
+    assert winding(estimated, 2.0 * WOUND, MOTORS) == pytest.approx(yielding / 2.0)
+    faster = approach_speed(estimated, True, MOTORS, yielding) - approach_speed(estimated, True, MOTORS)
+    assert faster > 0.0
+    assert approach_speed(estimated, False, MOTORS, yielding) == approach_speed(estimated, False, MOTORS)
+
+
+def test_a_surface_that_the_arm_does_not_reach_in_time_is_never_reached() -> None:
+    axis = axis_at(POSES[0])
+    assert not is_too_slow(axis, OWN)
+    assert is_too_slow(axis, limited(surface_speed=1.0))
+    assert is_too_slow(axis, limited(impact=1e-4))
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e6])

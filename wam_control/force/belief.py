@@ -98,7 +98,7 @@ def predicted(
     own: ForceLoopParameters,
     resting: float = 0.0,
     shaking: float = 0.0,
-    reach_time: float = 0.0,
+    is_too_slow: bool = False,
 ) -> Errors:
     """Predicted error of a force.
 
@@ -109,13 +109,13 @@ def predicted(
     own : parameters of the force loop.
     resting : force, N, that torques at rest look like, and nothing touched gives.
     shaking : swing of the force, N peak to peak, as the arm shakes on the stiffest surface.
-    reach_time : time, s, that the velocity loops need to wind up to the force.
+    is_too_slow : whether the arm cannot reach or follow the surface.
     """
     if sensed.force_sd == math.inf:
         return Errors(torques=math.inf)
     limits, soft = own.limits, yielding(sensed, own)
     pace = max(own.force_gain) * sensed.speed_fraction
-    settling = (FORCE.settled * soft / pace if pace else math.inf) + reach_time
+    settling = FORCE.settled * soft / pace if pace else math.inf
     slope = FORCE.friction_turn * FORCE.surface_slope * limits.slide_speed / soft
     return Errors(
         torques=sensed.error(torque_sd),
@@ -123,7 +123,7 @@ def predicted(
         place=sensed.place_sd,
         resting=abs(resting),
         moving_surface=(limits.surface_speed / pace if limits.surface_speed else 0.0) + slope,
-        slow_arm=math.inf if settling > limits.settling_time else 0.0,
+        slow_arm=math.inf if is_too_slow or settling > limits.settling_time else 0.0,
         shaking_arm=limits.tolerance / limits.shake_force * shaking,
     )
 
@@ -136,7 +136,7 @@ def belief(
     is_touching: bool,
     resting: Array,
     shaking: float,
-    reach_time: float,
+    is_too_slow: bool,
 ) -> Belief:
     """The belief of one force axis.
 
@@ -148,7 +148,7 @@ def belief(
     own : parameters of the force loop.
     is_touching : whether something is touched: until then, what sensors measure of the arm's own motion is no force.
     resting : torques at rest before (n,), N m, that no touched surface gives.
-    shaking, reach_time : as `predicted` has them.
+    shaking, is_too_slow : as `predicted` has them.
     """
     sensed, desired = axis.sensed, axis.desired
     force, before = axis.force(torques.now), axis.force(torques.before)
@@ -159,7 +159,7 @@ def belief(
     if torques.acceleration is not None and not is_touching:
         # the acceleration is the mean of a period
         force = before = 0.5 * (force + before) - float(sensed.carried @ torques.acceleration)
-    errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, reach_time)
+    errors = predicted(sensed, torques.sd, own, float(sensed.sense @ resting), shaking, is_too_slow)
     if sensed.force_sd == math.inf:
         return Belief(force, before, math.inf, 0.0, errors, tolerance(size, own))
     sd = math.hypot(sensed.error(torques.sd), sensed.friction_sd, sensed.place_sd)

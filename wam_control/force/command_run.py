@@ -17,7 +17,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
 from wam_control.force.held_arm import HeldArm
-from wam_control.force.limits import reach_time
+from wam_control.force.limits import is_too_slow
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
 from wam_description.arm import Arm, Covers, Timing
@@ -68,12 +68,15 @@ class Shaking:
     """
 
     def __init__(self, timing: Timing) -> None:
-        self._cycle, self._poses = timing.dither_cycle * timing.period, list[Array]()
+        self._cycle, self._poses = timing.dither_cycle * timing.period, deque[Array]()
 
-    def is_watching(self, q: Sequence[float], dt: float) -> bool:
-        """Take a pose (n,), rad; whether more of them are needed."""
-        if not self._cycle or len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
+    def is_watching(self, q: Sequence[float], holds: bool, dt: float) -> bool:
+        """Take a pose (n,), rad, unless there are enough and the arm moves; whether one was taken."""
+        is_enough = len(self._poses) * dt > max(FORCE.watched_time, self._cycle)
+        if not self._cycle or (is_enough and not holds):
             return False
+        if is_enough:
+            self._poses.popleft()
         self._poses.append(np.array(q))
         return True
 
@@ -185,12 +188,10 @@ class CommandRun:
         """Whether something is touched by one of its forces."""
         return any(one.watch.touch.is_there for one in self.axes)
 
-    def believe(
-        self, axis: CommandedAxis, size: float, torques: WorldTorques, own: ForceLoopParameters, wound: Array
-    ) -> Belief:
-        """What is known of the force along an axis, N; `size` is that of the command, `wound` as of `reach_time`."""
-        swing, reach = self.shaking.swing(axis, own), reach_time(axis, wound, own)
-        return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, reach)
+    def believe(self, axis: CommandedAxis, size: float, torques: WorldTorques, own: ForceLoopParameters) -> Belief:
+        """What is known of the force along an axis, N; `size` is that of the command."""
+        swing, is_slow = self.shaking.swing(axis, own), is_too_slow(axis, own)
+        return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, is_slow)
 
     def move(self, moved: Array, axes: Sequence[CommandedAxis], forces: ForceAxes, q: Sequence[float]) -> None:
         """Count a motion of the joints (n,), rad: what is touched stays, and the link slides along it."""

@@ -77,10 +77,6 @@ class ForceLaw:
             velocity += proportional * (self.limited(axis, error) - self.limited(axis, before)) / dt
         return velocity
 
-    def velocities(self, errors: Sequence[float], before: Sequence[float], dt: float) -> list[float]:
-        """Velocity of every axis; arguments as those of `velocity`, one of each per axis."""
-        return [self.velocity(i, *pair, dt) for i, pair in enumerate(zip(errors, before, strict=True))]
-
     def along(self, axis: Sequence[float]) -> "ForceLaw":
         """The law of the error along one unit vector of the frame: its saturation and deadband are ellipsoids.
 

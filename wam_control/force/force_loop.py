@@ -27,7 +27,7 @@ from wam_control.force.force_watch import MotionWatch, Seen
 from wam_control.force.guard import Report, Supervision, Watch
 from wam_control.force.guarded import guarded
 from wam_control.force.held_arm import PushedArm
-from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time
+from wam_control.force.limits import accelerated, approach_speed, followed, joint_bounds, resolution, rise_time, winding
 from wam_control.force.problem import VelocityRow, solve
 from wam_control.force.stability_guard import GuardAssessment, Guarded
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
@@ -326,8 +326,8 @@ class ForceLoop:
         size = abs(axis.desired)
         if axis.is_joint:  # the torques of the joints are one vector
             size = math.hypot(*(one.desired for one in axes if one.is_joint))
-        own, torques, wound = self.parameters, self._measurement.torques, self._supervision.wound
-        known = self._run.believe(axis, size, torques, own, wound)
+        own, torques = self.parameters, self._measurement.torques
+        known = self._run.believe(axis, size, torques, own)
         place = axis.place
         if place is None or place.is_pinned or known.force >= axis.desired or (place.is_touched and not place.is_known):
             return known
@@ -338,7 +338,7 @@ class ForceLoop:
         sd = place.position_sd * max(known.force / axis.desired, 0.0) if place.is_known else 0.0
         place = place._replace(position_sd=max(sd, own.contact_position_sd))
         touched = axis._replace(sensed=self._axes.forces.axis(q, place.pressed(axis.direction, axis.desired)))
-        return known._replace(errors=self._run.believe(touched, size, torques, own, wound).errors)
+        return known._replace(errors=self._run.believe(touched, size, torques, own).errors)
 
     def _move(
         self,
@@ -361,6 +361,8 @@ class ForceLoop:
             own.joint_speed_limit,
         )
         rows, least = list[VelocityRow](), list[VelocityRow]()
+        is_watched = bool(axes) and own.is_estimated and not run.is_touching
+        is_watching = is_watched and run.shaking.is_watching(self._q, holds, dt)
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         if holds:
@@ -368,7 +370,7 @@ class ForceLoop:
             wanted = run.held.velocity(self._q, self._hold_at(axes, found), inertia, allowed, own)
         else:
             run.held.at = None
-            rows = self._rows(axes, known, factor, dt)
+            rows = self._rows(axes, known, factor, is_watching, dt)
             if rate is None:
                 wanted = self._slowed(axes, rows, wanted)
         least += self._pushes(axes, forces, known, contact, holds, allowed, dt)
@@ -400,12 +402,11 @@ class ForceLoop:
         return self.parameters.task.fastest(axis.is_joint)[0]
 
     def _rows(
-        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], factor: float, dt: float
+        self, axes: Sequence[CommandedAxis], known: Sequence[Belief], factor: float, is_watching: bool, dt: float
     ) -> list[VelocityRow]:
-        """The commanded velocity along each axis."""
+        """The commanded velocity along each axis; none while the arm is watched before it moves."""
         run, own = self._run, self.parameters
         speeds = [self._speed(i, axis, known[i], factor, dt) for i, axis in enumerate(axes)]
-        is_watching = bool(axes) and own.is_estimated and not run.is_touching and run.shaking.is_watching(self._q, dt)
         watch = self._supervision.watch
         is_assessed = watch is None or bool(watch.assessed) or all(axis.sensed is None for axis in axes)
         if is_watching or not is_assessed:
@@ -450,7 +451,8 @@ class ForceLoop:
                 return 0.0
         speed = factor * one.watch.oscillation.share * law.velocity(0, error, before, dt)
         if axis.desired:  # back no faster than the measured force can follow
-            most = approach_speed(axis, one.watch.touch.is_there, own)
+            slack = winding(axis, self._supervision.wound, own)
+            most = approach_speed(axis, one.watch.touch.is_there, own, slack)
             speed = min(max(speed, -most * max(-error / axis.desired, 1.0)), most)
         return axis.sensed.speed_fraction * speed
 

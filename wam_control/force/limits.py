@@ -50,12 +50,20 @@ def rise_time(own: ForceLoopParameters) -> float:
     return FORCE.rise * latency(own)
 
 
-def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters) -> float:
+def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParameters, winding: float = 0.0) -> float:
     """Largest speed along a force, m/s.
 
     Until something is touched, the impact (3.1), v sqrt(m k), stays below `limits.impact` of the force.  At a place
     that is not known the arm is slower, since the touch is detected late; after the touch, since the measured force is
-    late: it rises in no less than some latencies of it on the stiffest surface.
+    late: it rises in no less than some latencies of it on the stiffest surface.  The velocity loops that wind up to
+    it yield as the surface does.
+
+    Parameters
+    ----------
+    axis : of the force.
+    is_touching : whether something is touched.
+    own : parameters of the force loop.
+    winding : of the velocity loops, m/N.
     """
     sensed, place, limits = axis.sensed, axis.place, own.limits
     if not limits.impact or sensed is None or place is None or not sensed.speed_fraction:
@@ -64,7 +72,7 @@ def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParamet
     whole = axis.desired * yielding(sensed, own)
     rise = rise_time(own) if place.is_known else max(FORCE.identified_rise, rise_time(own))
     if is_touching:
-        return max(whole / sensed.speed_fraction / rise, slowest)
+        return max((whole + axis.desired * winding) / sensed.speed_fraction / rise, slowest)
     fastest = limits.impact * axis.desired / math.sqrt(sensed.impact_mass * own.guard.contact_stiffness)
     if not place.is_known:
         detected = rise_time(own) if own.is_estimated else FORCE.detected * own.force_filter
@@ -72,29 +80,30 @@ def approach_speed(axis: CommandedAxis, is_touching: bool, own: ForceLoopParamet
     return fastest / sensed.speed_fraction
 
 
-def reach_time(axis: CommandedAxis, wound: Array, own: ForceLoopParameters) -> float:
-    """Time until the velocity loops reach a force on the stiffest surface, s; infinite where the arm cannot.
+def winding(axis: CommandedAxis, wound: Array, own: ForceLoopParameters) -> float:
+    """How far the velocity loops yield to a force that is not fed forward, m/N: |l|^4 / l.K l.
 
-    A surface that is approached, or that moves, has to be reached at all.  What is not fed forward is wound up by the
-    integral gains K at the joints: dF/dt = v l.K l / |l|^4.  The torque of a force is fed forward once its place is
-    known.
+    From the motors, this is a force at a place that is not known.
 
     Parameters
     ----------
     axis : of the force.
-    wound : K (n, n), N m/rad.
+    wound : integral gains K at the joints (n, n), N m/rad.
     own : parameters of the force loop.
     """
-    sensed, place, square = axis.sensed, axis.place, float(axis.along @ axis.along)
-    if sensed is None or place is None or not sensed.speed_fraction:
-        return 0.0  # without a lever the force is not measured, either
-    free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
-    if free < FORCE.creep / own.limits.settling_time or touching < own.limits.surface_speed:
-        return math.inf
-    if place.is_pinned or not own.is_estimated:
+    if axis.place is None or axis.place.is_known or not own.is_estimated:
         return 0.0
-    stiffness = float(axis.along @ wound @ axis.along) / (square * square)
-    return axis.desired / max(touching * stiffness, FORCE.negligible)
+    square = float(axis.along @ axis.along)
+    return square * square / max(float(axis.along @ wound @ axis.along), FORCE.negligible)
+
+
+def is_too_slow(axis: CommandedAxis, own: ForceLoopParameters) -> bool:
+    """Whether the arm is too slow to reach a surface at all, or to follow one that moves."""
+    sensed = axis.sensed
+    if sensed is None or not sensed.speed_fraction:
+        return False  # without a lever the force is not measured, either
+    free, touching = (sensed.speed_fraction * approach_speed(axis, is_touching, own) for is_touching in (False, True))
+    return free < FORCE.creep / own.limits.settling_time or touching < own.limits.surface_speed
 
 
 def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> float:
