@@ -14,11 +14,10 @@ from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers
 
-WEIGHT, DRAG, FILTER = "weight", "drag", "filter"
+WEIGHT, DRAG = "weight", "drag"
 ALSO = {
     WEIGHT: "with its weight",
     DRAG: "with a drag by the square of the velocity",
-    FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
 }
 
 
@@ -107,7 +106,7 @@ class FoundFriction(NamedTuple):
     Attributes
     ----------
     friction : with errors that count what the effort may also hold.
-    also : what was found in it: of `WEIGHT`, `DRAG` and `FILTER`.
+    also : what was found in it: of `WEIGHT` and `DRAG`.
     lag : s, of the effort behind the motion.
     per_lag : how the viscous friction changes where the effort of a motion of one frequency is later, per s; NaN of
         other motions.
@@ -155,7 +154,7 @@ def friction(source: Source) -> FoundFriction | None:
     acceleration = _Acceleration.of(velocity, sd, rest, width, period)
     one_frequency = WEIGHT in columns and acceleration.own_part(columns[WEIGHT], width) < SHAFT.apart
     found, also, shift = _best(trial, not one_frequency)
-    if (shift or FILTER in also) and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
+    if shift and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
         rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
         rate = np.concatenate(rates)
         other = trial._replace(velocity=rate, columns=columns | {DRAG: (rate * np.abs(rate))[:, np.newaxis]})
@@ -183,11 +182,8 @@ class _Trial(NamedTuple):
     def fit(self, also: Sequence[str], shift: int) -> Friction:
         """Friction with the columns of these names, and the effort of `shift` samples later."""
         effort = np.roll(self.effort, -shift)
-        every = dict(self.columns)
-        if FILTER in also:
-            every[FILTER] = np.nan_to_num(-np.gradient(effort, self.period))[:, np.newaxis]
         time = self.period * np.arange(len(effort), dtype=np.float64)
-        load = np.hstack([every[name] for name in also]) if also else None
+        load = np.hstack([self.columns[name] for name in also]) if also else None
         return identify_friction(time, self.velocity, effort, self.rest, self.window, load=load)
 
     def lag(self, also: Sequence[str]) -> int:
@@ -215,7 +211,7 @@ def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
     shift = 0
     found = trial.fit(also, shift)
     while True:
-        others = [((*also, name), shift) for name in (*trial.columns, *([FILTER] * lags)) if name not in also]
+        others = [((*also, name), shift) for name in trial.columns if name not in also]
         others += [(also, lag)] if lags and not shift and (lag := trial.lag(also)) else []
         fits = [trial.fit(*other) for other in others]
         least = [SHAFT.better if WEIGHT in {*other[0]} - {*also} else SHAFT.much_better for other in others]

@@ -52,7 +52,9 @@ def nanoseconds(label: str, numbers: NDArray[Any], given: TopicMap, received: Ti
         took = 0.0 if received is None else float(np.ptp(received)) / 1e9
         is_slower = step >= STREAM.slowest and float(np.ptp(numbers)) > STREAM.faster * took
         if is_slower or np.max(numbers) > STREAM.latest:
-            likely = min(("ms", "us", "ns"), key=lambda unit: abs(math.log(UNITS[unit][0] * step / STREAM.usual)))
+            likely = min(
+                ("ms", "us", "ns"), key=lambda unit: abs(math.log(max(UNITS[unit][0] * step, 1e-9) / STREAM.usual))
+            )
             raise ValueError(
                 f"{label} increases by {shown(step)} from message to message, so it is hardly in s; give --unit "
                 f"stamp={likely}, or another one of s, ms, us, ns or a factor"
