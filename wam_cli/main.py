@@ -45,6 +45,7 @@ EXTRAS = {
     "dask": ("distributed", "dask"),
     "completion": ("argcomplete",),
 }  # fmt: skip
+OF_ROS = ("control_msgs", "tf2_msgs")  # of an installation of ROS alone
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -155,12 +156,13 @@ def _command(words: list[str]) -> Any:
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:
-    """Print which extra of the package has a module that is not installed; raise the error for a module of none."""
+    """Print how to install a module that is missing; raise the error for one of which that is not known."""
     module = (error.name or "").partition(".")[0]
-    extra = next((extra for extra, modules in EXTRAS.items() if module in modules), None)
-    if extra is None:
+    ways = {name: f"pip install 'wam_stack[{extra}]'" for extra, modules in EXTRAS.items() for name in modules}
+    ways |= {name: f"apt install ros-jazzy-{name.replace('_', '-')}" for name in OF_ROS}
+    if module not in ways:
         raise error
-    needs = f"it needs '{module}', which is not installed; install it with: pip install 'wam_stack[{extra}]'"
+    needs = f"it needs '{module}', which is not installed; install it with: {ways[module]}"
     sys.stderr.write(f"wam {command}: {needs}\n")
     return 1
 

@@ -74,8 +74,7 @@ def _page(given: argparse.Namespace) -> None:
 
 
 def _frames(given: argparse.Namespace) -> None:
-    with of_installation("tf2_msgs"):
-        from wam_live.frame_publisher import FramesNode
+    from wam_live.frame_publisher import FramesNode
     from wam_ros.client import run_next_to
 
     stop, prefix = Stop(), given.frame_prefix or ""
@@ -87,28 +86,10 @@ def _frames(given: argparse.Namespace) -> None:
 
 
 def _trajectories(given: argparse.Namespace) -> None:
-    with of_installation("control_msgs"):
-        from wam_live.trajectory_action import serve
+    from wam_live.trajectory_action import serve
+
     stop = Stop()
     serve(given.namespace, lambda: stop.is_set, _print)
-
-
-@contextmanager
-def of_installation(package: str) -> Iterator[None]:
-    """Imports of a package that only an installation of ROS has; states this where it is missing.
-
-    Raises
-    ------
-    ValueError
-        with the package and how to install it.
-    """
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name != package:
-            raise
-        install = f"apt install ros-jazzy-{package.replace('_', '-')}"
-        raise ValueError(f"this needs {package} of a ROS installation: {install}") from None
 
 
 def _recording(given: argparse.Namespace) -> int:
