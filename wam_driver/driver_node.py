@@ -191,7 +191,7 @@ class DriverNode(ArmDriver):
             publish("/clock", stamp, None)
             for topic, value in driver.outer_values().items():
                 publish(topic, stamp, value)
-        self.diagnostics.report(stamp, self.time.facts)
+        self.health.report(stamp, self.time.facts)
         self.announce()
 
     # the samples before a fault
@@ -225,5 +225,5 @@ class DriverNode(ArmDriver):
 
     def _warn_of_post_mortem(self, error: OSError) -> None:
         reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
-        self.diagnostics.facts["post_mortem"] = reason
+        self.health.facts["post_mortem"] = reason
         self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")

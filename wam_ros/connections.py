@@ -11,7 +11,7 @@ from wam_description.signals import NodeStatus
 from wam_description.status import BUSY, HELD_UP
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
-from wam_ros.health import Diagnostics, Health, problem_of
+from wam_ros.health import Health, problem_of
 from wam_ros.inlets import Inlets
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused, message_type, read_status
@@ -97,7 +97,6 @@ class StackNode(TolerantNode):
         rows = [topics[topic] for topic in declaration.outputs if topic in topics]
         self.outlets = Outlets(self, rows, [topics[STATUS], topics[DIAGNOSTICS]], self.shared)
         self.health = Health(self, self.outlets, self.shared)
-        self.diagnostics = Diagnostics(self, self.outlets, self.health, self.shared)
         self.inlets = Inlets(self, self.interface, self.shared, self.health, self.outlets.bus)
         self.peers = Peers(set(self.interface.names) - {declaration.name})
         self._status_type = message_type(topics[STATUS])
@@ -109,7 +108,7 @@ class StackNode(TolerantNode):
         timing = self.shared.timing
         if timing.mode == "realtime":
             granted = set_priority(max(timing.fifo_priority - (not self.is_first), 0), timing.niceness)
-            self.diagnostics.facts[PRIORITY] = granted
+            self.health.facts[PRIORITY] = granted
             if self.is_first:
                 self.get_logger().info(f"{PRIORITY}: {granted}")
 
@@ -158,7 +157,7 @@ class StackNode(TolerantNode):
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""
-        self.diagnostics.end()
+        self.health.report_end()
         self.outlets.wait_for_delivery()
         super().destroy_node()
         self._place.close()

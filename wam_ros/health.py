@@ -34,7 +34,7 @@ def problem_of(cause: str, reason: str) -> Event | None:
 
 
 class Health:
-    """Status of one node: what it reports, its problems and the messages that it refuses.
+    """What one node reports: its status with its problems and refusals, and once a second its diagnostics.
 
     Parameters
     ----------
@@ -46,6 +46,7 @@ class Health:
     ----------
     status : as it was published last.
     counts : steps, refused messages and whatever else the node counts, for the diagnostics.
+    facts : further values for the diagnostics.
     live : present values of the shared parameters that the node owns, as facts of its status.
     problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
     unusable : why messages of a topic are refused, by topic, up to a report before which none was.
@@ -66,6 +67,8 @@ class Health:
         self.is_ready = False
         self._changes: tuple[int, dict[str, str]] = (-1, {})  # stamp of the step before, and what was taken after it
         self._repeated = time.monotonic()  # when the status was, on that clock
+        self.facts: dict[str, str] = {}
+        self._next = self._last = 0  # stamps of diagnostics, ns
 
     # the status
 
@@ -178,54 +181,36 @@ class Health:
                 log.warning(text)
                 self.publish_again()
 
-    def look_at_refusals(self) -> None:
-        """Once a second: leave out of the status what has not been refused since the last time."""
+    # the diagnostics
+
+    def report(self, stamp: int, facts: Callable[[], Mapping[str, str]] = dict) -> None:
+        """Publish the diagnostics, with further facts, once in a second of the arm's time.
+
+        The status leaves out what has not been refused since the last time.
+        """
+        if stamp < self._next:
+            return
+        self._next = stamp - stamp % SECOND + SECOND
+        self._last = stamp
+        self.facts |= facts()
+        self._report()
         if self.unusable:
             self.unusable, self._unusable_since = self._unusable_since, {}
             self.publish_again()
 
-
-class Diagnostics:
-    """The report of one node in /diagnostics, once in a second of the arm's time.
-
-    Parameters
-    ----------
-    node : the ROS node.
-    outlets, health : of the node.
-    shared : the shared configuration.
-
-    Attributes
-    ----------
-    facts : further values.
-    """
-
-    def __init__(self, node: Any, outlets: Outlets, health: Health, shared: Shared) -> None:
-        self._node, self._outlets, self._health, self._arm = node, outlets, health, shared.arm.name
-        self.facts: dict[str, str] = {}
-        self._next = self._last = 0
-
-    def report(self, stamp: int, facts: Callable[[], Mapping[str, str]] = dict) -> None:
-        """Publish the report where it is due, with further facts."""
-        if stamp >= self._next:
-            self._next = stamp - stamp % SECOND + SECOND
-            self._last = stamp
-            self.facts |= facts()
-            self._report()
-            self._health.look_at_refusals()
-
-    def end(self) -> None:
+    def report_end(self) -> None:
         """Report how much was published in all."""
         self._report(**{ENDED: "yes"})
 
     def _report(self, **more: str) -> None:
-        """Publish a report, with how many messages were published on each topic, this one included."""
-        node, outlets, health = self._node, self._outlets, self._health
+        """Publish the diagnostics, with how many messages were published on each topic, this one included."""
+        node, outlets = self._node, self._outlets
         totals = {**outlets.published, DIAGNOSTICS: outlets.published[DIAGNOSTICS] + 1}
-        facts = {key: str(count) for key, count in sorted(health.counts.items())}
+        facts = {key: str(count) for key, count in sorted(self.counts.items())}
         facts |= {NODE: node.get_fully_qualified_name()}
         facts |= {f"{PUBLISHED}{outlets.full[topic]}": str(count) for topic, count in totals.items()}
-        name, present = diagnosed_name(node.get_namespace(), node.get_name()), health.status
         facts |= {**self.facts, **more}
-        status = NodeStatus(present.level, present.message, name, health.is_ready, fault=present.fault, facts=facts)
-        report = DiagnosticArray(header=header(self._last), status=[diagnostic_status(status, self._arm)])
-        outlets.send(DIAGNOSTICS, report)
+        name, present = diagnosed_name(node.get_namespace(), node.get_name()), self.status
+        status = NodeStatus(present.level, present.message, name, self.is_ready, fault=present.fault, facts=facts)
+        message = diagnostic_status(status, self._shared.arm.name)
+        outlets.send(DIAGNOSTICS, DiagnosticArray(header=header(self._last), status=[message]))

@@ -194,7 +194,7 @@ class AdaptedNode(StackNode):
             else:
                 check = self._checks.get(topic)
                 self.outlets.publish(topic, stamp, check(value) if check else value)
-        self.diagnostics.report(stamp, getattr(self.node, "diagnostics", dict))
+        self.health.report(stamp, getattr(self.node, "diagnostics", dict))
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:
         self.health.publish(status)

@@ -96,7 +96,7 @@ class BusDriver(ArmDriver):
                 publish("motor_currents", stamp, State([], [], current))
         self.health.counts["steps"] += 1
         self.health.counts |= hardware.counts
-        self.diagnostics.report(self.stamp)
+        self.health.report(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Send currents, A, that answer the state of a stamp, ns."""
