@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.agreement import DIGESTS, disagreement
@@ -65,7 +64,7 @@ class ArmDriver(StackNode):
         self.serve("estop", Trigger, lambda _: self.estop())
         self.serve("reset_fault", Trigger, lambda _: self.clear())
         self.outlets.publish("robot_description", 0, urdf(self.shared.arm))
-        self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(NODE_LIMITS.claim_period, self._forget_nodes)
 
     # what a driver adds
 

@@ -5,7 +5,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.event import Event
@@ -38,8 +37,7 @@ class DriverNode(ArmDriver):
         self.serve("reset", Trigger, lambda _: self.driver.reset())
         self.serve("step", Trigger, lambda _: self.time.step())
         self._try_post_mortem()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
+        self._watching = self.create_timer(0.02, self._look_for_start)
         self.time: Lockstep | Realtime
         if timing.mode == "lockstep":
             self.time = Lockstep(
@@ -52,9 +50,9 @@ class DriverNode(ArmDriver):
                 self.trip,
                 time.perf_counter,
             )
-            self.create_timer(DRIVER.watch, self._watch_lockstep, clock=steady)
+            self.create_timer(DRIVER.watch, self._watch_lockstep)
             if timing.real_time_factor:
-                self.create_timer(timing.period / timing.real_time_factor, self.time.go_on, clock=steady)
+                self.create_timer(timing.period / timing.real_time_factor, self.time.go_on)
             return  # the first status goes to all peers
         self.time = Realtime(
             self.driver,
@@ -70,8 +68,8 @@ class DriverNode(ArmDriver):
             filter(None, (self.peers.held_up(senders) or advice(), self.lateness))
         )
         self.announce()
-        self.create_timer(timing.period, self.time.tick, clock=steady)
-        self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
+        self.create_timer(timing.period, self.time.tick)
+        self.create_timer(DRIVER.status_period, self.health.repeat_taken)
         self.time.start()
 
     def destroy_node(self) -> None:

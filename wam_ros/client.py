@@ -4,6 +4,7 @@ import importlib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -12,7 +13,6 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from wam_bag.value_messages import Encode
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.nodes import NODES
@@ -63,6 +63,8 @@ class StackClient(Closing):
     Attributes
     ----------
     node : that asks, in the namespace of the arm.
+    client : the client of a service by its type and name.
+    publisher : the publisher of a topic of the table by its name.
     statuses : newest of each node by its name, after `follow_statuses` and while anything is awaited.
     """
 
@@ -75,9 +77,9 @@ class StackClient(Closing):
         self.statuses: dict[str, NodeStatus] = {}
         self.shared: Any = shared
         self.topics = Interface(shared).topics if shared else BY_NAME
-        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
-        self._publishers: dict[str, Publisher] = {}
-        self._encoders: dict[str, Encode] = {}
+        self.client = cache(self.node.create_client)
+        self.publisher = cache(self._make_publisher)
+        self._encoder = cache(lambda topic: encoder(self.topics[topic], self.shared))
 
     def close(self) -> None:
         """Leave the network, where the connection is its own."""
@@ -103,12 +105,6 @@ class StackClient(Closing):
         """The client of a request, and the message that it sends."""
         service, kind, message = service_request(request)
         return self.client(kind, service), message
-
-    def client(self, kind: Any, service: str) -> Any:
-        """The client of a service by its type and name."""
-        if (service, kind) not in self._clients:
-            self._clients[service, kind] = self.node.create_client(kind, service)
-        return self._clients[service, kind]
 
     def request(self, request: Call | SetParameters, seconds: float = CALL_LIMITS.answer) -> Reply:
         """Ask a node and wait for its answer, for this time."""
@@ -263,18 +259,13 @@ class StackClient(Closing):
 
         self.node.create_subscription(message_type(row), topic, receive, listening(row), raw=True)
 
-    def publisher(self, topic: str) -> Publisher:
-        """The publisher of a topic of the table."""
-        if topic not in self._publishers:
-            row = self.topics[topic]
-            self._publishers[topic] = self.node.create_publisher(message_type(row), topic, qos(row))
-        return self._publishers[topic]
+    def _make_publisher(self, topic: str) -> Publisher:
+        row = self.topics[topic]
+        return self.node.create_publisher(message_type(row), topic, qos(row))
 
     def send(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, as the answer to a state, ns."""
-        if topic not in self._encoders:
-            self._encoders[topic] = encoder(self.topics[topic], self.shared)
-        self.publisher(topic).publish(self._encoders[topic](stamp, value))
+        self.publisher(topic).publish(self._encoder(topic)(stamp, value))
 
     def messages(self, topic: str, check: Callable[[float], object] = lambda silent: None) -> Iterator[Any]:
         """Messages of a topic as they come, without end; a run is not delayed by it.

@@ -3,8 +3,6 @@
 from collections.abc import Collection, Iterable
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
-
 from wam_description.event import RAISED, Event
 from wam_description.interface import Interface
 from wam_description.signals import NodeStatus
@@ -101,7 +99,7 @@ class StackNode(TolerantNode):
         self.peers = Peers(set(self.interface.names) - {declaration.name})
         self._status_type = message_type(topics[STATUS])
         self.inlets.listen(STATUS, self._hear)
-        self._readiness = self.create_timer(0.02, self._look_for_peers, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._readiness = self.create_timer(0.02, self._look_for_peers)
 
     def raise_priority(self) -> None:
         """In realtime: ask the system to prefer this process, and report what was granted."""

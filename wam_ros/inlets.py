@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.subscription import Subscription
 
 from wam_description.arm import Shared
@@ -100,7 +99,7 @@ class Inlets:
         self._health, self._bus = health, bus
         self.subscriptions: dict[str, Subscription] = {}
         self.claims: dict[str, PublisherClaim] = {}
-        node.create_timer(NODE_LIMITS.claim_period, self._look_at_all, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(NODE_LIMITS.claim_period, self._look_at_all)
 
     def feed(
         self,

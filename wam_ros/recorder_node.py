@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.event import Level
@@ -71,11 +69,10 @@ class RecorderNode(TolerantNode):
         self._dropped = 0
         self._failed = False
         self._has_heard = False  # others, recorded or not
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(RECORDER_LIMITS.drain_period, self._drain, clock=steady)
-        self.create_timer(0.1, self.attend, clock=steady)
+        self.create_timer(RECORDER_LIMITS.drain_period, self._drain)
+        self.create_timer(0.1, self.attend)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
-            self.create_timer(1.0, self._report, clock=steady)
+            self.create_timer(1.0, self._report)
         self.get_logger().info(f"recording to {self.bag.path}")
 
     def destroy_node(self) -> None:

@@ -3,10 +3,10 @@
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Any, NamedTuple
 
 from rcl_interfaces.srv import SetParameters as SetParametersService
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.timer import Timer
@@ -58,7 +58,7 @@ class RequestQueue:
     def __init__(self, node: Node, refused: Callable[[str], None]) -> None:
         self._node, self._refused = node, refused
         self._waiting: deque[Callable[[], None]] = deque()
-        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
+        self._client = cache(node.create_client)
         self._is_asking = False
 
     @property
@@ -83,9 +83,7 @@ class RequestQueue:
 
     def _make(self, request: Request) -> None:
         service, kind, message = service_request(request)
-        client = self._clients.get((service, kind))
-        if client is None:
-            client = self._clients[service, kind] = self._node.create_client(kind, service)
+        client = self._client(kind, service)
         self._is_asking = True
         began, is_reported = time.monotonic(), False
         timer: Timer
@@ -102,7 +100,7 @@ class RequestQueue:
                 self._node.destroy_timer(timer)
                 client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result()))
 
-        timer = self._node.create_timer(0.005, ask_when_found, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        timer = self._node.create_timer(0.005, ask_when_found)
 
     def _answered(self, request: Request, answer: Any) -> None:
         self._is_asking = False

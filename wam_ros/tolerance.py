@@ -74,8 +74,9 @@ class TolerantNode(LeavingNode):
         self._unserved = (*self._unserved, subscription)
 
     def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
-        """As that of rclpy."""
+        """As that of rclpy, on the steady clock unless another is given."""
         name = getattr(callback, "__name__", "a timer")
+        options.setdefault("clock", Clock(clock_type=ClockType.STEADY_TIME))
         return super().create_timer(timer_period_sec, self.bearing(callback, name), *more, **options)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
@@ -136,8 +137,7 @@ class TolerantNode(LeavingNode):
         self._exception_fault = printable(self._described(what, error), NODE_LIMITS.exception_length)
         trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * NODE_LIMITS.exception_length, "\n")
         self.get_logger().error(f"{self._exception_fault}\n{trace}")
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._exception_timer = super().create_timer(NODE_LIMITS.fault_held, self._look_for_end, clock=steady)
+        self._exception_timer = self.create_timer(NODE_LIMITS.fault_held, self._look_for_end)
         self.take_fault(self._exception_fault)
 
     def _described(self, what: str, error: Exception) -> str:

@@ -3,7 +3,6 @@
 import time
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
 from wam_description.arm import Shared
@@ -38,9 +37,8 @@ class BusDriver(ArmDriver):
         self._tick, self._begin = 1, time.perf_counter()
         self._command_stamp, self._came = 0, -1.0  # before the first: too old
         self.serve("confirm_home", Trigger, self._confirm_home)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(self.shared.timing.period, self._run, clock=steady)
-        self.create_timer(DRIVER.status_period, self.health.repeat_taken, clock=steady)
+        self.create_timer(self.shared.timing.period, self._run)
+        self.create_timer(DRIVER.status_period, self.health.repeat_taken)
 
     def make_hardware(self, shared: Shared, own: Any) -> Any:
         """The motors: those of the production WAM on its bus."""
