@@ -39,11 +39,6 @@ def exact(value: float, observed: int) -> Interval:
     return Interval(value, value, value, observed)
 
 
-def counted(mark: str, observed: int) -> str:
-    """A mark, with a remark where it is one on too few observations; '' stays ''."""
-    return f"{mark} (n={observed}: {FEW})" if mark and observed < FEWEST and FEW not in mark else mark
-
-
 def share(hits: int, count: int) -> Interval:
     """Share of hits with its Wilson interval (1927)."""
     if count == 0:
@@ -146,7 +141,8 @@ class Row(NamedTuple):
     @property
     def verdict(self) -> str:
         """The mark, with a remark where it is one on too few observations."""
-        return counted(self.mark, self.found.observed)
+        mark, observed = self.mark, self.found.observed
+        return f"{mark} (n={observed}: {FEW})" if mark and observed < FEWEST and FEW not in mark else mark
 
     @property
     def cells(self) -> list[str]:

@@ -82,7 +82,7 @@ def against_spring(stiffness: float, unilateral: bool = False) -> World:
 
 def link_inertia(arm: Arm) -> float:
     """J_l of the link about its joint, kg m^2."""
-    return arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    return arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2 + arm.joints.armature[0]
 
 
 def stepped_map(plant: Plant, steps: int = 1) -> tuple[Numbers, Numbers]:
@@ -160,7 +160,7 @@ def loop_node(arm: Arm, stiffness: float, unilateral: bool = False) -> FrictionN
     return FrictionNode(
         link_inertia(arm),
         joints.viscous_friction[0],
-        RATIO**2 * arm.circuits[0].stiffness,
+        (1.0 / arm.joint_from_motor[0]) ** 2 * arm.circuits[0].stiffness,
         stiffness,
         joints.dynamic_friction[0],
         joints.static_friction[0],

@@ -10,9 +10,10 @@ import numpy as np
 
 from wam_control.force.force_law import ForceLaw
 from wam_control.force.force_loop_parameters import AXES
-from wam_description.arm import Arm, seconds
+from wam_description.arm import seconds
 from wam_description.world import Springs
 from wam_studies.figures.panels import Line, Numbers, Series, line_only, measured
+from wam_studies.plant.ideal_testbed import loop_node
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.recording import Recording, Step
 from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
@@ -56,12 +57,6 @@ class OneLink(NamedTuple):
         return gain * self.lever**2
 
 
-def link_inertia(arm: Arm) -> float:
-    """J_l about the joint, kg m^2."""
-    x = arm.links.centre[0]
-    return float(arm.links.inertia[1] + arm.links.mass[0] * x * x + arm.joints.armature[0])
-
-
 def joint_stiffness(recording: Recording) -> float:
     """k_c of the spring at the joint, N m/rad."""
     springs = recording.part("driver", "world.springs", Springs)
@@ -92,14 +87,8 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
         )
     ratio, lever = 1.0 / arm.joint_from_motor[0], float(control["contact_position"])
     added = float(recording.parameters.node("driver")["effects.added_coulomb_friction"][0])
-    node = FrictionNode(
-        inertia=link_inertia(arm),
-        damping=arm.joints.viscous_friction[0],
-        transmission_stiffness=ratio**2 * arm.circuits[0].stiffness,
-        contact_stiffness=joint_stiffness(recording),
-        dynamic_friction=arm.joints.dynamic_friction[0] + added,
-        static_friction=arm.joints.static_friction[0] + added,
-    )
+    node = loop_node(arm, joint_stiffness(recording))
+    friction = {f"{kind}_friction": getattr(node, f"{kind}_friction") + added for kind in ("dynamic", "static")}
     loop = IntegralLoop(
         gain=law.gain[ACROSS] / lever**2,
         error_limit=law.error_limit[ACROSS] * lever,
@@ -107,7 +96,7 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
         sample_period=seconds(timing.outer_period_ns),
         delay_samples=int(control["delay_samples"]),
     )
-    return OneLink(node, loop, lever, ratio)
+    return OneLink(replace(node, **friction), loop, lever, ratio)
 
 
 def set_until(recording: Recording, step: Step) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from operator import attrgetter
 from typing import NamedTuple, SupportsFloat
 
 from wam_analysis import table
@@ -90,7 +89,6 @@ class Result(NamedTuple):
 
 
 NOTHING = "-"  # no prediction
-NEARNESS = attrgetter("nearness")
 PAGE_HEAD = ("quantity", "predicted", "measured", "deviation", "bound")
 HEAD = ("quantity", "predicted", "measured", "unit", "deviation", "bound", "equation", "")
 
@@ -131,7 +129,7 @@ def summary(rows: Sequence[Comparison]) -> tuple[str, ...]:
     claimed = [row for row in rows if not math.isnan(row.bound)]
     agreeing = sum(row.agrees for row in claimed)
     verdict = f"{agreeing} of {len(claimed)}" + (" MISSED" if agreeing < len(claimed) else "")
-    return verdict, *_page_cells(max(claimed, key=NEARNESS))
+    return verdict, *_page_cells(max(claimed, key=lambda row: row.nearness))
 
 
 def _value(value: float | str) -> str:

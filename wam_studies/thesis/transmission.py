@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from wam_bag.losses import CUT
 from wam_description.arm import Arm
 from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
+from wam_studies.plant.ideal_testbed import link_inertia
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import joint_stiffness, link_inertia
+from wam_studies.thesis.one_link import joint_stiffness
 from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, near
 from wam_theory.cable import stiffness_with_reducer
