@@ -46,8 +46,8 @@ def grasp() -> Panels:
         length.append((f"μ = {mu:g}", line_only(ratio, useful_length(ratio, secure_angle(mu)))))
         diameter.append((f"μ = {mu:g}", line_only(ratio, largest_cylinder(ratio, mu))))
     return (
-        Panel("useful length of a link (3.2)", aspect, "L'/L [-]", tuple(length), "x"),
-        Panel("largest cylinder (3.3)", aspect, "D/L [-]", tuple(diameter), "x"),
+        Panel("useful length of a link (3.2)", aspect, "L'/L [-]", length, "x"),
+        Panel("largest cylinder (3.3)", aspect, "D/L [-]", diameter, "x"),
     )
 
 
@@ -89,7 +89,7 @@ def breakpoints() -> Panels:
             f"c) several N, N_m = {matched:.4g}",
             "contact stiffness over that of (4.9) [-]",
             "ω₁ over its asymptote (4.6) [-]",
-            tuple(family),
+            family,
             "xy",
             limits=(np.nan, np.nan, 7e-3, 1.5),
         ),
@@ -118,7 +118,7 @@ def efficiencies() -> Panels:
     testbed, power = Series(torques, np.array(line), some, plant), "power out over power in [-]"
     return (
         Panel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),
-        Panel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, tuple(equal)),
+        Panel("n stages of equal stress", "(T₂ - T₁)/EA [%]", power, equal),
     )
 
 
@@ -186,7 +186,7 @@ def _stiffness() -> Panel:
         line = unit * stiffness_with_reducer(cables.stage_ea[0], length, ratio, shares * length)
         measured = np.array([static_stiffness(line_of(ratio, share)) for share in some])
         lines.append((f"N = {ratio:g}", Series(shares, line, some, measured)))
-    return Panel("a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", tuple(lines), "y")
+    return Panel("a) reducer part of the way (4.1)", "C/L [-]", "stiffness at the joint [N m/rad]", lines, "y")
 
 
 def _bandwidth() -> Panel:
@@ -212,6 +212,4 @@ def _torque() -> Panel:
         line = RATIO / np.abs(force_transfer(1j * frequency, *own))
         measured = RATIO / force_amplitude(arm, some)
         lines.append((label, Series(HZ * frequency, line, HZ * some, measured)))
-    return Panel(
-        "c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", tuple(lines), "y"
-    )
+    return Panel("c) torque for one force (4.3)", "frequency [Hz]", "motor torque over that at rest [-]", lines, "y")

@@ -129,7 +129,7 @@ def _attenuation() -> Panel:
         for name, gain in gains.items()
     ]
     title = "a) disturbance at the motor, half of the largest gain"
-    return Panel(title, "frequency [Hz]", "part that reaches the contact [-]", tuple(lines), "xy")
+    return Panel(title, "frequency [Hz]", "part that reaches the contact [-]", lines, "xy")
 
 
 def _largest_gains() -> Panel:
@@ -144,5 +144,5 @@ def _largest_gains() -> Panel:
         lines.append((loop.name, Series(stiffness, line / reference, some, points / reference)))
     title = "b) largest stable gain, over that of the testbed"
     return Panel(
-        title, "stiffness of the cable over that of the testbed [-]", "largest gain over that [-]", tuple(lines), "xy"
+        title, "stiffness of the cable over that of the testbed [-]", "largest gain over that [-]", lines, "xy"
     )

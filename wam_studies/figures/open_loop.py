@@ -149,7 +149,7 @@ def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, s
 
 
 def _panel(title: str, lines: list[tuple[str, Series]]) -> Panel:
-    return Panel(title, "error over the largest steady force [%]", "part of the poses [-]", tuple(lines))
+    return Panel(title, "error over the largest steady force [%]", "part of the poses [-]", lines)
 
 
 def table(panels: Panels) -> str:

@@ -40,7 +40,7 @@ def describing_function() -> Panels:
         curves.append((f"b G(jω), γ = {gamma:g}", Series(line.real, line.imag, plant.real, plant.imag)))
     cycle = Mark("unstable limit cycle (5.16)", -1.0 / (CASE.gammas[1] - 1.0), 0.0)
     axes = "real part of b G [-]", "imaginary part of b G [-]"
-    return (Panel("ζ = 0.25", *axes, tuple(curves), marks=(cycle,), limits=(-4.4, 2.9, -2.1, 3.1)),)
+    return (Panel("ζ = 0.25", *axes, curves, marks=(cycle,), limits=(-4.4, 2.9, -2.1, 3.1)),)
 
 
 def _measured_response(node: FrictionNode, gain: float, omega: Numbers) -> Numbers:
@@ -101,7 +101,7 @@ def stability_bound() -> Panels:
         Mark("B with stiction", float(stiction.x[-1]), float(stiction.y[-1])),
     )
     axes = "gain γ = J_l G_I K/b [-]", "F_friction/F_error [-]"
-    panel = Panel("k_tr = k_c", *axes, tuple(lines), "", marks, (0.2, 2.6, 0.0, 2.2), is_relative=True)
+    panel = Panel("k_tr = k_c", *axes, lines, "", marks, (0.2, 2.6, 0.0, 2.2), is_relative=True)
     return (panel,)
 
 

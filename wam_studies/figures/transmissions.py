@@ -224,8 +224,8 @@ def transmissions() -> Panels:
         angle = 1e3 * (torque / by.stiffness + 0.5 * by.play)
         springs.append((kind, Series(torque, angle, steps, 1e3 * np.array([_deflection(it, t) for t in steps]))))
     return (
-        Panel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", tuple(lines), "xy"),
-        Panel("b) motor held", "torque on the link [N m]", "deflection [mrad]", tuple(springs)),
+        Panel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", lines, "xy"),
+        Panel("b) motor held", "torque on the link [N m]", "deflection [mrad]", springs),
     )
 
 
