@@ -85,11 +85,11 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
 
     def score(self, records: Sequence[FaultTrial]) -> Scores:
         """Trials of each kind from which something escaped, and the worst values."""
-        by_kind = {name: [one for one in records if one.kind == name] for name in self.kinds}
+        every = {name: [one for one in records if one.kind == name] for name in self.kinds}
+        by_kind = {name: own for name, own in every.items() if own}
         rows = [
             Row(f"escapes, {name}", exact(sum(bool(one.escapes) for one in own), len(own)), required=NONE_AT_ALL)
             for name, own in by_kind.items()
-            if own
         ]
         head = ("kind", "tried", "largest motion [rad]", "largest force [N]", "zero current after [ms]")
         worst = [
@@ -101,7 +101,6 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
                 _largest([one.delay for one in own], 1e3, 0),
             ]
             for name, own in by_kind.items()
-            if own
         ]
         return Scores(rows, [ScoreTable("Worst values", head, worst)])
 

@@ -16,7 +16,7 @@ def efficiency(runs: Runs) -> Result:
     """The experiment `efficiency`: power lost while a load is lifted, from rest to rest."""
     run = runs["lift"]
     arm = run.shared.arm
-    rows, torques, losses, predictions = [], [], [], []
+    rows, points = [], []
     for step, after in zip(run.steps[:-1], run.steps[1:], strict=True):
         if not step.name.startswith("lift"):
             continue
@@ -24,14 +24,9 @@ def efficiency(runs: Runs) -> Result:
         predicted = 1.0 - limiting_efficiency(arm, torque)
         lost = 1.0 - output_work / input_work
         rows.append(near(f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * lost, "%", "(6.15)"))
-        torques.append(torque)
-        losses.append(lost)
-        predictions.append(predicted)
-    x = np.array(torques)
-    curves = [
-        ("measured", measured(x, 100 * np.array(losses))),
-        ("(6.15)", line_only(x, 100 * np.array(predictions))),
-    ]
+        points.append((torque, 100 * lost, 100 * predicted))
+    torques, losses, predictions = zip(*points, strict=True)
+    curves = [("measured", measured(torques, losses)), ("(6.15)", line_only(torques, predictions))]
     return Result(rows, [Panel("power lost in the cables", "motor torque [N m]", "power lost [%]", curves)])
 
 
