@@ -175,9 +175,9 @@ class World:
         )
 
     @property
-    def moving(self) -> dict[str, Any]:
-        """The motions of obstacles, by the name of the obstacle."""
-        return {motion.obstacle: motion for motion in self.motions.present}
+    def moving(self) -> tuple[str, ...]:
+        """Names of the obstacles that move."""
+        return tuple(motion.obstacle for motion in self.motions.present)
 
     @property
     def objects(self) -> tuple[str, ...]:

@@ -178,9 +178,8 @@ class CoverLoads:
             for geom, sign in ((second, 1.0), (first, -1.0)):  # none between objects, both between links
                 if geom in self._cover_of_geom:
                     cover = self._cover_of_geom[geom]
-                    mujoco.mj_contactForce(self._model, data, i, self._wrench)
                     rotation = self._rotation[cover]
-                    force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))
+                    force = rotation.T @ (sign * contact_force(self._model, data, i, self._wrench))
                     at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
                     yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
 
@@ -209,6 +208,13 @@ def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     place = sum((w * part.position for w, part in zip(weights, parts, strict=True)), 0.0) / whole
     force, moment = reduce(add, (part.force for part in parts)), reduce(add, (part.moment for part in parts))
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
+
+
+def contact_force(model: Any, data: Any, i: int, wrench: np.ndarray) -> np.ndarray:
+    """Force of contact i on its second geom, (3,), N, in the base frame; `wrench` (6,) is overwritten."""
+    mujoco.mj_contactForce(model, data, i, wrench)
+    force: np.ndarray = data.contact.frame[i].reshape(3, 3).T @ wrench[:3]
+    return force
 
 
 def half_lengths(model: Any, geom: int) -> np.ndarray:

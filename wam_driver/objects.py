@@ -12,6 +12,7 @@ from wam_description.arm import Arm
 from wam_description.mjcf_objects import hinge_name
 from wam_description.signals import ObjectState
 from wam_description.world import World
+from wam_driver.loads import contact_force
 
 Array = NDArray[np.float64]
 UNKNOWN = float("nan")
@@ -23,8 +24,7 @@ class MovingObstacle:
     Parameters
     ----------
     model, data : of MuJoCo.
-    world : its motions.
-    name : of the obstacle.
+    motion : its parameters.
 
     Attributes
     ----------
@@ -32,9 +32,8 @@ class MovingObstacle:
     velocity : (3,), m/s, of its surface in the base frame.
     """
 
-    def __init__(self, model: Any, data: Any, world: World, name: str) -> None:
-        motion = world.moving[name]
-        self.name = name
+    def __init__(self, model: Any, data: Any, motion: Any) -> None:
+        self.name = name = motion.obstacle
         self.velocity: Array = np.zeros(3)
         self._position = data.mocap_pos[int(model.body(name).mocapid[0])]
         self._centre = model.body(name).pos.copy()
@@ -107,15 +106,9 @@ class TrueObjects:
             first, second = data.contact.geom[k].tolist()
             touched = [(geom, sign) for geom, sign in ((first, -1.0), (second, 1.0)) if geom in self._index]
             if touched:
-                mujoco.mj_contactForce(self._model, data, k, self._wrench)
-                force = data.contact.frame[k].reshape(3, 3).T @ self._wrench[:3]
+                force = contact_force(self._model, data, k, self._wrench)
                 is_arm = first in self._covers or second in self._covers
                 for geom, sign in touched:
                     i = self._index[geom]
                     lever = data.contact.pos[k] - data.xpos[self._bodies[i]]
                     yield i, sign * np.concatenate([force, np.cross(lever, force)]), is_arm
-
-
-def moving_obstacles(model: Any, data: Any, world: World) -> list[MovingObstacle]:
-    """The obstacles that move."""
-    return [MovingObstacle(model, data, world, name) for name in world.moving]

@@ -30,8 +30,8 @@ from wam_driver.compiled_steps import compiled_steps
 from wam_driver.dry_friction import DryFriction
 from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
-from wam_driver.objects import TrueObjects, moving_obstacles
-from wam_driver.pusher import pushers
+from wam_driver.objects import MovingObstacle, TrueObjects
+from wam_driver.pusher import Pusher
 from wam_driver.reach import require_free_start
 from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Mover, Surfaces
@@ -118,9 +118,9 @@ class Plant:
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)
-        self._moving = moving_obstacles(self.model, self.data, world)
+        self._moving = [MovingObstacle(self.model, self.data, motion) for motion in world.motions.present]
         self._objects = TrueObjects(self.model, self.data, arm, world, {one.name: one for one in self._moving})
-        self._pushers = pushers(self.model, self.data, arm, world.pushers, step)
+        self._pushers = [Pusher(self.model, self.data, arm, one, step) for one in world.pushers.present]
         movers: list[Mover] = [*self._pushers, *self._moving]
         self._surfaces = Surfaces(self.model, self.data, arm, world, movers, step)
         self._view = _View(self.model, self.data, n)

@@ -8,7 +8,6 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.parameters import rows
-from wam_description.world import Pushers
 
 
 class Pusher:
@@ -99,11 +98,6 @@ class Pusher:
         force -= self._axis * (self._axis @ force)
         force /= math.sqrt(force @ force)
         return force, _cross(force, self._axis)
-
-
-def pushers(model: Any, data: Any, arm: Arm, given: Pushers, step: float) -> list[Pusher]:
-    """The pushers that have a force."""
-    return [Pusher(model, data, arm, one, step) for one in given.present]
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
