@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError, build, fields, listed, values
+from wam_description.thresholds import FILES
 
 T = TypeVar("T")
 
@@ -15,7 +16,6 @@ DIGESTS = "shared parameters"  # fact in the status of a node: `digests` of what
 OF_ONE_PROCESS = frozenset(
     {"nodes", "timing.niceness", "timing.fifo_priority", "timing.timeout", "timing.real_time_factor"}
 )  # nothing that a node computes depends on them
-NAMED = 3  # parameters
 OTHER_VERSION = "version of wam_stack"
 _LENGTH = 3  # characters of 6 bits each: two values have the same digest in one of 260 000 cases
 
@@ -55,8 +55,8 @@ def difference(one: str, other: str) -> str:
     if len(other) != len(one) or _part(other, 0) != _part(one, 0):
         return OTHER_VERSION
     different = [name for i, name in enumerate(names, start=1) if _part(one, i) != _part(other, i)]
-    more = f" and {len(different) - NAMED} more" if len(different) > NAMED else ""
-    return f"{', '.join(different[:NAMED])}{more}"
+    more = f" and {len(different) - FILES.disagreements} more" if len(different) > FILES.disagreements else ""
+    return f"{', '.join(different[: FILES.disagreements])}{more}"
 
 
 def live_facts(group: Any, prefix: str) -> dict[str, str]:

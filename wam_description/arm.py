@@ -15,10 +15,8 @@ from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
 from wam_description.parameters import aligned, lengths, named, parameter, require, rows, tunable
 from wam_description.parts import Joints, Links, Motors
-from wam_description.thresholds import MODEL
+from wam_description.thresholds import FILES, MODEL
 from wam_description.units import STANDARD_GRAVITY
-
-SLOWEST = 1e-3  # of timing.real_time_factor: 1 s of the arm takes 17 min, and a period of 0.1 s nearly two
 
 
 @dataclass(frozen=True)
@@ -269,8 +267,8 @@ class Timing:
     def __post_init__(self) -> None:
         factor = self.real_time_factor
         require(
-            factor == 0.0 or factor >= SLOWEST,
-            f"timing.real_time_factor is {factor:g}; allowed: {SLOWEST:g} to 100, or 0 for as fast as it can",
+            factor == 0.0 or factor >= FILES.slowest,
+            f"timing.real_time_factor is {factor:g}; allowed: {FILES.slowest:g} to 100, or 0 for as fast as it can",
         )
 
     @cached_property

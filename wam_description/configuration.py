@@ -15,15 +15,12 @@ import yaml
 from wam_description import yaml_text
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError, build, fields, given_once, listed, nested
+from wam_description.thresholds import FILES
 
 T = TypeVar("T")
 SHARED = "/**"
 BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
-LONGEST = 60  # characters of a value that is refused
-MOST_OVERLAYS = 20  # files that build on each other
-MOST_DIFFERENCES = 12  # parameters that are named
-LONGEST_DIFFERENCE = 100  # characters of two values
 LENGTHS = ("arm.covers.length", "arm.joints.length", "arm.joints.offset")
 MASSES = ("arm.links.mass", "arm.links.centre", "arm.links.inertia")
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
@@ -237,11 +234,16 @@ def differences(path: Path, loaded: Configuration) -> list[str]:
         if base.get(section, {}).get(key) != value
     }
     rows = [row for name, (old, new) in changed.items() for row in _changes(name, old, new)]
-    more = [f"  and {len(rows) - MOST_DIFFERENCES} more"] if len(rows) > MOST_DIFFERENCES else []
+    more = [f"  and {len(rows) - FILES.differences} more"] if len(rows) > FILES.differences else []
     lengths = [name for name in LENGTHS if name in changed]
     is_open = lengths and not any(name in changed for name in MASSES)
     question = f"{', '.join(lengths)} changed: is the link as heavy as before? If not, change {', '.join(MASSES)}"
-    return [f"{path} differs from {last.stem}:", *rows[:MOST_DIFFERENCES], *more, *([question] if is_open else [])]
+    return [
+        f"{path} differs from {last.stem}:",
+        *rows[: FILES.differences],
+        *more,
+        *([question] if is_open else []),
+    ]
 
 
 def _changes(name: str, old: Any, new: Any) -> list[str]:
@@ -250,7 +252,7 @@ def _changes(name: str, old: Any, new: Any) -> list[str]:
         pairs = enumerate(zip(old, new, strict=True))
         return [f"  {name}[{i}]: {one}, now {other}" for i, (one, other) in pairs if one != other]
     before = "not given" if old is None else old
-    return [f"  {name}: {textwrap.shorten(f'{before}, now {new}', LONGEST_DIFFERENCE)}"]
+    return [f"  {name}: {textwrap.shorten(f'{before}, now {new}', FILES.longest_difference)}"]
 
 
 def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:
@@ -272,7 +274,7 @@ def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]
             parsed = yaml_text.parse(value)
         except yaml.YAMLError as error:
             reason = str(error).partition("\n")[0]
-            shown = repr(value if len(value) <= LONGEST else f"{value[:LONGEST]}...")
+            shown = repr(value if len(value) <= FILES.longest_value else f"{value[: FILES.longest_value]}...")
             raise ParameterError(f"{option} {name.strip()}: {shown} is no value of YAML: {reason}") from error
         if found.setdefault(name.strip(), parsed) != parsed:
             raise ParameterError(f"{option} has {name.strip()} twice, with two values; give one of them")
@@ -360,9 +362,9 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
             f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
         )
     base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
-    if len(above) >= MOST_OVERLAYS:
+    if len(above) >= FILES.overlays:
         raise ParameterError(
-            f"{above[0]}: more than {MOST_OVERLAYS} files build on each other by '{BASE}'; put some of them together"
+            f"{above[0]}: more than {FILES.overlays} files build on each other by '{BASE}'; put some of them together"
         )
     if base.resolve() in (path.resolve(), *above):
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")

@@ -12,15 +12,14 @@ from wam_description.defects import Check, UnusableOutput, defect_finder, output
 from wam_description.nodes import EACH, GROUPED, GROUPS, INNER, NODES, ONE
 from wam_description.parameters import ParameterError, meant
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
+from wam_description.thresholds import FILES, INPUTS
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
-NEARLY = 0.8  # of the letters
 BETWEEN = (
     "it is of the outer rate, and this step of each {} is between two outer periods, so that no node would use it; "
     "write thinned=True in @reaction, or return it only where shared.timing.is_outer(inputs.stamp)"
 )
-TOGETHER = 0.7  # of the age of the oldest: topics of this age have stopped with it, younger ones are only late
 
 
 @cache
@@ -70,7 +69,7 @@ def require_sections(sections: Iterable[str], entries: Iterable[str]) -> None:
     """
     names = {declared(entry).name for entry in entries}
     for section in set(sections) - names - set(NODES):
-        if near := get_close_matches(section, [*NODES, *names], n=1, cutoff=NEARLY):
+        if near := get_close_matches(section, [*NODES, *names], n=1, cutoff=FILES.similar):
             raise ParameterError(f"section '/**/{section}' is of no node in 'nodes'; did you mean '{near[0]}'?")
 
 
@@ -280,7 +279,7 @@ class Interface:
         ages : of the newest message by topic, as parts of their limits.
         """
         oldest = max(ages.values())
-        lost = [topic for topic, age in ages.items() if age > TOGETHER * oldest]
+        lost = [topic for topic, age in ages.items() if age > INPUTS.together * oldest]
         present = [topic for topic in ages if topic not in lost]
         suspects = [self.upstream(topic) for topic in lost]
         every: frozenset[str] = frozenset().union(*suspects)

@@ -1,9 +1,9 @@
 """Free bodies and doors in the MuJoCo model."""
 
-from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
 from wam_description.movable import BODY_SHAPES, Doors, FreeBodies, principal_inertia
+from wam_description.signals import ZERO
 from wam_description.xml_element import add
 
 DOOR_COLOUR, BODY_COLOUR = "0.70 0.52 0.34 1", "0.36 0.56 0.72 1"
@@ -19,7 +19,8 @@ def add_doors(parent: Element, doors: Doors) -> None:
     for door in doors.present:
         centre = (door.size[0], 0.0, 0.0)
         body = add(parent, "body", name=door.name, pos=door.position, euler=door.rotation)
-        _add_inertial(body, centre, door.mass, principal_inertia("box", door.size, door.mass))
+        inertia = principal_inertia("box", door.size, door.mass)
+        add(body, "inertial", pos=centre, mass=door.mass, diaginertia=inertia)
         add(
             body, "joint", name=hinge_name(door.name), range=(door.lower, door.upper), damping=door.hinge_damping,
             frictionloss=door.hinge_friction, stiffness=door.spring, springref=door.rest,
@@ -32,11 +33,7 @@ def add_bodies(parent: Element, bodies: FreeBodies) -> None:
     for one in bodies.present:
         size = one.size[: BODY_SHAPES[one.shape]]
         body = add(parent, "body", name=one.name, pos=one.position, euler=one.rotation)
-        _add_inertial(body, (0.0, 0.0, 0.0), one.mass, principal_inertia(one.shape, size, one.mass))
+        add(body, "inertial", pos=ZERO, mass=one.mass, diaginertia=principal_inertia(one.shape, size, one.mass))
         add(body, "freejoint", name=f"{one.name}_pose")
         kind = "sphere" if one.shape == "ball" else one.shape
         add(body, "geom", name=one.name, type=kind, size=size, rgba=BODY_COLOUR)
-
-
-def _add_inertial(body: Element, centre: Sequence[float], mass: float, inertia: Sequence[float]) -> None:
-    add(body, "inertial", pos=centre, mass=mass, diaginertia=inertia)

@@ -10,7 +10,7 @@ Nothing is used that is from the future, too old, or from before the driver's se
   one goes on from it: a single message never moves the clock, a driver that starts again does.
 - An input far ahead of the clock is refused; one a little ahead is kept until the clock is there.
 - An input older than its limit is given as absent, and an older one never replaces a newer one.
-- A step waits for an input that answers an earlier state only until the clock is `LONGEST_WAIT` ahead.  Two nodes
+- A step waits for an input that answers an earlier state only until the clock is `longest_wait` ahead.  Two nodes
   that wait for each other go on so, after one of them has missed a state.
 - A session that a status announces forgets nothing by itself, as anybody can send a status; its first state does.
 - A command of a program counts while it is streamed: a message of its own, which no other has preceded within
@@ -22,13 +22,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
-
-LONGEST_JUMP = (
-    200_000_000  # ns, by which a clock goes on at once where a node was late; a longer one needs two messages
-)
-MOST_AHEAD = 1000  # messages ahead of the clock that are kept
-MOST_EARLY = 64  # messages of a session that was announced, kept until its first state comes
-LONGEST_WAIT = 10  # outer periods by which states go on before a step is made without an input of a state before
+from wam_description.thresholds import INPUTS
 
 
 class OutOfTime(ValueError):
@@ -50,7 +44,7 @@ class InputSpec(NamedTuple):
     outer: bool
     delay: int = 0
     streamed: bool = True
-    limit_ns: int = LONGEST_JUMP
+    limit_ns: int = INPUTS.longest_jump
     is_command: bool = False
 
 
@@ -127,7 +121,7 @@ class Synchroniser:
         self._nominal = seconds(self._period)
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
-        self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
+        self._longest_jump = max(INPUTS.longest_jump, 3 * self._period)
         self._outer_period, self._outer_phase = timing.outer_period_ns, timing.period_ns % timing.outer_period_ns
         self._triggers: deque[tuple[int, Any]] = deque()
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
@@ -143,7 +137,7 @@ class Synchroniser:
         self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
         self._lacks: tuple[_Group, int, int] | None = None  # see `_inputs`
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
-        self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
+        self._early: deque[tuple[str, int, Any]] = deque(maxlen=INPUTS.early)
         self.strays = 0
         self.restart()
 
@@ -277,7 +271,7 @@ class Synchroniser:
 
     def _is_overdue(self, group: "_Group", cause: int) -> bool:
         """Whether states have gone on for so long that inputs which answer an earlier one will not come any more."""
-        return group.is_delayed and self._last - cause > LONGEST_WAIT * self._outer_period
+        return group.is_delayed and self._last - cause > INPUTS.longest_wait * self._outer_period
 
     def _complete(self) -> Sequence[Inputs]:
         """The inputs of each step that is complete, in the order of their stamps."""
@@ -391,7 +385,7 @@ class _Newest:
 
     def __init__(self, spec: InputSpec) -> None:
         self.limit_ns, self.is_command = spec.limit_ns, spec.is_command
-        self._ahead: deque[tuple[int, Any]] = deque(maxlen=MOST_AHEAD)
+        self._ahead: deque[tuple[int, Any]] = deque(maxlen=INPUTS.ahead)
         self.clear()
 
     def clear(self) -> None:

@@ -19,4 +19,33 @@ class ModelThresholds:
     small: float = 1e-9  # m, lever arms that are zero apart from rounding
 
 
+@dataclass(frozen=True, slots=True)
+class FileThresholds:
+    """What is named of a configuration, and what can be none."""
+
+    longest_value: int = 60  # characters of a value that is refused
+    overlays: int = 20  # files that build on each other
+    differences: int = 12  # parameters that are named as different from the base
+    longest_difference: int = 100  # characters of two values
+    disagreements: int = 3  # parameters that are named where two nodes have different ones
+    deepest: int = 50  # nested mappings and lists in YAML; the loader in C recurses
+    similar: float = 0.8  # of the letters of a section and of a node, which is then meant
+    slowest: float = 1e-3  # of timing.real_time_factor: 1 s of the arm takes 17 min, and a period of 0.1 s nearly two
+
+
+@dataclass(frozen=True, slots=True)
+class InputThresholds:
+    """How the inputs of a step go together."""
+
+    # ns, by which a clock goes on at once where a node was late; a longer jump needs two messages
+    longest_jump: int = 200_000_000
+    ahead: int = 1000  # messages ahead of the clock that are kept
+    early: int = 64  # messages of a session that was announced, kept until its first state comes
+    longest_wait: int = 10  # outer periods by which states go on before a step is made without an earlier input
+    # of the age of the oldest: topics of this age have stopped with it, younger ones are only late
+    together: float = 0.7
+
+
 MODEL = ModelThresholds()
+FILES = FileThresholds()
+INPUTS = InputThresholds()

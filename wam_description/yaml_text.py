@@ -7,8 +7,8 @@ from typing import Any, Final
 import yaml
 
 from wam_description.parameters import is_finite, nested
+from wam_description.thresholds import FILES
 
-DEEPEST: Final = 50  # nested mappings and lists; the loader in C recurses
 OCTAL: Final = re.compile("[-+]?0[0-7_]+")
 UNREADABLE: Final = (ValueError, TypeError, LookupError, OverflowError, AttributeError)  # of tags, as `!!bool x`
 # in C they take a tenth of the time, if they were built
@@ -58,7 +58,7 @@ def parse(text: str) -> Any:
     ------
     yaml.YAMLError
         if it is not YAML, a key is given twice in one mapping or is no text, a number is another one than it seems, it
-        contains itself, or it is nested more than `DEEPEST` levels deep; names the line where it is known.
+        contains itself, or it is nested more than `FILES.deepest` levels deep; names the line where it is known.
     """
     try:
         _require_plain(text)
@@ -80,8 +80,8 @@ def _require_plain(text: str) -> None:
             within.pop()
         elif isinstance(event, yaml.AliasEvent) and event.anchor in within:
             raise _refusal(f"*{event.anchor} is inside of what it refers to; write the value itself", event)
-        if len(within) > DEEPEST:
-            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
+        if len(within) > FILES.deepest:
+            raise yaml.YAMLError(f"it is nested more than {FILES.deepest} levels deep")
 
 
 def dump(tree: Any) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wam_bag.bag import Bag, BagError, JointColumns, TableColumns, WrenchColumns
 from wam_description.arm import Arm
 from wam_description.signals import BASE
-from wam_description.synchroniser import LONGEST_JUMP
+from wam_description.thresholds import INPUTS
 from wam_sim.recorded_parameters import RecordedParameters
 
 Times = NDArray[np.int64]
@@ -106,7 +106,7 @@ def taken_commands(bag: Bag, namespace: str, parameters: RecordedParameters) -> 
             continue
         kept = np.ones(len(columns.stamp_ns), bool)
         if found is not None:
-            last = int(np.max(found[1].stamp_ns)) + LONGEST_JUMP
+            last = int(np.max(found[1].stamp_ns)) + INPUTS.longest_jump
             is_ahead = columns.stamp_ns > last
             columns = _stamped(columns, found[1], (columns.stamp_ns == 0) | (is_ahead if name == PUSH else False))
             kept = columns.stamp_ns <= last
