@@ -29,7 +29,8 @@ from wam_cli.options import (
 )
 from wam_control.task.scenario import load, script_file
 from wam_description import yaml_text
-from wam_description.configuration import LONGEST, option_values
+from wam_description.configuration import option_values
+from wam_description.thresholds import FILES
 from wam_sim.batch import results
 from wam_sim.sweep import MOST_SETS, Axis, SweepResult, drawn, grid, listed, points, sweep
 from wam_studies.figures.sweeps import Sets, experiment_figure, scenario_figure
@@ -166,7 +167,7 @@ def _axis(text: str) -> Axis:
         reason = f": {getattr(error, 'problem', None) or error}"
     if not (name and equals and parsed):
         raise argparse.ArgumentTypeError(
-            f"{text[:LONGEST]!r} is no NAME=VALUES{reason}; write for example servo.gain=1,2 or 1:2:5"
+            f"{text[: FILES.longest_value]!r} is no NAME=VALUES{reason}; write for example servo.gain=1,2 or 1:2:5"
         )
     return Axis(name, tuple(parsed))
 
