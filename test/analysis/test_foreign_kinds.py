@@ -345,6 +345,7 @@ class Written(NamedTuple):
     decimal: str = "."
     fields: tuple[str, ...] = ()
     times: Callable[[float], Any] = float
+    comment: str = ""
 
 
 def date(time: float) -> str:
@@ -364,6 +365,7 @@ TABLES = {
     "ns since 1970": Written(times=lambda time: 17 * 10**17 + round(1e9 * time)),
     "dates": Written(times=date),
     "some rows without a time": Written(times=lambda time: "" if round(100.0 * time) % 1000 == 7 else time),
+    "a comment above": Written(comment="# recorded by hand\n"),
     "titles as numpy writes them": Written(("# time", " position.a", " velocity.a", " effort.a")),
 }
 
@@ -383,6 +385,7 @@ def test_a_table_is_read_as_a_recording(is_file: bool, how: Written, tmp_path: P
     if is_file:
         source = tmp_path / "table.csv"
         with source.open("w", newline="") as stream:
+            stream.write(how.comment)
             writer = csv.writer(stream, delimiter=how.delimiter)
             writer.writerow(titles)
             writer.writerows([str(one).replace(".", how.decimal) for one in row] for row in zip(*columns, strict=True))

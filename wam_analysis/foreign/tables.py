@@ -29,6 +29,8 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     """
     with path.open(newline="", encoding="utf-8-sig") as stream:
         lines = [line for line in stream if line.strip()]
+    while len(lines) > 1 and lines[0].startswith("#") and not lines[1].lstrip(' "+-.')[:1].isdigit():
+        del lines[0]  # a comment above the titles, which may begin with '#', too
     head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
     if not rows:
         raise BagError(f"{path} has no row below the names of its columns")
