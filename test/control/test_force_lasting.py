@@ -18,7 +18,6 @@ from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import (
     RANGES,
     Task,
-    TaskConditions,
     configured,
     steps,
     triple,
@@ -128,11 +127,12 @@ def test_the_force_in_all_stays_below_a_multiple_of_the_commanded_one(
 def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:
     """At full speed it cycled by 7 % of itself, less than is reported, and such cycles are measured as less, too."""
     surface = Surface(OUTER, 0.306, unit((-0.323, 0.718, -0.616)), 7886.0, 0.073, is_plane=False)
-    conditions = TaskConditions(
+    task = Task(
+        (-1.011, 1.243, 2.07, -0.741),
+        surface,
+        14.63,
         is_dithered=True,
-        is_pinned=True,
         is_tared=True,
-        ramp=0.0,
         mismatch={
             "motor_friction": (1.186, 0.822, 0.815, 0.824),
             "joint_friction": (0.802, 0.853, 1.057, 0.802),
@@ -140,7 +140,6 @@ def test_from_the_motors_a_force_on_a_slippery_surface_does_not_cycle() -> None:
         },
         asymmetry=-0.015,
     )
-    task = Task((-1.011, 1.243, 2.07, -0.741), surface, 14.63, conditions)
     configuration = configured(CONFIGURATION, task)
     run = Simulation(configuration, steps(task, 3.5))
     forces = TaskWatch(configuration, task, run).traces()[0].forces[-1000:]

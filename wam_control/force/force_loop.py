@@ -384,7 +384,7 @@ class ForceLoop:
             limits += self._at_ends(unlimited, velocity)
         effort = [0.0] * len(q)
         if axes and not holds:
-            fed = self._fed(axes, dt)
+            fed = self._fed(axes, known, dt)
             effort = run.feed_forward.step(fed, velocity.tolist(), own, dt) if forces else fed.tolist()
         return velocity, effort, limits
 
@@ -509,18 +509,21 @@ class ForceLoop:
                 found.append(warning(Code.AT_LIMIT, "joint_end", joint=joints.names[i], **values))
         return found
 
-    def _fed(self, axes: Sequence[CommandedAxis], dt: float) -> Array:
+    def _fed(self, axes: Sequence[CommandedAxis], known: Sequence[Belief], dt: float) -> Array:
         """Torque of the forces that is fed forward (n,), N m: after the touch, where the place is known.
 
-        The velocity loops need not wind up to it; the whole of it rises as the force may.
+        The velocity loops need not wind up to it, but for what they have wound up to before, which motors show late.
+        The whole of it rises as the force may.
         """
         own, run = self.parameters, self._run
         at_once, later = np.zeros(len(self._q)), np.zeros(len(self._q))
-        for axis in axes:
+        for axis, belief, one in zip(axes, known, run.axes, strict=True):
             if axis.is_force:
                 at_once += own.force_feedforward * axis.desired * axis.along
                 if run.is_touching and axis.place is not None and axis.place.is_known and not axis.is_joint:
-                    later += (1.0 - own.force_feedforward) * axis.desired * axis.along
+                    if math.isnan(one.wound):
+                        one.wound = belief.force * own.is_estimated
+                    later += ((1.0 - own.force_feedforward) * axis.desired - one.wound) * axis.along
         if own.limits.impact:
             missing = later - run.fed
             way, whole = (float(np.abs(one).max()) for one in (missing, [later, run.fed]))
