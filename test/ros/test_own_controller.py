@@ -440,14 +440,6 @@ def test_a_node_that_stops_to_return_its_output_ends_the_run_with_its_name_and_t
     assert run.driver.safety.fault in failure
 
 
-def test_over_topics_the_fault_names_the_node_and_its_unusable_output(
-    arm: RunningArm, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Careless, "given", State([], [], [NAN] * 4))
-    fault = arm.start(Careless, nodes=INNER_NODES).run_until_fault()
-    assert fault.startswith("careless: unusable joint_effort_command: effort of joint1 is nan; send finite numbers")
-
-
 def test_an_array_in_the_place_of_another_argument_of_an_input_is_refused() -> None:
     with pytest.raises(TypeError, match=r"delayed must be True or False; .*'joint_states', 'position velocity"):
         reaction(Input("joint_states", "position", "velocity"), outputs=())  # type: ignore[arg-type]

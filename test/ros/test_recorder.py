@@ -18,7 +18,6 @@ import pytest
 import yaml
 from conftest import LONG, soon
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import WrenchStamped
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
@@ -695,14 +694,6 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(arm: RunningArm, m
     recorded = {name: topic.messages for name, topic in contents(bag.path).topics.items()}
     assert published["/wam/motor_states"] == 301
     assert {name: published[name] for name in recorded} == recorded
-
-
-def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
-    found = machine(tmp_path, "/wam/motor_states", "/wam/sim/disturbance")
-    found.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
-    found.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
-    found.finish()
-    assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
 
 
 @pytest.mark.parametrize(("number", "begin"), [(1, 0), (6001, 6_000_000_000)])
