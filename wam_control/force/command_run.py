@@ -69,15 +69,12 @@ class Shaking:
     """
 
     def __init__(self, timing: Timing) -> None:
-        self._cycle, self._poses = timing.dither_cycle * timing.period, deque[Array]()
+        self._cycle, self._poses = timing.dither_cycle * timing.period, list[Array]()
 
-    def is_watching(self, q: Sequence[float], holds: bool, dt: float) -> bool:
-        """Take a pose (n,), rad, unless there are enough and the arm moves; whether one was taken."""
-        is_enough = len(self._poses) * dt > max(FORCE.watched_time, self._cycle)
-        if not self._cycle or (is_enough and not holds):
+    def is_watching(self, q: Sequence[float], dt: float) -> bool:
+        """Take a pose (n,), rad, unless there are enough; whether one was taken."""
+        if not self._cycle or len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
             return False
-        if is_enough:
-            self._poses.popleft()
         self._poses.append(np.array(q))
         return True
 
