@@ -112,7 +112,7 @@ $(STAMPS)/venv:
 		echo "Could not make $(VENV); on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	@mkdir -p $(STAMPS) && touch $@
 
-ROS_EXTRAS := compile,completion,live,ros
+ROS_EXTRAS := bus,compile,completion,kit,live,ros
 TEST_EXTRAS := $(ROS_EXTRAS),test
 DOCS_EXTRAS := $(TEST_EXTRAS),docs
 

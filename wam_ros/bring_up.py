@@ -238,7 +238,7 @@ class Processes(Closing):
 def _ending(code: int) -> str:
     """How a process ended that should not have, in words."""
     if code > 0:
-        return f"ended by itself with code {code}; it printed the reason above"
+        return f"ended with code {code}; it printed the reason above"
     number = -code
     name = signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
     cause = "; the system does that if memory is short" if name == "SIGKILL" else ""

@@ -54,7 +54,7 @@ POSE = [0.0, -1.2, 0.0, 0.53]
 STEPS = {"push outer": 0.0, "push inner": 2.0, "lower": 4.0, "press 8 N": 5.0, "press 4 N": 7.0, "lift": 9.0}
 REASON = REASONS[Reason.MOMENT_ONLY]
 PARAMETERS = "arm: {joints: "  # not YAML
-NO_LIMIT = "without a commanded force no contact above limits.contact_force: NOT SHOWN, see below"
+NO_LIMIT = "without a commanded force no contact above limits.contact_force: NOT EVALUATED, see below"
 NO_TASK = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(0), {"kind": np.zeros(0)})  # no axes
 
 
@@ -267,7 +267,7 @@ def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(se
     recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
     assert math.isnan(forces_of(recording).get("press 4 N: error of the true force", math.nan))
     shown = told(recording.bag())
-    assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
+    assert "force within 10 %: NOT EVALUATED, 1 of 2 forces lasted less than 1 s" in shown
     assert "Forces: 1 of 1 applied, largest error +5.0 %." in shown
     is_hold = "press 4 N: 4 N commanded on outer_link for less than 1 s, so" in shown
     assert is_hold == (seconds > 0.3)  # else it may be part of a ramp
@@ -559,7 +559,7 @@ def test_contact_that_is_missed_is_reported_and_wrong():
     recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
     assert "MISSED" in told(recording.bag())
     assert "right link: NO" in verdict(recording.summary())
-    assert "position within 4 cm: NOT SHOWN" in verdict(recording.summary())
+    assert "position within 4 cm: NOT EVALUATED" in verdict(recording.summary())
 
 
 def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_their_uncertainty():
@@ -681,7 +681,7 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording = Played()
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
-    answer = "of the time without contact: NOT SHOWN, 200 ms, as a contact that ends may take"
+    answer = "of the time without contact: NOT EVALUATED, 200 ms, as a contact that ends may take"
     assert answer in verdict(recording.summary())
 
 
@@ -705,7 +705,7 @@ def test_missing_topic_is_said_and_nothing_is_invented(name):
     if name in RECORDED and name not in ("sim/disturbance", "sim/joint_states"):
         assert any(name in section.lacking for section in sections)
     if name == "sim/contact/wrench":
-        assert "force within 10 %: NOT SHOWN | right link: NOT SHOWN" in verdict(summary)
+        assert "force within 10 %: NOT EVALUATED | right link: NOT EVALUATED" in verdict(summary)
     if name == "contact/wrench":
         assert all(math.isnan(held.estimated_accuracy.bias) for held in summary.held)
 
@@ -713,7 +713,7 @@ def test_missing_topic_is_said_and_nothing_is_invented(name):
 def test_empty_bag_gives_a_report():
     empty = Bag(Path("bag"), {}, {}, {}, {})
     summary = AnalysedRecording(empty)
-    assert "NOT SHOWN" in verdict(summary)
+    assert "NOT EVALUATED" in verdict(summary)
     assert "No constant force was commanded" in told(empty)
 
 

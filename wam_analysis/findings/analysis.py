@@ -184,7 +184,7 @@ def _line(title: str, sentences: list[str], silent: str) -> str:
     if not sentences:
         return f"{title}: {silent}"
     kept = sentences[: LAYOUT.stated]
-    more = f" +{len(sentences) - len(kept)} below." * (len(sentences) > len(kept))
+    more = f" {len(sentences) - len(kept)} more below." * (len(sentences) > len(kept))
     return f"{title}: {' '.join(kept)}{more}"
 
 

@@ -43,7 +43,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         off = float(np.median(force)) if len(force) else math.nan
         findings += [
             Finding("contact on the right link", "%", right),
-            Finding("position error, median", "cm", away, note="along the link, without its sign"),
+            Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding(
                 "size of the force error, median",
                 "N",

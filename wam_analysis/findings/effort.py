@@ -55,7 +55,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
         remarks = [f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"]
         if math.isnan(found.inertia.value):
             late = shown(1e-3 * abs(whole.per_lag))
-            remarks.append(f"one frequency, 1 ms of delay changes the viscous friction by {late}")
+            remarks.append(f"it moved at one frequency, where each ms of delay changes the viscous friction by {late}")
             alone.append(one.label)
         remarks += [f"not identifiable: {', '.join(missing)}"] * bool(missing)
         remarks += [ALSO[name] for name in whole.also]
@@ -66,8 +66,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
         return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
     assumed = (
-        "Computed from the effort, which is taken as friction, inertia and the joint's own weight. Drag and delays are "
-        "removed if they are found; otherwise they increase the errors:"
+        "The whole effort is explained by friction, inertia and the joint's own weight. Drag, by the square of the "
+        "velocity, and delays are subtracted if they are found; otherwise they increase the errors:"
     )
     if alone:
         doubts.append(

@@ -211,7 +211,7 @@ def _fate(one: HeldForce) -> tuple[str, str]:
         return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
     shaft, seen = one.swinging
     is_bad = seen.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
-    text = f"{name}: {f'{shaft} (the force was not recorded)' if shaft else 'the force'} {_words(seen)}"
+    text = f"{name}: {f'no force was recorded; {shaft}' if shaft else 'the force'} {_words(seen)}"
     if shaft and is_bad:
         what = "limit cycle of" if seen.verdict is Verdict.LIMIT_CYCLE else "last"
         text += f"; {what} {shown(seen.peak_to_peak, 'rad')} peak to peak, period {shown(seen.period, 's')}"

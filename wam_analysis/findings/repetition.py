@@ -95,7 +95,7 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
-    span = f"from {shown(min(begins), 'Hz')} on, five cycles of the longest stretch"
+    span = f"from {shown(min(begins), 'Hz')} on, so that five cycles fit into the longest part without a gap"
     if findings:
         return Section("frequency", "Spectrum", (f"Looked for {span}.",), findings)
     silent = (f"No frequency is above the noise {span}; slower ones were not looked for.",)

@@ -21,7 +21,7 @@ class VerdictResult(StrEnum):
 
     YES = "YES"
     NO = "NO"
-    NOTHING = "NOT SHOWN"
+    NOTHING = "NOT EVALUATED"
 
 
 class VerdictAnswer(NamedTuple):
@@ -53,7 +53,7 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
     answers = [f"{answer}." for answer in verdict(recording)]
-    return Section("steps", "Result of the steps, worst case in brackets", answers, wrong=wrong)
+    return Section("steps", "Result of the steps; in brackets the worst step", answers, wrong=wrong)
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
@@ -99,7 +99,7 @@ def _force_verdict(held: Sequence[HeldForce], brief: int) -> VerdictAnswer:
     errors = [100.0 * one.true_accuracy.smallest / one.hold.commanded for one in done] + [math.nan] * brief
     answer = _answer(question, errors, HOLD.force_tolerance, "{:.1f} %")
     short = brief + sum(one.hold.is_short for one in done)
-    return answer._replace(remark=f"{short} of {len(held) + brief} commanded for less than {STEADY:g} s" * bool(short))
+    return answer._replace(remark=f"{short} of {len(held) + brief} forces lasted less than {STEADY:g} s" * bool(short))
 
 
 def _command_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
