@@ -32,8 +32,8 @@ WITHIN = {  # methods of an object of the simulation, by part
     "contact_estimator: observe": ("nodes.contact_estimator._estimator", "observe"),
     "contact_estimator: estimate": ("nodes.contact_estimator._estimator", "estimate"),
 }
-WHOLE, TRUTH, REST = "whole", "true state, published", "bus, synchronisers, scheduling"
-DRIVER = {"driver": ("driver", "advance"), TRUTH: ("", "_publish_truth")}
+WHOLE, TRUTH, REST = "whole", "true state", "bus, synchronisers, scheduling"
+DRIVER = {"driver": ("driver", "advance"), TRUTH: ("driver", "outer_values")}
 Spent = Counter[str]
 
 
