@@ -54,7 +54,7 @@ def prediction_parameters(recorded: RecordedParameters) -> PredictionParameters:
         try:
             return recorded.part(node, cls, prefix)
         except BagError as error:
-            notes[_reason(recorded, error)] = None
+            notes[str(error).removeprefix(f"{recorded.source}: ")] = None  # the reader of a report knows the bag
             return None
 
     return PredictionParameters(
@@ -83,8 +83,3 @@ def recorded_arm(recorded: PredictionParameters) -> RecordedArm:
     world = build_part(World, configuration.sections["driver"], "world.")
     note = f"the arm in the picture is that of the packaged configuration 'wam': {recorded.note}"
     return RecordedArm(configuration.shared.arm, world, note)
-
-
-def _reason(recorded: RecordedParameters, error: BagError) -> str:
-    """The message without the path of the bag, which the reader of a report knows."""
-    return str(error).removeprefix(f"{recorded.source}: ")

@@ -102,10 +102,6 @@ class _Sentence(string.Formatter):
         return brief(value) if format_spec == "b" else str(super().format_field(value, format_spec))
 
 
-def _fill(text: str, values: Mapping[str, Any]) -> str:
-    return _Sentence().vformat(text, (), values)
-
-
 def sentence(event: Event) -> str:
     """What an event is in words, '' where nothing has happened."""
     cause = str(event.cause)
@@ -113,7 +109,7 @@ def sentence(event: Event) -> str:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
     end = HOLDING if event.holds and "hold" not in SENTENCES[cause] and "goes back" not in SENTENCES[cause] else ""
-    return _fill(SENTENCES[cause], values) + end
+    return _Sentence().vformat(SENTENCES[cause], (), values) + end
 
 
 def reasons_in_words(reasons: Reason) -> str:

@@ -10,7 +10,6 @@ from typing import Final
 from wam_description.parameters import aligned, like, parameter, require
 from wam_description.parts import Joints, Links, Motors
 
-FROM_ARM: Final = "arm"  # source of a model that was not identified
 UNKNOWN: Final = "none"  # in place of the names of identified parameters, where there are none
 
 

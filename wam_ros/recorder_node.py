@@ -66,7 +66,6 @@ class RecorderNode(TolerantNode):
         )
         self.ready = False
         self._attached = ""
-        self._dropped = 0
         self._failed = False
         self._has_heard = False  # others, recorded or not
         self.create_timer(RECORDER_LIMITS.drain_period, self._drain)
@@ -155,10 +154,10 @@ class RecorderNode(TolerantNode):
             self._failed = True
             self.get_logger().error(self.recorder.failure)
             self._status.publish(self._state(self.recorder.failure, self.recorder.failure if self._required else ""))
-        dropped = self.recorder.dropped()
-        if dropped > self._dropped:
-            self._dropped = dropped
-            self.get_logger().warning(f"the recorder was too slow: {dropped} messages are lost so far")
+        if self.recorder.dropped():
+            self.get_logger().warning(
+                "the recorder is too slow: messages are lost; at its end it counts them", once=True
+            )
 
     def _report(self) -> None:
         state = self._state("recording")

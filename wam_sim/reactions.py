@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, watched_axes
+from wam_control.force.task import AxisKind, TaskCommand, watched_axes
 from wam_control.task.scenario import ScenarioStep
 from wam_description.event import Code, Event
 from wam_description.event_text import sentence
@@ -145,15 +145,18 @@ def watched_times(
     """
     times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
-        axes, since = [axis.name for axis in watched_axes(task) if not (without_forces and _is_of_link(axis))], begin
+        axes, since = (
+            [
+                axis.name
+                for axis in watched_axes(task)
+                if not (without_forces and axis.kind is AxisKind.FORCE and axis.joint < 0)
+            ],
+            begin,
+        )
         if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
         times.append((axes, since, end))
     return [(begin, end) for axes, begin, end in times if axes]
-
-
-def _is_of_link(axis: TaskAxis) -> bool:
-    return axis.kind is AxisKind.FORCE and axis.joint < 0
 
 
 def is_too_short(times: Sequence[tuple[int, int]], step: StepSpan, settling_time: float) -> bool:

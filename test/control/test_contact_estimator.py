@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
-from wam_analysis.findings.analysis import analyse
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_control.task.scenario import ScenarioStep
@@ -24,7 +23,6 @@ from wam_description.signals import ForceCommand, State
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
-from wam_sim.simulated_bag import record
 from wam_sim.simulation import Simulation
 from wam_studies.contact.scenarios import base_values
 
@@ -444,22 +442,6 @@ def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
     grown = total[-1] - total[5]
     assert grown == pytest.approx([0.3 * level * at_motor] * 2, rel=0.5)
     assert np.abs(total[5] - total[3]).max() < 0.3 * grown.min()
-
-
-@pytest.mark.slow
-def test_the_analysis_of_a_bag_has_the_tracked_friction(tmp_path: Path) -> None:
-    configured = CONFIGURATION.with_values(base_values(CONFIGURATION, False))
-    steps = [ScenarioStep("release", 0.5, request="enable"), ScenarioStep("move", 1.2, posture=(0.5, -0.9, 0.3, 2.0))]
-    record(configured, steps, tmp_path / "moved")
-    (section,) = (each for each in analyse(tmp_path / "moved", lambda _: None).sections if each.key == "contact")
-    found = {finding.name: finding for finding in section.findings}
-    level = ARM.motors.dynamic_friction[0]
-    for way in ("positive", "negative"):
-        finding = found[f"motor1: friction in {way} motion"]
-        assert finding.unit == "N m"
-        assert 0.5 * level < finding.measured < 1.5 * level
-        assert "since the start" in finding.note
-        assert f"joint4: friction in {way} motion" in found
 
 
 @pytest.mark.slow

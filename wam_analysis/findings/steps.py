@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, ListedContact
+from wam_analysis.contact_list import NO_LINK
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.held_force import HeldForce
 from wam_analysis.recording import AnalysedRecording
@@ -125,18 +125,13 @@ def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 
 def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
-    found = _compared(recording)
+    found = [one for one in recording.contacts if one.true != NO_LINK]  # no false detections
     errors = [100.0 * abs(one.position_error) for one in found if not one.estimate.is_lower_bound]
     errors += [math.nan] * sum(one.lasts for one in recording.missed)
     question = f"position within {100.0 * TOUCH.position_tolerance:g} cm"
     unknown = sum(one.estimate.is_lower_bound for one in found)
     answer = _answer(question, errors, 100.0 * TOUCH.position_tolerance, "{:.1f} cm")
     return answer._replace(remark=f"unknown for {unknown} of {len(found)} contacts" * bool(unknown))
-
-
-def _compared(recording: AnalysedRecording) -> list[ListedContact]:
-    """The estimated contacts that are no false detections."""
-    return [one for one in recording.contacts if one.true != NO_LINK]
 
 
 def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:

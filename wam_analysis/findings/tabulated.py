@@ -58,7 +58,7 @@ def _table(findings: list[Finding]) -> Tabulated:
     quantities = list(dict.fromkeys((one.quantity, one.unit) for one in findings))
     cells = {(one.subject, (one.quantity, one.unit)): one for one in findings}
     downwards = len(subjects) <= len(quantities)
-    titles = [_titled(*quantity) for quantity in quantities]
+    titles = [f"{quantity} [{unit}]" if unit else quantity for quantity, unit in quantities]
     grid = [[cells.get((subject, quantity)) for quantity in quantities] for subject in subjects]
     columned = grid if downwards else zip(*grid, strict=True)
     columns = [("quantity" if downwards else "", False, titles if downwards else subjects)]
@@ -74,7 +74,3 @@ def _table(findings: list[Finding]) -> Tabulated:
 def _measured(one: Finding) -> str:
     error = f" +- {shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
     return bounded(shown(one.measured), one.is_lower_bound) + error + MARK * one.deviates
-
-
-def _titled(quantity: str, unit: str) -> str:
-    return f"{quantity} [{unit}]" if unit else quantity

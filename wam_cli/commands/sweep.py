@@ -113,14 +113,10 @@ def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
             raise ValueError(f"--vary {name}: runs of a sweep have no such node; give the scenario as --scenario")
 
 
-def _scenario_file(given: argparse.Namespace) -> Path:
-    return script_file(given.scenario or SCENARIO)
-
-
 def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:
     """Why each set failed, '' where it did not, and what was reported of the others; a row of the table for each."""
     configuration = configuration_of(given)
-    runs = points(configuration, load(_scenario_file(given), configuration.shared), axes, sets)
+    runs = points(configuration, load(script_file(given.scenario or SCENARIO), configuration.shared), axes, sets)
     with batch_of(given, len(runs)) as batch:
         is_own = any(":" in entry for entry in configuration.shared.nodes)  # its code may import any file
         found = sweep(runs, batch.executor, None if is_own else batch.file, batch.report)

@@ -137,7 +137,11 @@ class PostureMotion:
         times = [point.time for point in points]
         for posture in postures[1:]:
             self._require_inside(posture)
-        self._parts = self._timed(postures, points) if any(times) else self._fast(postures)
+        self._parts = (
+            self._timed(postures, points)
+            if any(times)
+            else [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
+        )
         self.duration = sum(part.duration for part in self._parts)
         self.fastest = [max(each) for each in zip(*(part.fastest for part in self._parts), strict=True)]
 
@@ -150,9 +154,6 @@ class PostureMotion:
         else:
             time = part.duration
         return part.at(time)
-
-    def _fast(self, postures: Sequence[list[float]]) -> list["_Part"]:
-        return [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
 
     def _timed(self, postures: Sequence[list[float]], points: Sequence[PathPoint]) -> list["_Part"]:
         rest = [0.0] * len(postures[0])

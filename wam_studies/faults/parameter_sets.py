@@ -190,7 +190,7 @@ def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
         stack.escapes.append("no answer to the set")
         return 1
     after = _present(stack, name)
-    changed = [key for key in before if not _same(before[key], after[key])]
+    changed = [key for key in before if before[key] != after[key] and repr(before[key]) != repr(after[key])]
     if not answer.successful and changed:
         stack.escapes.append(f"refused, but {changed[0]} has changed")
     if answer.successful and todo.is_wrong:
@@ -225,7 +225,3 @@ def _push(stack: WatchedStack) -> None:
         stack.escapes.append(
             f"accepted, then unstable: {speed:.1f} rad/s after a push of {FAULTS.push:g} N {stack.driver.safety.fault}"
         )
-
-
-def _same(a: Any, b: Any) -> bool:
-    return bool(a == b) or repr(a) == repr(b)

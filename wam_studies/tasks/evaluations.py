@@ -45,7 +45,14 @@ def pushing(runs: Runs) -> Result:
         near("press 4 N, true force across", 4.0, _across(run, press), "N", "commanded", BOUNDS.slipped),
         below("press 4 N, the box moves", _moved(pressed), "m", BOUNDS.still, "friction holds"),
         near("horizontal force while it slides, mean", friction * (weight - lift), along, "N", "mu N", BOUNDS.force),
-        near("weight carried by the table", weight - lift, _mean_size(slides, 2), "N", "m g - lift", 0.02),
+        near(
+            "weight carried by the table",
+            weight - lift,
+            float(np.abs(slides.other_force[:, 2]).mean()),
+            "N",
+            "m g - lift",
+            0.02,
+        ),
         noted("distance pushed", _moved(pushed), "m"),
         below("aside of the push", np.ptp(pushed.position[:, 1]), "m", 0.01, "straight"),
         *_estimate(run, push),
@@ -167,10 +174,6 @@ def _sliding(trace: ObjectTrace) -> tuple[float, float]:
 def _moved(trace: ObjectTrace) -> float:
     """Distance between both ends of the motion, m."""
     return float(np.linalg.norm(trace.position[-1, :2] - trace.position[0, :2]))
-
-
-def _mean_size(trace: ObjectTrace, axis: int) -> float:
-    return float(np.abs(trace.other_force[:, axis]).mean())
 
 
 def _largest(traces: Mapping[str, ObjectTrace]) -> float:
