@@ -145,14 +145,12 @@ def watched_times(
     """
     times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
-        axes, since = (
-            [
-                axis.name
-                for axis in watched_axes(task)
-                if not (without_forces and axis.kind is AxisKind.FORCE and axis.joint < 0)
-            ],
-            begin,
-        )
+        since = begin
+        axes = [
+            axis.name
+            for axis in watched_axes(task)
+            if not (without_forces and axis.kind is AxisKind.FORCE and axis.joint < 0)
+        ]
         if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
         times.append((axes, since, end))
