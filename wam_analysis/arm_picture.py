@@ -16,6 +16,7 @@ from wam_analysis.thresholds import LAYOUT
 from wam_bag.arrays import Numbers
 from wam_description.arm import Arm
 from wam_description.mjcf import rotation_xyz
+from wam_description.parameters import rows
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, ObjectState
 from wam_description.world import World
@@ -82,16 +83,10 @@ class View(NamedTuple):
 
 def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
     """The covers of the arm in a pose, q in rad."""
-    body = RigidBody(arm)
-    covers = arm.covers
+    body, colours = RigidBody(arm), itertools.cycle(TUBE_COLOURS)
     return [
-        Tube(
-            body.point(q, name, covers.start[3 * i : 3 * i + 3]),
-            body.point(q, name, covers.end[3 * i : 3 * i + 3]),
-            covers.radius[i],
-            TUBE_COLOURS[i % len(TUBE_COLOURS)],
-        )
-        for i, name in enumerate(covers.names)
+        Tube(body.point(q, one.name, one.start), body.point(q, one.name, one.end), one.radius, colour)
+        for one, colour in zip(rows(arm.covers), colours, strict=False)
     ]
 
 
@@ -117,15 +112,12 @@ def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[
 
 def scene(arm: Arm, q: Sequence[float], world: World, states: Sequence[ObjectState] = ()) -> SideScene:
     """The arm in a pose, q in rad, and its world; without the states of its objects the obstacles alone."""
-    obstacles = world.obstacles
     balls: list[Tube] = []
     faces: list[Face] = []
-    for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
-        if states and name in world.moving:
-            continue
-        triple = slice(3 * i, 3 * i + 3)
-        rotation, centre = rotation_xyz(*obstacles.rotations[triple]), np.array(obstacles.positions[triple])
-        faces += _faces(shape, np.array(obstacles.sizes[triple]), rotation, centre, BLOCK_COLOUR)
+    for fixed in rows(world.obstacles):
+        if not (states and fixed.name in world.moving):
+            rotation, centre = rotation_xyz(*fixed.rotation), np.array(fixed.position)
+            faces += _faces(fixed.shape, np.array(fixed.size), rotation, centre, BLOCK_COLOUR)
     floor = min([float(face.corners[:, 2].min()) for face in faces], default=-0.2)  # at the lowest obstacle
     for one, state in zip(world.solids, states, strict=False):
         rotation = pin.Quaternion(state.qw, state.qx, state.qy, state.qz).matrix()

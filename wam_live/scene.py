@@ -27,6 +27,7 @@ from wam_analysis.drawing import (
 )
 from wam_analysis.thresholds import LAYOUT
 from wam_description.arm import Arm
+from wam_description.parameters import rows
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, LikelyRange, Wrench
 from wam_description.world import Solid, World
@@ -141,14 +142,11 @@ class Scene:
         return frame
 
     def _add_surroundings(self, world: World) -> None:
-        obstacles = world.obstacles
-        for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
-            three = slice(3 * i, 3 * i + 3)
-            turn = quaternion(pin.rpy.rpyToMatrix(*obstacles.rotations[three]))
-            if name not in world.moving:
-                x, y, z = obstacles.positions[three]
-                solid = Solid(name, shape, obstacles.sizes[three], (x, y, z))
-                self._add_solid(f"/world/{name}", solid, BLOCK_COLOUR, turn)
+        for one in rows(world.obstacles):
+            if one.name not in world.moving:
+                turn = quaternion(pin.rpy.rpyToMatrix(*one.rotation))
+                solid = Solid(one.name, one.shape, one.size, one.position)
+                self._add_solid(f"/world/{one.name}", solid, BLOCK_COLOUR, turn)
         for solid in world.solids:
             colour = BLOCK_COLOUR if solid.name in world.moving else OBJECT_COLOUR
             self._add_solid(f"/world/{solid.name}/mesh", solid, colour)
