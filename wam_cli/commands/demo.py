@@ -90,6 +90,8 @@ def run(given: argparse.Namespace) -> int:
         print(f"\nthe demonstration failed: {', '.join(failures)}", file=stream)
         if stated.is_there:
             print(f"next: wam analyse {bag_word}", file=stream)
+        if configuration.shared.timing.mode == "realtime":
+            print("next: wam demo    # without --realtime: lockstep waits for a busy machine", file=stream)
         return 1
     print(f"next     wam live {bag_word}       # the recording in the browser")
     print(f"         wam analyse {bag_word}    # measured and compared with theory")
