@@ -116,20 +116,21 @@ ROS_EXTRAS := bus,compile,completion,kit,live,ros
 TEST_EXTRAS := $(ROS_EXTRAS),test
 DOCS_EXTRAS := $(TEST_EXTRAS),docs
 
-# of the C++ libraries that come with pin: 200 MB that nothing here compiles against
-HEADERS := $(VENV)/lib/python3*/site-packages/cmeel.prefix/include
+# The C++ libraries that come with pin: 200 MB of headers, which nothing here compiles against, and each library in
+# two or three copies, because a wheel has no links.
+CXX := $(VENV)/lib/python3*/site-packages/cmeel.prefix
 
 define INSTALL_WITH
 @rm -f $(STAMPS)/installed-*
 @$(TIDY)
-@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
-@rm -rf $(HEADERS)
+@$(PIP) install -q --no-compile --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
+@rm -rf $(CXX)/include; ! command -v hardlink >/dev/null || hardlink -q $(CXX)
 @$(TIDY)
 @touch $@
 endef
 
 $(STAMPS)/ros: $(STAMPS)/venv constraints.txt setup.py
-	@echo "Installing into $(VENV): about 0.8 GB, a minute or two the first time"
+	@echo "Installing into $(VENV): about 0.7 GB, a minute or two the first time"
 	@$(PIP) install -q -c constraints.txt setuptools
 	$(call INSTALL_WITH,$(ROS_EXTRAS))
 
