@@ -385,10 +385,12 @@ def demonstration(folder: Path, name: str, options: list[str]) -> Run:
 
 
 def short_form(folder: Path) -> list[str]:
-    """Options of a demonstration of some seconds, without a page in the browser."""
+    """Options of a demonstration of some seconds, without a page in the browser, and polite to other programs."""
     (folder / "short.yaml").write_text(yaml.safe_dump({"steps": SHORT}), encoding="utf-8")
-    section = {"ros__parameters": {"script": str(folder / "short.yaml")}}
-    (folder / "quick.yaml").write_text(yaml.safe_dump({"base": "wam", "/**/scenario": section}), encoding="utf-8")
+    polite, script = {"fifo_priority": 0, "niceness": 0}, str(folder / "short.yaml")
+    values = {"/**": {"timing": polite}, "/**/scenario": {"script": script}}
+    sections = {name: {"ros__parameters": value} for name, value in values.items()}
+    (folder / "quick.yaml").write_text(yaml.safe_dump({"base": "wam", **sections}), encoding="utf-8")
     return ["--config", "quick.yaml", "--no-live"]
 
 
