@@ -201,7 +201,8 @@ TOPICS: Final = (
     _joints(
         "joint_sensors",
         "inner",
-        "joint1..N: joint-side encoder in rad and rad/s; strain torque in N m, on the link side of the friction",
+        "joint1..N: joint-side encoder in rad and rad/s; torque by strain gauges in N m, on the link side of the joint "
+        "friction",
         needs_joint_sensors=True,
     ),
     _joints("joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m"),
@@ -221,22 +222,23 @@ TOPICS: Final = (
     _joints(
         "joint_posture_command",
         "outer",
-        "posture held in the complement of the force, rad; and, if it moves, its velocity, rad/s",
+        "posture that the arm holds in all directions without a force, rad; if the posture moves, also its velocity, "
+        "rad/s",
     ),
     Topic(
         "joint_trajectory",
         TRAJECTORY,
         "outer",
-        "postures to go through, rad, from your program, in place of `joint_posture_command`; stream it",
+        "postures to go through, rad, streamed by your program in place of `joint_posture_command`",
         "joints",
     ),
-    _joints("joint_torque_command", "outer", "joint torques commanded in the joint_torque mode, by your program, N m"),
+    _joints("joint_torque_command", "outer", "joint torques commanded by your program in the mode joint_torque, N m"),
     Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero releases the force axis"),
     Topic(
         "task_command",
         TABLE,
         "outer",
-        "forces, velocities, positions and impedances along chosen axes, one row each; no row: no task; "
+        "forces, velocities, positions and impedances along chosen axes, one row each; without a row there is no task; "
         "float64 columns: see docs/tasks.md",
         columns=TASK_COLUMNS,
     ),
@@ -244,8 +246,8 @@ TOPICS: Final = (
         "task_axes",
         TABLE,
         "display",
-        "how well each axis of the task is measured and done, in the order of `task_command`; float64 columns: see "
-        "docs/tasks.md",
+        "how well each axis of the task is measured and followed, in the order of `task_command`; float64 columns: "
+        "see docs/tasks.md",
         columns=TASK_AXIS_COLUMNS,
     ),
     Topic(
@@ -258,14 +260,14 @@ TOPICS: Final = (
         TABLE,
         "display",
         "how well the commanded force is measured and held; frame = the cover; no row without a command; "
-        "also at each new event; float64 columns: see docs/force.md",
+        "published also at each new event; float64 columns: see docs/force.md",
         columns=FORCE_AXIS_COLUMNS,
     ),
     _joints(
         "external_torque_zero",
         "outer",
-        "effort = torques of the joint sensors that count as zero force, N m, by `~/tare` or at the "
-        "start of a force; the estimator corrects the arm's weight by them",
+        "effort = torques of the joint sensors that count as zero force, N m, set by `~/tare` or at the "
+        "start of a force; the estimator corrects the arm's weight with them",
     ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
@@ -297,12 +299,12 @@ TOPICS: Final = (
         "columns: see docs/estimator.md",
         columns=FRICTION_COLUMNS,
     ),
-    Topic("contact/in_contact", BOOL, "latched", "whether something touches the arm"),
+    Topic("contact/in_contact", BOOL, "latched", "true while a contact is detected"),
     Topic(
         "contact/markers",
         "visualization_msgs/msg/MarkerArray",
         "display",
-        "the contact as an arrow and a sphere; the positions with 90 % probability as a band along the links",
+        "the contact as an arrow and a sphere; a band along the links that contains it with 90 % probability",
     ),
     _joints("sim/joint_states", "outer", "truth: joint angles, velocities, torques through the cables"),
     Topic(
@@ -324,11 +326,11 @@ TOPICS: Final = (
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force and torque at the origin of the cover frame_id, N and N m; it ends `ages.command` after the last "
-        "message, or with a push on another cover",
+        "a push: force and torque at the origin of the cover frame_id, N and N m; the push ends `ages.command` after "
+        "the last message, or with a push on another cover",
     ),
     Topic("robot_description", STRING, "latched", "URDF of the arm"),
-    Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),
+    Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node; each node latches its own"),
     Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "1 Hz", "counts, timing and refusals of each node"),
     Topic("/clock", TIME, "outer", "time of the arm, strictly increasing"),
 )
