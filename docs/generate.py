@@ -297,8 +297,8 @@ def recorded_range(configuration: Configuration) -> str:
     errors = [
         (row.quantity, abs(row.deviation * float(row.predicted))) for row in rows if row.quantity.endswith("true")
     ]
-    shown = [(f"{name}, error", f"{error:.2g}", f"{force / error:.0f}") for name, error in errors]
-    return markdown(("recorded", "N", "steady force over it"), shown)
+    shown = [(name.removesuffix(", true"), f"{error:.2g}", f"{force / error:.0f}") for name, error in errors]
+    return markdown(("step of `wam-press`", "error, N", "steady force over this error"), shown)
 
 
 def verdict(file: str) -> str:
@@ -367,9 +367,9 @@ def dither(configuration: Configuration) -> str:
     cost = Dither(shared.arm, shared.timing, own).cost(DITHER_POSE)
     rows = [
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
-        ["amplitude over static friction of motor and joints", f"{own.level:g}"],
+        ["amplitude divided by static friction of motor and joints", f"{own.level:g}"],
         ["motion of the tool without friction, peak to peak", f"{1e3 * cost.tip_motion:.2g} mm"],
-        ["heat of the hottest winding, over its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
+        ["heat of the hottest winding, of its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
     ]
     return markdown(["the dither", ""], rows)
 

@@ -223,7 +223,7 @@ def _counted(results: Sequence[TaskResult]) -> tuple[int, int, int, int]:
 
 def _forbidden(trials: Sequence[ForceTrial]) -> Iterator[Row]:
     """What must not happen."""
-    over = f"true force above {OUTCOME.overshoot:g} times the commanded plus the impact (3.1)"
+    over = f"true force above the impact (3.1) plus {OUTCOME.overshoot:g} times the commanded force"
     own = [trial for trial in trials if not trial.task.mistake]
     mistaken = [trial for trial in trials if trial.task.mistake]
     for title, number, of in (
