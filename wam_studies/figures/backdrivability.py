@@ -108,4 +108,4 @@ def table(found: Panels) -> str:
         for label, series in panel.lines:
             quantiles = np.quantile(series.x, (0.1, 0.5, 0.9))
             rows.append((quantity, label.removeprefix("payload "), *(digits.format(value) for value in quantiles)))
-    return markdown(("at the tip", "payload", "a tenth of the poses below", "median", "a tenth above"), rows)
+    return markdown(("at the tip", "payload", "10 % quantile over the poses", "median", "90 % quantile"), rows)
