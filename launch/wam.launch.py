@@ -44,7 +44,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     ),
     "processes": (
         "false",
-        "one for each node; grouped: for inner loop, outer loop, recorder; false: one, but grouped in realtime",
+        "true: one per node; grouped: driver with velocity loop, recorder, all others; false: one, in realtime grouped",
         [*SWITCH, GROUPED],
     ),
     "scenario": ("", "scenario that is played: name of an installed one, or path of a YAML file; empty: none", None),

@@ -239,8 +239,8 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each: one process per node; grouped: one each for inner loop, outer loop and recorder; default: one "
-        "process for all; in realtime: grouped",
+        help="each: one process per node; grouped: one for driver and velocity loop, one for the recorder, one for "
+        "all others; default: one process for all, in realtime grouped",
     )
     parser.add_argument(
         "--realtime",

@@ -51,7 +51,7 @@ def start(
     Raises
     ------
     ParameterError
-        where there is no such node, one of this name runs already in this namespace, or a value is not allowed.
+        where there is no such node, one of this name already runs in this namespace, or a value is not allowed.
     """
     names = node_names(configuration)
     require_places(names.values(), namespace)

@@ -293,7 +293,7 @@ def _agreement(bench: DriverBench) -> str:
 
 def _end(bench: DriverBench) -> str:
     if bench.end is None:
-        raise Untested("the driver runs already; give its command with --driver")
+        raise Untested("the driver already runs; give its command with --driver")
     bench.enable()
     bench.end()
     bench.watch(CONFORMANCE_LIMITS.settle)
@@ -303,7 +303,7 @@ def _end(bench: DriverBench) -> str:
 
 def _session(bench: DriverBench) -> str:
     if bench.restart is None:
-        raise Untested("the driver runs already; give its command with --driver")
+        raise Untested("the driver already runs; give its command with --driver")
     before = bench.status.session
     bench.reported.clear()
     bench.restart()

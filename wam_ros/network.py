@@ -101,7 +101,7 @@ def require_name(node: Any, name: str) -> None:
 
 
 def require_places(names: Iterable[str], namespace: str) -> None:
-    """Refuse to start nodes where one of them runs already.
+    """Refuse to start nodes where one of them already runs.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _taken(domain: int, namespace: str, name: str) -> str:
     pid = occupant(domain, namespace, name)
     where = f"in namespace {namespace} of ROS domain {domain}" + (f" (process {pid})" if pid else "")
     return (
-        f"node '{name}' runs already {where}; "
+        f"node '{name}' already runs {where}; "
         "stop it, or take another ROS_DOMAIN_ID, or give the nodes of a second arm a namespace: "
         "wam up --namespace other, for one node -r __ns:=/other"
     )

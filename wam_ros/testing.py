@@ -131,7 +131,7 @@ class RunningArm:
         ParameterError
             where a value is refused, or there is no such node.
         """
-        assert self._composition is None, "the stack of this test runs already; call start first, and once"
+        assert self._composition is None, "the stack of this test already runs; call start first, and once"
         self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
         self.interface = Interface(self.configuration.shared)
         self._composition = Composition(self.configuration, domain_id=self._domain_id)

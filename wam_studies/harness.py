@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from time import monotonic
 from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
 from wam_description.configuration import Configuration
@@ -102,14 +101,12 @@ class Measurement(NamedTuple):
     ----------
     study : with its options.
     records : by seed, in order of their cases.
-    seconds : of this measurement, with what was kept of an earlier one left out.
     date : of its end.
     code : hash of code and configuration.
     """
 
     study: Study[Any, Any]
     records: Mapping[int, Sequence[Any]]
-    seconds: float
     date: str
     code: str
 
@@ -154,11 +151,10 @@ def evaluate(
     report: Report | None = None,
 ) -> Measurement:
     """Run the cases of each seed; the other arguments are those of `wam_sim.batch.results`."""
-    begin = monotonic()
     found = iter(results(study.run, [case for own in cases.values() for case in own], executor, file, report))
     records = {seed: list(islice(found, len(own))) for seed, own in cases.items()}
     code = hashlib.sha256(f"{code_of(study.run)} {study.configuration.text}".encode()).hexdigest()[:12]
-    return Measurement(study, records, monotonic() - begin, f"{datetime.now(UTC):%Y-%m-%d}", code)
+    return Measurement(study, records, f"{datetime.now(UTC):%Y-%m-%d}", code)
 
 
 def load(name: str) -> type[Study[Any, Any]]:

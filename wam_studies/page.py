@@ -44,10 +44,7 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     picture : its path relative to the page, '' for none.
     """
     count = len(measured.total)
-    head = (
-        f"Written by `{command}`: {count} cases on {measured.date}, {measured.seconds:.0f} s, "
-        f"code and configuration `{measured.code}`."
-    )
+    head = f"Written by `{command}`: {count} cases on {measured.date}, code and configuration `{measured.code}`."
     shown = f"![{measured.study.title}]({picture})" if picture else ""
     missed = measured.scores.missed
     verdict = "\n".join(["Missed:", "", *(f"- {one}" for one in missed)]) if missed else "Every required value is met."

@@ -322,7 +322,7 @@ def test_a_place_is_taken_once_and_free_again_when_it_is_closed() -> None:
     assert not occupant(229, "/left", "driver")
     for refuse in (lambda: Place(230, "/left", "driver"), lambda: Place(230, "/left", "driver").close()):
         with pytest.raises(
-            ParameterError, match=rf"runs already in namespace /left of ROS domain 230 \(process {os.getpid()}"
+            ParameterError, match=rf"already runs in namespace /left of ROS domain 230 \(process {os.getpid()}"
         ):
             refuse()
     place.close()
@@ -344,7 +344,7 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     assert ended.value.code == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert (
-        f"node 'velocity_loop' runs already in namespace /wam of ROS domain {domain_id} (process {os.getpid()})" in line
+        f"node 'velocity_loop' already runs in namespace /wam of ROS domain {domain_id} (process {os.getpid()})" in line
     )
     assert "stop it, or take another ROS_DOMAIN_ID" in line
     require_places(["velocity_loop"], "wam")
@@ -353,7 +353,7 @@ def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
 @pytest.mark.parametrize(
     ("name", "more", "text"),
     [
-        ("driver", (), r"node 'driver' runs already in namespace /wam .* \(process \d+\); stop it"),
+        ("driver", (), r"node 'driver' already runs in namespace /wam .* \(process \d+\); stop it"),
         ("driver", ("-r", "__node:=other"), "node 'driver' was renamed 'other'; .* namespace instead: -r __ns:=/other"),
         ("recorder", ("-r", "__node:=other"), "node 'recorder' was renamed 'other'; other nodes and its parameters"),
     ],

@@ -49,7 +49,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--running",
         action="store_true",
-        help="test a driver that runs already, with nodes [driver, velocity_loop] and timing.mode realtime",
+        help="test a driver that already runs, with nodes [driver, velocity_loop] and timing.mode realtime",
     )
     parser.add_argument(
         "--current",
@@ -83,7 +83,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = driver_alone(on_bus(configuration_of(given), given.bus))
     if given.dry_run:
         return _listen(configuration, given.dry_run)
-    print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
+    print(f"driver under test: {configuration.shared.nodes[0]}{', which already runs' if given.running else ''}")
     require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
     counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
     with (

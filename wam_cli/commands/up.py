@@ -25,7 +25,7 @@ from wam_ros.run import die_with_parent
 
 WHERE = {
     ONE: "this process",
-    GROUPED: "processes of inner loop, outer loop and recorder",
+    GROUPED: "processes of driver and velocity loop, recorder, others",
     EACH: "processes of their own",
 }
 
