@@ -42,8 +42,8 @@ def pushing(runs: Runs) -> Result:
     slides = pushed.during(*_sliding(pushed))
     along, lift = float(slides.arm_force[:, 0].mean()), float(slides.arm_force[:, 2].mean())
     rows = [
-        near("press 4 N, true force across", 4.0, _across(run, press), "N", "commanded", BOUNDS.slipped),
-        below("press 4 N, the box moves", _moved(pressed), "m", BOUNDS.still, "friction holds"),
+        near("press 4 N, true force across the link", 4.0, _across(run, press), "N", "commanded", BOUNDS.slipped),
+        below("press 4 N, motion of the box", _moved(pressed), "m", BOUNDS.still, "friction holds"),
         near("horizontal force while it slides, mean", friction * (weight - lift), along, "N", "mu N", BOUNDS.force),
         near(
             "weight carried by the table",
@@ -54,7 +54,7 @@ def pushing(runs: Runs) -> Result:
             0.02,
         ),
         noted("distance pushed", _moved(pushed), "m"),
-        below("aside of the push", np.ptp(pushed.position[:, 1]), "m", 0.01, "straight"),
+        below("motion of the box across the push", np.ptp(pushed.position[:, 1]), "m", 0.01, "straight"),
         *_estimate(run, push),
     ]
     return Result(rows, [_forces(run, press.begin, push.end), _path({"box": pushed}, 0)])
@@ -69,10 +69,10 @@ def sweeping(runs: Runs) -> Result:
     moved = sum(_moved(trace) > BOUNDS.moved for trace in swept.values())
     calm = max(float(np.linalg.norm(trace.velocity[-1])) for trace in swept.values())
     rows = [
-        Comparison("objects that the link takes along", float(len(objects)), float(moved), "", 0.0, "all"),
+        Comparison("objects that move with the link", float(len(objects)), float(moved), "", 0.0, "all"),
         noted("angle about the base over all objects, before", before, "rad"),
-        below("the same, after, of that before", after / before, "", BOUNDS.together, "together"),
-        below("speed of the fastest, after", calm, "m/s", 0.01, "at rest"),
+        below("angle over all objects, after / before", after / before, "", BOUNDS.together, "together"),
+        below("speed of the fastest object, after", calm, "m/s", 0.01, "at rest"),
         noted("largest true force of the arm", _largest(swept), "N"),
         *_estimate(run, sweep),
     ]
@@ -123,9 +123,9 @@ def opening(runs: Runs) -> Result:
             "I a + d w + k phi + friction",
             BOUNDS.closed_form,
         ),
-        below("the same, rms difference", error, "N m", 0.05),
+        below("torque on the hinge while it turns, rms difference", error, "N m", 0.05),
         noted("angle of the door, held", held.angle.mean(), "rad"),
-        below("angle of the door, changes while held", np.ptp(held.angle), "rad", 0.01),
+        below("change of the angle while the door is held", np.ptp(held.angle), "rad", 0.01),
         noted("largest true force of the arm", _largest({"door": open_}), "N"),
         *_estimate(run, step),
     ]
@@ -146,11 +146,11 @@ def following(runs: Runs) -> Result:
     force = run.forces(TRUE).during(follow.begin + 1.0, follow.end).across
     speed = float(np.abs(np.gradient(surface.position[:, 2], surface.time)).max())
     rows = [
-        near("at rest, true force across", 10.0, _across(run, press), "N", "commanded", BOUNDS.force),
-        near("moving, mean", 10.0, force.mean(), "N", "commanded", BOUNDS.force),
-        below("moving, rms error", np.sqrt(np.mean((force - 10.0) ** 2)), "N", 1.0),
-        below("moving, largest error", np.abs(force - 10.0).max(), "N", 2.0),
-        below("time without contact", np.mean(force == 0.0), "of the time", 0.0, "never"),
+        near("at rest, true force across the link", 10.0, _across(run, press), "N", "commanded", BOUNDS.force),
+        near("moving, true force, mean", 10.0, force.mean(), "N", "commanded", BOUNDS.force),
+        below("moving, true force, rms error", np.sqrt(np.mean((force - 10.0) ** 2)), "N", 1.0),
+        below("moving, true force, largest error", np.abs(force - 10.0).max(), "N", 2.0),
+        below("time without contact", np.mean(force == 0.0), "fraction", 0.0, "never"),
         noted("motion of the surface", np.ptp(surface.position[:, 2]), "m"),
         noted("largest speed of the surface", speed, "m/s"),
         *_estimate(run, follow),
@@ -206,7 +206,7 @@ def _across(run: Recording, step: Step) -> float:
 
 
 def _estimate(run: Recording, step: Step) -> list[Comparison]:
-    """The estimate over a step next to the truth: the force across, and the time with the right link."""
+    """The estimate over a step next to the truth: the force across, and the time with the correct link."""
     truth, estimate = run.forces(TRUE).during(step.begin, step.end), run.forces(ESTIMATED)
     at = np.searchsorted(estimate.time, truth.time).clip(0, len(estimate.time) - 1)
     frames = np.array(truth.frames)
@@ -216,8 +216,10 @@ def _estimate(run: Recording, step: Step) -> list[Comparison]:
     right = np.array(estimate.frames)[at][touched] == frames[touched]
     true, estimated = float(truth.across[touched].mean()), float(estimate.across[at][touched].mean())
     return [
-        Comparison(f"{step.name}, estimated force across, mean", true, estimated, "N", NO_CLAIM, "true"),
-        Comparison(f"{step.name}, time with the right link", 1.0, float(np.mean(right)), "of the contact", NO_CLAIM),
+        Comparison(f"{step.name}, estimated force across the link, mean", true, estimated, "N", NO_CLAIM, "true"),
+        Comparison(
+            f"{step.name}, time with the correct link", 1.0, float(np.mean(right)), "fraction of the contact", NO_CLAIM
+        ),
     ]
 
 
