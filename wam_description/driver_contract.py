@@ -68,7 +68,7 @@ REQUIREMENTS: Final = {
         "refuse enable if the last command is older than the watchdog",
     ),
     "current": Requirement(
-        "lets the commanded amperes flow when enabled; motor_currents has A, effort N m",
+        "lets the commanded current flow when enabled; motor_currents is in A, effort in N m",
         "send A in motor_currents and A times arm.motors.torque_constant in the effort",
     ),
     "names": Requirement(
@@ -76,8 +76,8 @@ REQUIREMENTS: Final = {
         "sort the values of a command by its names",
     ),
     "refusals": Requirement(
-        "refuses a whole command with NaN, infinite, missing, unknown or doubled values, and keeps the "
-        "last good one",
+        "refuses the whole command if a value is NaN or infinite, or a motor is missing, unknown or repeated; "
+        "keeps the last good command",
         "check the whole message before any value of it is used",
     ),
     "answers": Requirement(
@@ -89,27 +89,27 @@ REQUIREMENTS: Final = {
         "compare the newest state with the stamp of the last command in every period",
     ),
     "repetition": Requirement(
-        "faults also if all commands answer the same old state",
+        "faults also if new commands have the stamp of the same old state",
         "let the watchdog use the stamp of the command, not only its arrival",
     ),
     "fault": Requirement(
-        "latches a fault: refuses enable and names the fault; reset_fault ends braked",
+        "latches a fault: refuses enable and names the fault; is braked after reset_fault",
         "keep the first reason until reset_fault, which never enables",
     ),
     "disable": Requirement(
-        "stops the current at once and brakes, on enable with false",
+        "on enable with false, stops the current at once and brakes",
         "put on the brakes in the answer itself",
     ),
     "estop": Requirement(
-        "stops the current at once and latches a fault, on estop",
+        "on estop, stops the current at once and latches a fault",
         "put on the brakes in the answer itself",
     ),
     "discard": Requirement(
-        "discards older commands at enable, and sets `since` to the next state",
+        "at enable, discards older commands and sets `since` to the stamp of the next state",
         "set the command to zero at enable, and `since` when the brakes change",
     ),
     "peers": Requirement(
-        "brakes at a fault in the status of another node, and refuses enable as long as it lasts",
+        "brakes at a fault in the status of another node, and refuses enable until that fault ends",
         "read the status of all nodes; brake at level ERROR with a fault, and name both in an event",
     ),
     "claims": Requirement(
@@ -117,15 +117,15 @@ REQUIREMENTS: Final = {
         "count the publishers of the topic in every status period",
     ),
     "agreement": Requirement(
-        "brakes and refuses enable while two nodes publish different `shared parameters`",
+        "brakes and refuses enable while the `shared parameters` of two nodes differ",
         "compare them as text, and with your own node's; two configurations are in use",
     ),
     "end": Requirement(
-        "brakes at SIGTERM, and reports that before it ends",
+        "at SIGTERM, brakes and reports it before the process ends",
         "disable and publish the status before the node is destroyed",
     ),
     "session": Requirement(
-        "is braked after a restart, and has a greater session number",
+        "is braked after a restart, with a greater session number",
         "take the session from the wall clock in ms at the start",
     ),
 }  # fmt: skip

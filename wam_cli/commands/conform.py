@@ -73,7 +73,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="attempts at each row; a busy computer delays a correct driver; default: %(default)s",
     )
     parser.epilog = (
-        "The test releases the brakes several times, and small currents flow. On a real arm, keep its range clear and "
+        "The test enables the driver many times, and small currents flow. On a real arm, keep its range clear and "
         "a hand on the emergency stop."
     )
 

@@ -33,23 +33,24 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ZERO, Contact, ForceCommand, PathPoint, PosturePath, Triple
 
 STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
-    "name": "text; needed",
-    "seconds": "s of the arm's time; needed. With `until_force` the longest time",
-    "posture": "rad, an angle for each joint at the end of the step; the arm arrives a little later",
-    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` may be left out",
+    "name": "text; required",
+    "seconds": "duration, s of the arm's time; required. With `until_force` the longest duration",
+    "posture": "the angle of each joint at the end of the step, rad; the arm arrives a little later",
+    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad and s; `times` is optional",
     "tip": "`[x, y, z]`, m in the base frame; the tool goes there along a straight line",
-    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: N on the world, in `base` or in the "
-    "frame of a link. Optional: `contact_position`, m along the link, is where it acts; `rise`, s, "
-    "is its time to rise",
+    "force": "`{frame, newtons: [x, y, z], contact_position, rise}`: force on the world, N, in `base` or in the "
+    "frame of a link. Optional: `contact_position`, where the force acts, m along the link; `rise`, its rise time, s",
     "task": "`{frame, axes: [...]}`, see [tasks](tasks.md)",
-    "torque": "N m, a torque for each joint",
-    "until_force": "N; the step ends when a contact of this force is detected, and fails without one",
-    "chirp": "`{newtons, from, to}`: a sine along the force, N; its frequency goes from one value to another, Hz",
-    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm. The "
-    "position is in m along the link, the force in its frame. `begin` and `end` are optional, s from "
-    "the start of the step",
+    "torque": "the torque of each joint, N m",
+    "until_force": "force, N; the step ends when a contact with this force is detected, and fails without one",
+    "chirp": "`{newtons, from, to}`: adds a sine to `force`, along it. `newtons` is its amplitude, N; its frequency "
+    "goes from `from` to `to`, Hz",
+    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm on a link "
+    "(`cover`). `contact_position` is in m along the link, `newtons` in the frame of the link. Optional: `begin` and "
+    "`end`, s from the start of the step",
     "request": "`enable` or `disable` at the start of the step",
-    "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: sets live parameters of driver or force_loop at the start of the "
+    "step",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
