@@ -320,7 +320,7 @@ def joints_of_today() -> str:
     strength = [f"{torque:.3g}" for torque in through.largest_joint_torques(today().motors.peak_torque)]
     ranges = [f"{low:g} to {high:g}" for low, high in zip(joints.lower, joints.upper, strict=True)]
     columns = zip(joints.names, degrees, joints.length, joints.offset, ranges, strength, strict=True)
-    head = ["joint", "alpha before it [deg]", "a before it [m]", "d [m]", "range [rad]", "peak torque [N m]"]
+    head = ["joint i", "alpha of i-1 [deg]", "a of i-1 [m]", "d of i [m]", "range [rad]", "peak torque [N m]"]
     return markdown(head, [[name, *map(number, rest)] for name, *rest in columns])
 
 
@@ -334,8 +334,9 @@ def motors_of_today() -> str:
         circuit = today().circuits[i]
         assumed = (motors.static_friction[i], circuit.stiffness)
         rows.append([motor, turns, *(number(values[i]) for values in known), *(f"{value:.3g}" for value in assumed)])
-    head = ["motor", "turns", "drive inertia [kg m²]", "torque constant [N m/A]", "peak torque [N m]",
-            "continuous torque [N m]", "static friction [N m], assumed", "cable [N m/rad], assumed"]  # fmt: skip
+    head = ["motor", "angle of the motor", "drive inertia [kg m²]", "torque constant [N m/A]",
+            "peak torque [N m]", "continuous torque [N m]", "static friction [N m], assumed",
+            "cable stiffness [N m/rad], assumed"]  # fmt: skip
     return markdown(head, rows)
 
 

@@ -429,9 +429,9 @@ def test_a_contact_that_is_seen_for_a_moment_is_missed():
     recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
     summary = recording.summary()
     assert [missed.link for missed in summary.missed] == ["outer_link"]
-    assert "right link: NO (missed)" in verdict(summary)
+    assert "correct link: NO (missed)" in verdict(summary)
     recording.set(recording.estimated, 1.0, 2.6, "outer_link", (0.0, 9.0, 0.0), 0.28)
-    assert "right link: YES" in verdict(recording.summary())
+    assert "correct link: YES" in verdict(recording.summary())
 
 
 def test_without_truth_the_estimate_shows_what_was_too_hard():
@@ -537,7 +537,7 @@ stoppable_report(Path("{bag}"), False, None)
 def test_good_run_has_a_good_verdict():
     summary = Played().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
+        "force within 10 %: YES (5.0 %) | correct link: YES (98 %) | "
         "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
         f"false detections for at most 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
     )
@@ -548,9 +548,9 @@ def test_each_fault_turns_its_own_verdict():
     force.set(force.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
     link.set(link.estimated, 0.52, 1.5, "inner_link", (0.0, 11.0, 0.0))
     position.set(position.estimated, 0.52, 1.5, "outer_link", (0.0, 11.0, 0.0), 0.33)
-    assert "force within 10 %: NO (12.5 %) | right link: YES" in verdict(force.summary())
-    assert "right link: NO (another link)" in verdict(link.summary())
-    assert "right link: YES" in verdict(position.summary())
+    assert "force within 10 %: NO (12.5 %) | correct link: YES" in verdict(force.summary())
+    assert "correct link: NO (another link)" in verdict(link.summary())
+    assert "correct link: YES" in verdict(position.summary())
     assert "position within 4 cm: NO (5.0 cm)" in verdict(position.summary())
 
 
@@ -558,7 +558,7 @@ def test_contact_that_is_missed_is_reported_and_wrong():
     recording = Played()
     recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
     assert "MISSED" in told(recording.bag())
-    assert "right link: NO" in verdict(recording.summary())
+    assert "correct link: NO" in verdict(recording.summary())
     assert "position within 4 cm: NOT EVALUATED" in verdict(recording.summary())
 
 
@@ -665,8 +665,8 @@ def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observ
     content = yaml.safe_dump({"/wam/contact_estimator": {"ros__parameters": own}})
     bag = bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
     summary = AnalysedRecording(bag)
-    assert ("right link: NO (missed)" in verdict(summary)) == sensors
-    assert ("right link: YES" in verdict(summary)) != sensors
+    assert ("correct link: NO (missed)" in verdict(summary)) == sensors
+    assert ("correct link: YES" in verdict(summary)) != sensors
     assert (BLIND in section_of(bag, "contact").sentences) != sensors
 
 
@@ -705,7 +705,7 @@ def test_missing_topic_is_said_and_nothing_is_invented(name):
     if name in RECORDED and name not in ("sim/disturbance", "sim/joint_states"):
         assert any(name in section.lacking for section in sections)
     if name == "sim/contact/wrench":
-        assert "force within 10 %: NOT EVALUATED | right link: NOT EVALUATED" in verdict(summary)
+        assert "force within 10 %: NOT EVALUATED | correct link: NOT EVALUATED" in verdict(summary)
     if name == "contact/wrench":
         assert all(math.isnan(held.estimated_accuracy.bias) for held in summary.held)
 

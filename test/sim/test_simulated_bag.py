@@ -63,8 +63,8 @@ def test_the_demonstration_without_ros_says_so_and_reports(played: tuple[Path, s
     _, out = played
     assert out.count("ROS is not installed") == 1
     assert "pip install 'wam_stack[ros,live]'" in out
-    assert "right link: YES" in out
-    assert out.index("Verdict") < out.index("right link: YES") < out.index("position along the link")
+    assert "correct link: YES" in out
+    assert out.index("Verdict") < out.index("correct link: YES") < out.index("position along the link")
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         away = 100.0 * float(np.median(position)) if len(position) else math.nan
         off = float(np.median(force)) if len(force) else math.nan
         findings += [
-            Finding("contact on the right link", "%", right),
+            Finding("contact on the correct link", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding(
                 "size of the force error, median",
@@ -51,7 +51,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
                 note="norm of the error vector; without forces that are lower bounds",
             ),
         ]
-        shows.append(f"Contacts: right link for {right:.0f} % of the time{_errors(away, off)}.")
+        shows.append(f"Contacts: correct link for {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
         count = len(runs(traces.is_false))
         seconds = float(np.sum(traces.is_false)) * traces.period

@@ -116,9 +116,9 @@ def _command_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
 def _link_verdict(recording: AnalysedRecording) -> VerdictAnswer:
     """Of each true contact; one that is estimated where none is has its own answer."""
     if any(one.lasts for one in recording.missed):
-        return VerdictAnswer("right link", VerdictResult.NO, "missed")
+        return VerdictAnswer("correct link", VerdictResult.NO, "missed")
     right = [one.right for one in recording.touched if one.lasts]
-    answer = _answer("right link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
+    answer = _answer("correct link", [1.0 - part for part in right], 1.0 - TOUCH.lasting, "another link")
     least = f"{100.0 * min(right, default=0.0):.0f} %"
     return answer._replace(worst=least) if answer.result is VerdictResult.YES else answer
 

@@ -118,7 +118,8 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     presses = [math.hypot(*step.force.force) for step in steps if any(step.force.force)]
     pushed = ", ".join(f"{math.hypot(*push.force):g} N on the {push.cover.replace('_', ' ')}" for push in pushes)
     count = f"{len(steps)} step{'s' * (len(steps) != 1)}"
-    print(f"Task {task or script_file(script).stem}: {count}, up to {seconds:g} s of the arm's time")
+    name = f"Task {task}" if task else f"Scenario {script_file(script).stem}"
+    print(f"{name}: {count}, up to {seconds:g} s of the arm's time")
     if pushes:
         print(f"  the simulator pushes the arm: {pushed}; the estimator finds link and position from the torques")
     if presses:
