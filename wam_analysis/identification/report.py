@@ -55,7 +55,16 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)
     lines += plain(
-        [["motor", "motion", "left by the present model", "by the estimate", "held out", "not in the covariance"]],
+        [
+            [
+                "motor",
+                "motion",
+                "unexplained by the present model",
+                "by the identified model",
+                "held out",
+                "not in the covariance",
+            ]
+        ],
         [
             [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in (*parts, found.tracked.left))]
             for i, name in enumerate(shared.arm.motors.names)

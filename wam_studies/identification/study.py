@@ -226,9 +226,10 @@ def _rows(records: Sequence[IdentificationResult]) -> Iterator[Row]:
 def _errors(records: Sequence[IdentificationResult]) -> ScoreTable:
     """Errors by kind of plant, and of all."""
     head = (
-        "plant", "runs", "friction before, rms", "friction, rms", "largest", "error / standard error, rms",
-        "beyond 2 of it", "Coulomb alone, rms", "largest", "its error / standard error, rms",
-        "gravity before, N m", "gravity, N m",
+        "plant", "runs", "friction error before, rms", "friction error, rms", "largest friction error",
+        "error / standard error, rms", "beyond 2 of it", "Coulomb alone, rms", "largest",
+        "its error / standard error, rms",
+        "gravity error before, N m", "gravity error, N m",
     )  # fmt: skip
     kinds = [(kind, [r for r in records if r.kind == kind]) for kind in dict.fromkeys(r.kind for r in records)]
     return ScoreTable("By kind of plant", head, [_cells(*each) for each in [*kinds, ("every plant", list(records))]])
