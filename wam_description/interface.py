@@ -290,6 +290,7 @@ class Interface:
         """The nodes that are the reason why topics do not come, each with what it should have published.
 
         A node that lacks what its step takes is none; those that publish what it lacks are looked at in its place.
+        A topic that no node of the bring-up publishes is that of the node ''.
 
         Parameters
         ----------
@@ -300,6 +301,8 @@ class Interface:
         passed, waiting = set(topics), list(topics)
         while waiting:
             topic = waiting.pop(0)
+            if topic not in _sources() and not self.publishers(topic):
+                found.setdefault("", []).append(topic)
             for name, one in self.declarations.items():
                 reactions = [reaction for reaction in one.reactions if topic in reaction.outputs]
                 taken = {item.topic for reaction in reactions for item in (reaction.trigger, *reaction.inputs)}

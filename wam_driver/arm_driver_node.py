@@ -187,7 +187,8 @@ class ArmDriver(StackNode):
             self._mode = safety.mode
             session.since = self.stamp + self.shared.timing.period_ns
         problem, warnings = self.health.problem, self.warnings
-        message = f"{safety.mode.value}: {safety.fault or problem or '; '.join(warnings)}".removesuffix(": ")
+        reasons = [*dict.fromkeys(filter(None, (safety.fault, problem)))] or warnings
+        message = f"{safety.mode.value}: {'; '.join(reasons)}".removesuffix(": ")
         reported = (message, self.health.is_ready, session.number, session.since, self.is_paused)
         if reported == self._reported:
             return

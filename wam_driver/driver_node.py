@@ -111,8 +111,8 @@ class DriverNode(ArmDriver):
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """What a person should know, though the arm may move."""
-        return tuple(self.driver.warnings)
+        """What a person should know: what time does not begin without, else what is near a limit."""
+        return (self.unready,) if self.time.start_overdue else tuple(self.driver.warnings)
 
     @property
     def lateness(self) -> str:  # type: ignore[override]
@@ -160,7 +160,7 @@ class DriverNode(ArmDriver):
         assert isinstance(self.time, Lockstep)
         self.time.watch()
         if self.time.start_overdue:
-            self.get_logger().warning(f"waiting for {self.awaited} to be ready", throttle_duration_sec=5.0)
+            self.announce()
 
     # what comes in and goes out
 

@@ -16,7 +16,10 @@ from wam_driver.thresholds import DRIVER
 def unpublished(found: Mapping[str, Sequence[str]]) -> str:
     """What to do about nodes that run and do not answer, each with the topics that it did not publish."""
     node, topics = next(iter(found.items()))
-    return f"{node} runs, but did not publish {' and '.join(topics)}: let each of its steps return that"
+    which = " and ".join(topics)
+    if not node:
+        return f"list a node in 'nodes' that publishes {which}"
+    return f"{node} runs, but did not publish {which}: let each of its steps return that"
 
 
 class Lockstep:
@@ -140,8 +143,9 @@ class Lockstep:
         if silent := ", ".join(self._session.silent):
             return f"{silent} has stopped or is very slow, start it again"
         found = self._interface.unanswered(missing, self._session.awaited)
-        if not found or found.keys() - self._session.awaited.keys():
-            return f"check that {' and '.join(self._senders[topic] for topic in missing)} runs"
+        unknown = sorted(found.keys() - self._session.awaited.keys() - {""})
+        if unknown or not found:
+            return f"check that {' and '.join(unknown or [self._senders[topic] for topic in missing])} runs"
         return unpublished(found)
 
     @property

@@ -117,9 +117,14 @@ class Health:
         """Publish that this node is inside a long step, which holds up those of its process; from another thread."""
         self._send(self._with(self.status, {BUSY: str(step), HELD_UP: " ".join(STEPS.nodes)}))
 
-    def follow(self, session: int, awaited: Collection[str]) -> None:
-        """Report that this node follows another session of the driver, and which topics it lacks for its next step."""
-        facts = {AWAITED: " ".join(awaited)} if self.session else {}  # at the start nobody asks
+    def follow(self, session: int, awaited: Collection[str] | None) -> None:
+        """Report that this node follows another session of the driver.
+
+        Parameters
+        ----------
+        awaited : topics that it lacks for its next step; None for a node that has not been there before.
+        """
+        facts = {} if awaited is None or not self.session else {AWAITED: " ".join(awaited)}  # at the start nobody asks
         self.session = session
         if self.is_ready:
             plain = self._plain

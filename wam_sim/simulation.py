@@ -255,7 +255,7 @@ class Simulation:
             for name, found in self._synchronisers.items()
         }
         found = self._interface.unanswered(topics, awaited)
-        return unpublished(found) if found else f"list a node in 'nodes' that publishes {' and '.join(topics)}"
+        return unpublished(found)
 
     def _report(self) -> None:
         """Report a new mode or fault of the driver to every node that takes status."""

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
 from ros_network import Network
 from test_loss import Stack
-from test_nodes import SIX, WAM, changed, make
+from test_nodes import MS, SIX, WAM, changed, make
 
 from wam_description.agreement import DIGESTS, OF_ONE_PROCESS, digests, disagreement, live_facts, with_facts
 from wam_description.arm import Servo, Shared
@@ -23,6 +23,7 @@ OWN = digests(WAM.shared)
 SERVO = WAM.shared.servo
 SOFT = [0.1 * gain for gain in SERVO.proportional_gain]  # the guard of the force loop does not accept it
 HEAVY = {"arm.payload": 1.5}
+FEWER = {"nodes": [name for name in SIX if name != "gravity"]}
 MANY = {"arm.payload": 1.5, "ages.command": 0.3, "motion.speed": 0.3, "motion.jerk": 9.0, "timing.dither_cycle": 8}
 
 
@@ -101,19 +102,28 @@ def test_live_values_in_a_status_that_cannot_be_are_refused(text: str) -> None:
 class Apart(Stack):
     """The six nodes in this process, some of them started with other values; nobody has enabled the arm."""
 
-    def __init__(self, ros: Network, folder: Path, others: dict[str, dict[str, Any]]) -> None:
+    def __init__(self, ros: Network, folder: Path, others: dict[str, dict[str, Any]], **values: Any) -> None:
         self.ros, self.folder = ros, folder
-        self.values = {"timing__mode": "lockstep", "timing__real_time_factor": 0.0}
+        self.values = {"timing__mode": "lockstep", "timing__real_time_factor": 0.0, **values}
         self.nodes = {name: self.made(name, **others.get(name, {})) for name in SIX}
 
     def made(self, name: str, **other: Any) -> Any:
         """A node with other values than the rest."""
-        return make(self.ros, self.folder, name, "/wam", changed(SIX, **self.values, **other))
+        return make(self.ros, self.folder, name, "/wam", changed(**{"nodes": SIX, **self.values, **other}))
 
-    def restart(self, name: str) -> None:
-        """End a node and start it with the values of the rest."""
-        self.ros.remove(self.nodes[name])
-        self.nodes[name] = self.made(name)
+    def end(self, name: str) -> None:
+        """End a node, and wait until the arm's time is at rest without it."""
+        self.ros.remove(self.nodes.pop(name))
+        seen: list[int] = []
+        while seen[-20:] != [self.driver.stamp] * 20:
+            seen.append(self.driver.stamp)
+            self.ros.executor.spin_once(timeout_sec=0.01)
+
+    def restart(self, name: str, **other: Any) -> None:
+        """End a node and start it with the values of the rest, but for some."""
+        if name in self.nodes:
+            self.ros.remove(self.nodes.pop(name))
+        self.nodes[name] = self.made(name, **other)
 
     def refusal(self) -> str:
         """Why the driver refuses to release the brakes, once all nodes are connected, also after a fault."""
@@ -154,15 +164,36 @@ def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_unt
     stack.enable()
 
 
-def test_a_node_that_the_driver_does_not_list_is_compared_too(ros: Network, tmp_path: Path) -> None:
-    stack = Apart(ros, tmp_path, {})
-    ros.remove(stack.nodes["driver"])
-    fewer = changed([name for name in SIX if name != "gravity"], **stack.values)
-    stack.nodes["driver"] = make(ros, tmp_path, "driver", "/wam", fewer)
-    ros.remove(stack.nodes["gravity"])
-    stack.nodes["gravity"] = stack.made("gravity", **HEAVY)
-    ros.wait(lambda: stack.nodes["driver"].health.problem, what="the status of gravity")
-    assert "gravity was started with another arm.payload than the driver" in stack.refusal()
+NO, GRAVITY = None, "gravity was started with another "
+RESTARTS = {
+    "a node that differs": ([("gravity", NO), ("gravity", HEAVY)], f"{GRAVITY}arm.payload than"),
+    "a node with other periods": (
+        [("gravity", NO), ("gravity", {"timing.outer_divisor": 10})], f"{GRAVITY}timing.outer_divisor than",
+    ),
+    "a node of the inner loop": ([("velocity_loop", NO), ("velocity_loop", {})], "check that velocity_loop runs"),
+    "a node that missed the state": ([("gravity", NO), ("gravity", {})], "check that gravity runs"),
+    "a driver without the node": ([("gravity", HEAVY), ("gravity", NO), ("driver", {})], "not connected yet: gravity"),
+    "a driver that does not list the node": (
+        [("gravity", HEAVY), ("gravity", NO), ("driver", FEWER)], "list a node in 'nodes' that publishes gravity_effort",
+    ),
+    "a node that differs and is not listed": ([("driver", FEWER), ("gravity", HEAVY)], f"{GRAVITY}arm.payload than"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("restarts", "reason"), RESTARTS.values(), ids=RESTARTS)
+def test_after_restarts_the_driver_names_the_reason_and_the_time_goes_on_when_it_is_gone(
+    restarts: list[tuple[str, dict[str, Any] | None]], reason: str, ros: Network, tmp_path: Path
+) -> None:
+    stack = Apart(ros, tmp_path, {}, timing__timeout=2.0)
+    ros.wait(lambda: stack.driver.stamp > 20 * MS, what="lockstep")
+    for name, other in restarts:
+        if other is None:
+            stack.end(name)
+        else:
+            stack.restart(name, **other)
+    ros.wait(lambda: reason in stack.nodes["driver"].health.status.message, 30.0, reason)
+    stack.restart("gravity")
+    stack.enable()
 
 
 def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: Network, tmp_path: Path) -> None:
