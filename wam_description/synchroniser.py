@@ -337,11 +337,10 @@ class Synchroniser:
 
     def awaited(self, now: int) -> list[str]:
         """Topics without which no step has been made for the state of this time, ns; none where it has been made."""
-        is_followed = self._announced is None  # else all that came is of the session before
-        if self._triggers and is_followed:
+        if self._triggers and self._last <= now:
             return self.missing(self._triggers[0][0])
         due = self._timing.outer_stamp(now) if self._outer else now
-        return [self._trigger] if self._last < due or not is_followed else []
+        return [] if due <= self._last <= now else [self._trigger]  # what came after `now` is of an earlier session
 
     def ages(self) -> dict[str, float]:
         """How old the inputs are that no step waits for and that have come, as parts of their limits, by topic."""

@@ -29,7 +29,10 @@ class Realtime:
     Attributes
     ----------
     command_came : when the last command came, on that clock.
+    start_overdue : never: this time begins at once.
     """
+
+    start_overdue = False
 
     def __init__(
         self,
