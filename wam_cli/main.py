@@ -76,6 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     def interrupt(number: int, frame: object) -> None:
         received.append(number)
+        ignore_signals()  # another one would interrupt the clean-up, with locks that nobody releases then
         raise KeyboardInterrupt
 
     # a signal raises an exception, so that the command cleans up; commands that run nodes handle signals themselves

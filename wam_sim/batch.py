@@ -11,9 +11,10 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from wam_sim.pieces import FinishedPieces, key_of
@@ -21,7 +22,6 @@ from wam_sim.pieces import FinishedPieces, key_of
 Input = TypeVar("Input")
 Output = TypeVar("Output")
 Report = Callable[[int, int], None]
-_POLL = 0.2  # s, between two checks for Ctrl-C
 
 
 class PieceError(ValueError):
@@ -63,18 +63,20 @@ def results(
             found[i] = kept[0]
     progress(len(found), len(inputs))
     pending: dict[Future[Output], int] = {}
+    # not `wait`: it locks all that is pending, and a Ctrl-C in it would leave the locks to the thread that ends the pool
+    done = SimpleQueue[Future[Output]]()
     try:
         for i, given in enumerate(inputs):
             if i not in found:
-                pending[executor.submit(function, given)] = i
+                future = executor.submit(function, given)
+                pending[future] = i
+                future.add_done_callback(done.put)
         while pending:
-            done, _ = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED)
-            for future in done:
-                i = pending.pop(future)
-                found[i] = _result(future, inputs[i])
-                if pieces is not None:
-                    pieces.add(keys[i], found[i])
-                progress(len(found), len(inputs))
+            i = pending.pop(future := done.get())
+            found[i] = _result(future, inputs[i])
+            if pieces is not None:
+                pieces.add(keys[i], found[i])
+            progress(len(found), len(inputs))
     finally:
         for future in pending:
             future.cancel()

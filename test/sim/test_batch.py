@@ -214,7 +214,7 @@ def piece(n):
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
     with batch.processes(2) as executor:
-        batch.results(piece, range(2), executor, Path("kept.jsonl"), lambda done, of: Path(f"report.{done}").touch())
+        batch.results(piece, range(1000), executor, Path("kept.jsonl"), lambda done, of: Path(f"report.{done}").touch())
 """
 
 
