@@ -7,7 +7,6 @@ from contextlib import suppress
 from functools import cache
 from typing import Any, Final, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -21,13 +20,13 @@ from wam_description.signals import NodeStatus
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
 from wam_ros.limits import CALL_LIMITS
-from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.messages import Refused, message_type
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import Request, refusal_of, service_request
 from wam_ros.run import Closing, Connection
 from wam_ros.tolerance import LeavingNode
 from wam_ros.topics import NAMESPACE, listening, qos
-from wam_ros.wire import decoder, deserialized, encoder, stamp_of
+from wam_ros.wire import decoder, encoder, stamp_of, status_of
 
 MODE: Final = "timing.mode"  # a shared parameter, which every node of the stack has
 START: Final = "start the stack with 'wam up'"
@@ -223,7 +222,7 @@ class StackClient(Closing):
 
     def _hear(self, data: bytes) -> None:
         try:
-            status = read_status(deserialized(data, DiagnosticStatus, STATUS))
+            status = status_of(data)
         except Refused:
             return
         self.statuses[status.node] = status

@@ -12,14 +12,14 @@ from wam_description.wiring import Declaration
 from wam_ros.health import Health, problem_of
 from wam_ros.inlets import Inlets
 from wam_ros.long_steps import STEPS
-from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.messages import Refused
 from wam_ros.network import Place, require_name
 from wam_ros.outlets import Outlets
 from wam_ros.parameters import declare
 from wam_ros.priority import PRIORITY, set_priority
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DIAGNOSTICS
-from wam_ros.wire import deserialized
+from wam_ros.wire import status_of
 
 
 class Peers:
@@ -97,7 +97,6 @@ class StackNode(TolerantNode):
         self.health = Health(self, self.outlets, self.shared)
         self.inlets = Inlets(self, self.interface, self.shared, self.health, self.outlets.bus)
         self.peers = Peers(set(self.interface.names) - {declaration.name})
-        self._status_type = message_type(topics[STATUS])
         self.inlets.listen(STATUS, self._hear)
         self._readiness = self.create_timer(0.02, self._look_for_peers)
 
@@ -127,7 +126,7 @@ class StackNode(TolerantNode):
 
     def _hear(self, data: bytes) -> None:
         try:
-            status = read_status(deserialized(data, self._status_type, STATUS))
+            status = status_of(data)
         except Refused as reason:
             self.health.refuse(STATUS, str(reason))
             return

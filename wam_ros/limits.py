@@ -23,6 +23,8 @@ class NodeLimits:
     trajectory_points: int = 500
     table_rows: int = 256  # of a table that is taken; more than any node publishes, read in 1 ms
     message_size: int = 262_144  # bytes; a trajectory of a 7-joint arm with all its arrays has half of it
+    # bytes, which the six nodes of a process read in 15 ms; one of ours with ten long refusals has half of it
+    status_size: int = 16_384
     requested_parameters: int = 500  # in one request; a node has half as many
     reason_length: int = 400  # characters; a message may hold a name of any length
     turn: int = 16  # messages handed on in one turn, about two inner periods; then timers and services have theirs

@@ -232,7 +232,7 @@ class AdaptedNode(StackNode):
                     synchroniser.follow(status.stamp)
                 self.inlets.restart()
                 awaited = {topic for one in self._synchronisers for topic in one.awaited(status.stamp)}
-                is_new = not self._worked and status.stamp > self.shared.timing.period_ns  # what came before it, it lacks
+                is_new = not self._worked and status.stamp > self.shared.timing.period_ns  # it lacks what came before
                 self.health.follow(status.session, None if is_new else sorted(awaited))
             if status.since != self._since:
                 self._since = status.since

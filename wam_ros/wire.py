@@ -11,6 +11,7 @@ from functools import partial
 from itertools import product
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_bag import value_messages
@@ -18,12 +19,12 @@ from wam_bag.cdr import first_stamp
 from wam_bag.value_messages import Encode, joint_states, points, tables, wrenches
 from wam_description.arm import Arm, Shared
 from wam_description.defects import defect_finder, frames, owners
-from wam_description.signals import Point, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, TABLE, TRAJECTORY, WRENCH, Topic
+from wam_description.signals import NodeStatus, Point, State, Table, Wrench
+from wam_description.topics import JOINT_STATE, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
 from wam_description.wiring import mask
 from wam_ros.limits import NODE_LIMITS
 from wam_ros.markers import contact_markers
-from wam_ros.messages import Refused, message_type, most_rows, reader
+from wam_ros.messages import Refused, message_type, most_rows, read_status, reader
 
 _STAMP_END = 12  # bytes to the end of the stamp of a message with a header
 
@@ -83,16 +84,27 @@ def decoder(topic: Topic, shared: Shared, arrays: str) -> Decode:
     return decode
 
 
-def deserialized(data: bytes, kind: Any, name: str) -> Any:
-    """A message of a type from its bytes.
+def status_of(data: bytes) -> NodeStatus:
+    """The status of a node from its bytes.
+
+    Raises
+    ------
+    Refused
+        as `deserialized`.
+    """
+    return read_status(deserialized(data, DiagnosticStatus, STATUS, NODE_LIMITS.status_size))
+
+
+def deserialized(data: bytes, kind: Any, name: str, most: int = NODE_LIMITS.message_size) -> Any:
+    """A message of a type from its bytes, of which it may have so many.
 
     Raises
     ------
     Refused
         for too many bytes, which would take too long, and for bytes that are no such message.
     """
-    if len(data) > NODE_LIMITS.message_size:
-        raise Refused(f"{len(data)} bytes of {name}; send at most {NODE_LIMITS.message_size}")
+    if len(data) > most:
+        raise Refused(f"{len(data)} bytes of {name}; send at most {most}")
     try:
         return deserialize_message(data, kind)
     except Exception as error:  # rclpy raises its own kinds for bytes that are no such message

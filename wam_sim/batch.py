@@ -63,7 +63,7 @@ def results(
             found[i] = kept[0]
     progress(len(found), len(inputs))
     pending: dict[Future[Output], int] = {}
-    # not `wait`: it locks all that is pending, and a Ctrl-C in it would leave the locks to the thread that ends the pool
+    # `wait` locks all that is pending: a Ctrl-C in it would leave the locks to the thread that ends the pool
     done = SimpleQueue[Future[Output]]()
     try:
         for i, given in enumerate(inputs):

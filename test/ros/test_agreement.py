@@ -174,7 +174,8 @@ RESTARTS = {
     "a node that missed the state": ([("gravity", NO), ("gravity", {})], "check that gravity runs"),
     "a driver without the node": ([("gravity", HEAVY), ("gravity", NO), ("driver", {})], "not connected yet: gravity"),
     "a driver that does not list the node": (
-        [("gravity", HEAVY), ("gravity", NO), ("driver", FEWER)], "list a node in 'nodes' that publishes gravity_effort",
+        [("gravity", HEAVY), ("gravity", NO), ("driver", FEWER)],
+        "list a node in 'nodes' that publishes gravity_effort",
     ),
     "a node that differs and is not listed": ([("driver", FEWER), ("gravity", HEAVY)], f"{GRAVITY}arm.payload than"),
 }  # fmt: skip
