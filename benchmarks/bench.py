@@ -24,6 +24,8 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_analysis.table import plain
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -63,23 +65,6 @@ class Benchmark(NamedTuple):
     rounds: int
 
 
-class Quartiles(NamedTuple):
-    """Median and quartiles of some rounds."""
-
-    median: float
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        return f"{self.median:.3g} ({self.low:.3g}..{self.high:.3g})"
-
-
-def quartiles(values: Sequence[float]) -> Quartiles:
-    """Median and quartiles of the rounds."""
-    low, median, high = statistics.quantiles(values, n=4, method="inclusive") if len(values) > 1 else [values[0]] * 3
-    return Quartiles(median, low, high)
-
-
 def mark(value: float, row: Row) -> str:
     """Which of its two limits a row reaches."""
     if math.isnan(row.must):
@@ -108,9 +93,11 @@ def run(name: str, benchmark: Benchmark, rounds: int, quick: bool) -> None:
     for row in benchmark.rows:
         values = [one[row.name] for one in found]
         references = [one.get(row.reference, 1.0) for one in found]
-        kept[row.name] = ratio = quartiles([a / b for a, b in zip(values, references, strict=True)])
-        middle = [f"{quartiles(part).median:.4g}" if row.reference else "" for part in (values, references)]
-        lines.append([row.name, *middle, row.reference, str(ratio), mark(ratio.median, row)])
+        ratios = [a / b for a, b in zip(values, references, strict=True)]
+        low, median, high = np.quantile(ratios, (0.25, 0.5, 0.75)).tolist()
+        kept[row.name] = median, low, high
+        middle = [f"{statistics.median(part):.4g}" if row.reference else "" for part in (values, references)]
+        lines.append([row.name, *middle, row.reference, f"{median:.3g} ({low:.3g}..{high:.3g})", mark(median, row)])
     head = [benchmark.title, "measured", "reference", "that is", "ratio, or value (middle half)", "[must, aim]"]
     print(f"== {name}\n{machine()}")
     print("\n".join(plain([head], lines, left=(0, 3, 5))), flush=True)

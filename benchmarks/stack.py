@@ -10,12 +10,13 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from statistics import median
+from typing import Any
 
 import mujoco
 import numpy as np
 import yaml
-from bench import Benchmark, Measured, Row, quartiles
+from bench import Benchmark, Measured, Row
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -44,8 +45,6 @@ from wam_ros.topics import qos, stamp_of
 from wam_ros.wire import stamp_of as stamp_in
 from wam_sim.simulation import Simulation
 
-STEADY = ClockType.STEADY_TIME
-POLL = 0.02  # s between two readings of the arm's time
 Readings = list[tuple[float, int]]  # wall clock in s, the arm's time in ns
 
 
@@ -103,14 +102,12 @@ def lockstep(configuration: Configuration, *recorder: str) -> float:
     with Composition(configuration.with_values(nodes)) as composition:
         driver: Any = composition.nodes["driver"]
         player: Any = composition.nodes["scenario"]
-        watch = Node("stopwatch", context=composition.context)
-        watch.create_timer(
-            POLL, lambda: seen.append((time.perf_counter(), driver.driver.stamp)), clock=Clock(clock_type=STEADY)
-        )
-        composition.executor.add_node(watch)
-        composition.spin(lambda: player.done)
-        composition.executor.remove_node(watch)
-        watch.destroy_node()
+
+        def ended() -> bool:
+            seen.append((time.perf_counter(), driver.driver.stamp))
+            return player.done
+
+        composition.spin(ended)
         if player.failure:
             raise SystemExit(player.failure)
     return seen_speed(seen)
@@ -302,7 +299,7 @@ def measure_stack(way: str, length: float) -> tuple[float, float]:
         listener = connection.add(Node("listener", context=connection.context))
         listener.create_subscription(DiagnosticArray, "/diagnostics", take, qos(BY_NAME["/diagnostics"]))
         connection.spin(lambda: len(reports) >= max(1, round(length)))
-    return tuple(1e-6 * quartiles([report[i] for report in reports]).median for i in (0, 1))
+    return tuple(1e-6 * median(report[i] for report in reports) for i in (0, 1))
 
 
 def round_trip(quick: bool) -> Measured:
@@ -340,19 +337,7 @@ ROUND_TRIP = Benchmark(
 # real time
 
 LONGEST = 1200.0  # s, for one demonstration
-SHORT = [
-    {"name": "release", "seconds": 0.5, "request": "enable"},
-    {"name": "move", "seconds": 1.5, "posture": [0.0, -0.8, 0.0, 0.3]},
-    {"name": "brake", "seconds": 0.5, "request": "disable"},
-]
-
-
-class Run(NamedTuple):
-    """One demonstration: when it began, s since 1970, whether it passed and printed its result, its bag."""
-
-    begin: float
-    passed: bool
-    bag: Path
+SHORT = 3.0  # s, of another one
 
 
 @contextmanager
@@ -367,8 +352,8 @@ def busy_loops(count: int) -> Iterator[None]:
             loop.wait()
 
 
-def demonstration(folder: Path, name: str, options: list[str]) -> Run:
-    """Run `wam demo` in a process of its own."""
+def demonstration(folder: Path, name: str, options: list[str]) -> tuple[float, bool]:
+    """Run `wam demo` in a process of its own: when it began, s since 1970, whether it passed and printed its result."""
     begin = time.time()
     done = subprocess.run(
         [sys.executable, "-P", "-m", "wam_cli.main", "demo", "--name", name, *options],
@@ -381,12 +366,12 @@ def demonstration(folder: Path, name: str, options: list[str]) -> Run:
     passed = "Result of the steps" in done.stdout and "the demonstration failed" not in done.stdout
     if not passed:  # a force that is off by more than a tenth is no failure here, but has an exit code, too
         print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
-    return Run(begin, passed, folder / "bags" / name)
+    return begin, passed
 
 
 def short_form(folder: Path) -> list[str]:
     """Options of a demonstration of some seconds, without a page in the browser, and polite to other programs."""
-    (folder / "short.yaml").write_text(yaml.safe_dump({"steps": SHORT}), encoding="utf-8")
+    (folder / "short.yaml").write_text(yaml.safe_dump(scenario(SHORT)), encoding="utf-8")
     polite, script = {"fifo_priority": 0, "niceness": 0}, str(folder / "short.yaml")
     values = {"/**": {"timing": polite}, "/**/scenario": {"script": script}}
     sections = {name: {"ros__parameters": value} for name, value in values.items()}
@@ -397,9 +382,9 @@ def short_form(folder: Path) -> list[str]:
 MOVED = 1e-3  # rad, of a joint since the first message
 
 
-def kept(run: Run) -> float:
-    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended."""
-    last = AnalysedRecording(read(run.bag)).loop[-1]
+def kept(bag: Path) -> float:
+    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has braked or ended."""
+    last = AnalysedRecording(read(bag)).loop[-1]
     missed, periods = (float(last.get(name, 0)) for name in ("missed periods", "periods"))
     return 100.0 * (1.0 - missed / periods) if periods else 0.0
 
@@ -410,19 +395,16 @@ def first_motion(folder: Path, name: str, options: list[str]) -> float:
         playing = pool.submit(demonstration, folder, name, options)
         while not playing.done():
             executor.spin_once(timeout_sec=0.05)
-    run = playing.result()
-    states = read(run.bag, topics=["/wam/joint_states"]).topics["/wam/joint_states"]
+    begin, _ = playing.result()
+    states = read(folder / "bags" / name, topics=["/wam/joint_states"]).topics["/wam/joint_states"]
     assert isinstance(states, JointColumns)
     moved = np.abs(states.position - states.position[0]).max(axis=1) > MOVED
     stamp = int(states.stamp_ns[int(np.argmax(moved))])
-    return next(at for at, shown in seen if shown >= stamp) - run.begin
+    return next(at for at, shown in seen if shown >= stamp) - begin
 
 
-KEPT, KEPT_LOADED, START = (
-    "periods kept, no other load [%]",
-    "periods kept, 4 busy loops [%]",
-    "wam demo to first motion [s]",
-)
+KEPT, KEPT_LOADED = "periods kept, no other load [%]", "periods kept, 4 busy loops [%]"
+START = "wam demo to first motion [s]"
 BRAKED = "braked next to busy loops"
 
 
@@ -435,11 +417,11 @@ def real_time(quick: bool) -> Measured:
             found, turn = {}, time.monotonic_ns()
             for row, loops in ((KEPT, 0), (KEPT_LOADED, 1 if quick else 4)):
                 with busy_loops(loops):
-                    run = demonstration(folder, f"{loops}_{turn}", [*(short if quick else []), "--realtime"])
-                found[row] = kept(run)  # the periods of one that a late node has braked count, too
+                    _, passed = demonstration(folder, f"{loops}_{turn}", [*(short if quick else []), "--realtime"])
+                found[row] = kept(folder / "bags" / f"{loops}_{turn}")
             yield {
                 **found,
-                BRAKED: float(not run.passed),
+                BRAKED: float(not passed),
                 START: first_motion(folder, f"start_{turn}", short),
             }
 

@@ -33,8 +33,6 @@ OUTSIDE = {
 }
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("wam_*/__init__.py"))
 LINK = re.compile(r"\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)]*)?\)")
-# of a toctree: pages that other work brings appear by themselves
-GLOB = re.compile(r"^([\w/*-]*\*[\w/*-]*)\n", re.MULTILINE)
 
 project = "wam_stack"
 author = "wam_stack maintainers"
@@ -79,7 +77,6 @@ def text_of(app: Sphinx, docname: str, source: list[str]) -> None:
     if not page.is_file():
         return
     text = page.read_text(encoding="utf-8") if outside else source[0]
-    text = GLOB.sub(lambda found: found[0] if any(HERE.glob(f"{found[1]}.*")) else "", text)
     source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
 
 

@@ -50,7 +50,7 @@ from wam_studies.thesis import claims
 from wam_studies.thesis.definition import load, tasks
 from wam_studies.thesis.evaluation import evaluate
 from wam_studies.thesis.rows import markdown as rows_of_a_result
-from wam_theory.equations import EQUATIONS, Equation
+from wam_theory.equations import EQUATIONS
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -209,21 +209,14 @@ def names_in(function: ast.FunctionDef) -> set[str]:
 
 def equations() -> str:
     """Every numbered equation: section, content, functions and a test of them; a star marks a correction."""
-    citing_, using = citing(), tests_by_function()
-    head = ["", "section", "content", "function", "test"]
-    return markdown(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
-
-
-def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequence[str]]) -> list[str]:
-    """One equation with the first of its tests."""
-    tests = [test for name in names for test in using.get(name.split(".")[1], [])]
-    return [
-        f"({row.number}){'*' * bool(row.correction)}",
-        row.section,
-        row.content,
-        row.reason or ", ".join(f"`{name}`" for name in names),
-        f"`{tests[0].partition('.')[2]}`" if tests else "",
-    ]
+    citing_, using, rows = citing(), tests_by_function(), []
+    for row in EQUATIONS:
+        names = citing_.get(row.number, [])
+        tests = [test for name in names for test in using.get(name.split(".")[1], [])]
+        shown = row.reason or ", ".join(f"`{name}`" for name in names)
+        number_ = f"({row.number}){'*' * bool(row.correction)}"
+        rows.append([number_, row.section, row.content, shown, f"`{tests[0].partition('.')[2]}`" if tests else ""])
+    return markdown(["", "section", "content", "function", "test"], rows)
 
 
 # pages
@@ -256,7 +249,9 @@ def blocks() -> dict[str, Callable[[], str]]:
         "topics": lambda: topics(configuration),
         "parameters": lambda: parameters(configuration),
         "steps": lambda: steps(configuration),
-        "driver contract": driver_contract,
+        "driver contract": lambda: markdown(
+            ["row", "a driver"], [[f"`{key}`", row.text] for key, row in REQUIREMENTS.items()]
+        ),
         "plant": lambda: effects.table(plant_study()),
         "steps of a scenario": lambda: markdown(
             ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
@@ -356,11 +351,6 @@ def draw_tasks() -> None:
         print(f"docs/tasks/{name}.png", flush=True)
 
 
-def driver_contract() -> str:
-    """The rows that `wam conform` tests."""
-    return markdown(["row", "a driver"], [[f"`{key}`", row.text] for key, row in REQUIREMENTS.items()])
-
-
 def dither(configuration: Configuration) -> str:
     """Cost of the dither."""
     shared = configuration.with_values({"timing.dither_cycle": DITHER_CYCLE}).shared
@@ -373,11 +363,6 @@ def dither(configuration: Configuration) -> str:
         ["heat of the hottest winding, of its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
     ]
     return markdown(["the dither", ""], rows)
-
-
-def measure_forces() -> None:
-    """Press with a nearly straight elbow, and keep the table."""
-    (ROOT / "docs" / "elbow.txt").write_text(elbow_table(Configuration.load(CONFIGURATION)), encoding="utf-8")
 
 
 def filled(text: str) -> str:
@@ -464,7 +449,7 @@ def main() -> None:
         DRAWN[given.only]()
         return
     if not given.pages:
-        measure_forces()
+        (ROOT / "docs" / "elbow.txt").write_text(elbow_table(Configuration.load(CONFIGURATION)), encoding="utf-8")
         for draw in DRAWN.values():
             draw()
     for path, text in pages().items():  # last: they have numbers of the demonstration

@@ -24,7 +24,7 @@ from wam_description.signals import Contact
 SIZE, DPI = (6.4, 6.4), 110
 FRAMES_PER_SECOND, SPEED = 8, 1.5
 LARGEST = 1_000_000  # bytes
-QUALITIES = (70, 55, 40, 25)
+QUALITY = 70
 
 
 def frames(recording: AnalysedRecording, recorded: RecordedArm, joints: JointColumns) -> list[Image.Image]:
@@ -84,9 +84,7 @@ def save(bag: Path, file: Path) -> None:
     joints = recording.run.joints("sim/joint_states")
     assert joints is not None, f"{bag} has no sim/joint_states"
     first, *others = frames(recording, recorded_arm(recording.parameters), joints)
-    for quality in QUALITIES:
-        duration = round(1000 / FRAMES_PER_SECOND)
-        first.save(file, save_all=True, append_images=others, duration=duration, loop=0, quality=quality, method=4)
-        if file.stat().st_size < LARGEST:
-            return
-    raise SystemExit(f"{file} has {file.stat().st_size} bytes, more than {LARGEST}")
+    duration = round(1000 / FRAMES_PER_SECOND)
+    first.save(file, save_all=True, append_images=others, duration=duration, loop=0, quality=QUALITY, method=4)
+    if file.stat().st_size > LARGEST:
+        raise SystemExit(f"{file} has {file.stat().st_size} bytes, more than {LARGEST}: lower QUALITY")

@@ -6,7 +6,6 @@ Each code cell is run as Jupyter would, in the folder of the notebook: what it p
 then its figures.
 """
 
-import argparse
 import ast
 import base64
 import contextlib
@@ -94,10 +93,7 @@ def read(file: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Run notebooks in their own folders, as Jupyter does, and keep their outputs."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("notebooks", nargs="+", type=Path)
-    files = [file.resolve() for file in parser.parse_args().notebooks]
-    for file in files:
+    for file in [Path(name).resolve() for name in sys.argv[1:]]:
         os.chdir(file.parent)
         file.write_text(json.dumps(run(read(file)), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         print(file.relative_to(ROOT))
