@@ -1,4 +1,4 @@
-"""Arms that the plant is tested with, built from parameters alone."""
+"""The packaged arm, and arms that the plant is tested with, built from parameters alone."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -10,11 +10,14 @@ from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parts import Joints, Links, Motors
+from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
-WAM = CONFIGURATION.shared.arm
+SHARED = CONFIGURATION.shared
+WAM = SHARED.arm
+BODY = RigidBody(WAM)
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 FRICTIONS = ("static_friction", "dynamic_friction", "viscous_friction")
 

@@ -1,6 +1,5 @@
 """From motion to the controllers' model: planted values are found, and what is stated about them is true."""
 
-import dataclasses
 import math
 import re
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, NOWHERE, WAM, changed
+from arms import CONFIGURATION, SHARED, WAM
 from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin, Writer
 from sample_messages import STORE, joint_state, wrench
@@ -26,21 +25,16 @@ from wam_control.contact.contact_estimator import ContactEstimator, ContactEstim
 from wam_control.task.scenario import load
 from wam_control.velocity.gravity_node import GravityNode
 from wam_description.configuration import Configuration
-from wam_description.effects import no_effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError, build
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
-from wam_description.world import NO_SPRINGS, World
-from wam_driver.friction import COULOMB_STICTION
-from wam_driver.plant import Plant
 from wam_sim.recording import recorded_run
 from wam_studies.identification.study import IdentificationTrial, run_trial
 
 ROOT = Path(__file__).parents[2]
-SHARED = CONFIGURATION.shared
 Array = NDArray[np.float64]
 
 
@@ -430,35 +424,6 @@ def test_a_torque_offset_is_named_as_not_identifiable_with_its_value_if_friction
     assert "not identifiable from this recording" in text
     level = [sum(each.values[each.unknowns.places(f"motors.coulomb_{way}")]) for each in (found, other) for way in WAYS]
     assert level[0] + level[1] == pytest.approx(level[2] + level[3], rel=1e-2), "the nodes take the sum of both"
-
-
-def test_an_offset_and_friction_that_differs_by_direction_move_the_plant_alike_in_motion_at_rest_and_dithered() -> None:
-    """Why no recording tells them apart; without the difference the motion is another one."""
-    friction, offset, step = 0.06, 0.012, SHARED.timing.substep
-    level = dict.fromkeys(("static_friction", "dynamic_friction"), (friction,) * 4)
-    arm = changed(WAM, motors=level, joints=dict.fromkeys(level, (0.0,) * 4))
-    lean = dataclasses.replace(COULOMB_STICTION, motor_asymmetry=(-offset / friction,))
-    world, effects = World(NOWHERE, NO_SPRINGS), no_effects(arm)
-    plain, leaning, other = (
-        Plant(arm, world, effects, step, law) for law in (COULOMB_STICTION, lean, COULOMB_STICTION)
-    )
-    gravity = RigidBody(arm).gravity_torque(arm.joints.start) @ TransmissionMap.of(arm).joint_from_motor
-    kept: list[list[Array]] = []
-    for plant, added in ((plain, offset), (leaning, 0.0), (other, 0.0)):
-        plant.brake(False)
-        rows: list[Array] = []
-        for i in range(1500):
-            time = i * 1e-3
-            wanted = rows[0] + 2.0 * math.sin(4.0 * min(time, 0.8)) if rows else np.array(plant.theta)
-            dither = 0.15 * math.sin(2.0 * math.pi * 25.0 * time) * (time > 1.1)  # before it, at rest
-            torque = gravity + 0.5 * (wanted - plant.theta) - 0.02 * np.array(plant.thetad) + dither + added
-            plant.step(torque.tolist(), SHARED.timing.substeps)
-            rows.append(np.array(plant.theta))
-        kept.append(rows)
-    same, apart, none = (np.array(rows) for rows in kept)
-    assert np.ptp(same, axis=0).min() > 1.0
-    assert np.abs(same - none).max() > 0.02  # rad
-    assert np.abs(same - apart).max() < 2e-3
 
 
 @pytest.mark.slow

@@ -7,18 +7,15 @@ import pytest
 
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.episodes import episodes
-from wam_analysis.measures.force_accuracy import force_accuracy
 from wam_analysis.measures.friction import identify_friction
 from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_analysis.measures.response import step_response
-from wam_analysis.measures.runs import without_short
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 from wam_theory.verdicts import Verdict
 
-MS = 1_000_000
 PRECISE = pytest.approx
 
 
@@ -32,15 +29,6 @@ def draws(seed: int, n: int, sd: float) -> np.ndarray:
 
 
 # stretches
-
-
-def test_short_stretches_belong_to_their_neighbours_the_shortest_first():
-    mask = np.array([1] * 9 + [0] * 1 + [1] * 2 + [0] * 9, dtype=bool)
-    assert without_short(mask, 3).tolist() == [True] * 12 + [False] * 9
-    merged = np.array([1] * 9 + [0, 0, 1, 0, 0] + [1] * 9, dtype=bool)  # still short once it has swallowed its middle
-    assert without_short(merged, 6).all()
-    chatter = np.tile([True, False], 50_000)
-    assert without_short(np.concatenate(([True] * 9, chatter, [True] * 9)), 5).all()
 
 
 # steps
@@ -90,13 +78,6 @@ def test_a_first_order_step_has_its_textbook_rise_and_settling(sd):
     assert found.overshoot < 0.005
 
 
-def test_a_step_that_keeps_swinging_does_not_settle():
-    time = np.arange(2000) / 1000.0
-    found = step_response(time, 1.0 + 0.1 * np.sin(40.0 * time) - np.exp(-30.0 * time), 0.0, 1.0, 0.02)
-    assert found.settling == math.inf
-    assert found.ripple == near(0.1)
-
-
 @pytest.mark.parametrize("phase", [k * math.pi / 4.0 for k in range(8)])
 def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stops(phase):
     time = np.arange(4000) / 1000.0
@@ -129,12 +110,6 @@ def test_a_planted_cycle_is_recovered_from_noise_and_drift(shape, period):
     assert found.peak_to_peak == PRECISE(1.6, rel=0.02)
     assert found.confidence > 0.9
     assert found.cycles == near(6.0 / period)
-
-
-@pytest.mark.parametrize(("growth", "expected"), [(1.003, Verdict.DIVERGED), (0.992, Verdict.SETTLED)])
-def test_a_slow_trend_is_no_limit_cycle(growth, expected):
-    turns = np.arange(0.0, 100.0, 0.01)
-    assert swings(turns, growth**turns * np.cos(math.pi * turns), 2e-3, 1e-3).verdict is expected
 
 
 def random_walk(n: int) -> np.ndarray:
@@ -198,18 +173,6 @@ def test_a_slow_sine_turns_and_does_not_slip_and_one_with_stiction_does(peak: fl
     assert len(slips[0].slips) == 1
     assert slips[0].stuck < 0.05
     assert len(slips[1].slips) >= 12
-
-
-def test_the_exact_staircase_of_stick_and_slip_is_found_again():
-    node = FrictionNode(1.0, 1.0, 2.0, 2.0, 0.8, 1.0)
-    trajectory = simulate(node, IntegralLoop(gain=0.05), force=0.5, until=400.0)
-    times = np.arange(0.0, 400.0, 0.02)
-    motion = trajectory.at(times)
-    found = stick_slip_phases(np.asarray(motion.v), rest=1e-9, shortest=3)
-    said = [event for event in trajectory.events if event.kind == "slip" and event.time < 399.0]
-    assert len(said) > 3
-    assert len(found.slips) == len(said)
-    assert np.abs(times[found.slips[:, 0]] - [event.time for event in said]).max() <= 0.04
 
 
 # friction
@@ -337,14 +300,6 @@ def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
     assert swings(0.05 * np.arange(len(error)), error, 0.16 * step, 0.08 * step).verdict is verdict
 
 
-def test_a_limit_cycle_is_neither_settled_nor_divergent():
-    time = np.arange(0.0, 30.0, 0.01)
-    error = (1.0 + 3.0 * np.exp(-time / 3.0)) * np.cos(5.0 * time) + draws(15, len(time), 0.01)
-    found = swings(time, error, 0.2, 0.1)
-    assert found.verdict is Verdict.LIMIT_CYCLE
-    assert found.growth == PRECISE(1.0, abs=0.02)
-
-
 # power
 
 
@@ -371,26 +326,7 @@ def test_late_messages_are_not_counted_as_missing(jitter, lost):
     assert stamp_timing(stamp, None).missed == inner.sum()
 
 
-def test_missed_periods_jitter_and_stamps_that_go_back_are_counted():
-    stamp = np.delete(np.arange(1, 1001) * MS, [100, 500, 501])
-    received = stamp + 200_000 + np.abs(draws(18, len(stamp), 50_000.0)).astype(np.int64)
-    found = stamp_timing(np.concatenate([stamp, stamp[-1:]]), np.concatenate([received, received[-1:] + 10]))
-    assert (found.missed, found.backwards) == (3, 1)
-    assert found.period == PRECISE(1e-3)
-    assert found.longest_gap == PRECISE(3e-3)
-    assert 20e-6 < found.jitter < 200e-6
-    assert math.isnan(stamp_timing(stamp, None).jitter)
-
-
 # force
-
-
-def test_force_accuracy_is_bias_and_ripple():
-    time = np.arange(4000) / 1000.0
-    held = 5.2 + 0.1 * np.sign(np.sin(10.0 * math.pi * time + 1e-3))
-    found = force_accuracy(5.0, held)
-    assert (found.bias, found.ripple) == PRECISE((0.2, 0.1), abs=0.005)
-    assert found.smallest == near(0.3)
 
 
 # swings

@@ -23,13 +23,12 @@ from wam_analysis.findings.contact import BLIND, contact_numbers
 from wam_analysis.findings.finding import Section
 from wam_analysis.findings.force import press_findings
 from wam_analysis.findings.held_force import Theory
-from wam_analysis.findings.plots import arm_plot
 from wam_analysis.findings.steps import verdict as answers
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.recorded import RecordedArm, prediction_parameters, recorded_arm
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.traces import OF_STEPS, RECORDED
-from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.task.scenario import load as load_steps
@@ -201,14 +200,6 @@ def array(stamp: int, *statuses: Any) -> Any:
 
 def arm_of(bag: Bag) -> RecordedArm:
     return recorded_arm(prediction_parameters(recorded_parameters(bag, "/wam")))
-
-
-def test_steps_run_from_one_status_to_the_next():
-    summary = Played().summary()
-    assert [step.name for step in summary.steps] == list(STEPS)
-    assert [(step.begin - START) / 1e9 for step in summary.steps] == list(STEPS.values())
-    assert summary.steps[-1].end == START + 10_000 * MS
-    assert summary.outcome == "done"
 
 
 @pytest.mark.parametrize(
@@ -486,16 +477,6 @@ def test_a_reaction_to_what_pushes_states_how_hard_it_became():
     assert f"{largest}; at its end: 155 N (true), 11 N (estimated)" in told(bag)
 
 
-def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
-    summary = Played().summary()
-    inner = summary.contacts[1].estimate
-    assert math.isnan(inner.position)
-    assert inner.is_lower_bound
-    assert f"2 inner_link: {REASON}." in told(Played().bag())
-    assert "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts" in verdict(summary)
-    assert ">=10" in told(Played().bag())
-
-
 @pytest.mark.slow
 def test_a_failed_task_leaves_a_report(tmp_path, capsys):
     steps = [
@@ -552,14 +533,6 @@ def test_each_fault_turns_its_own_verdict():
     assert "correct link: NO (another link)" in verdict(link.summary())
     assert "correct link: YES" in verdict(position.summary())
     assert "position within 4 cm: NO (5.0 cm)" in verdict(position.summary())
-
-
-def test_contact_that_is_missed_is_reported_and_wrong():
-    recording = Played()
-    recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
-    assert "MISSED" in told(recording.bag())
-    assert "correct link: NO" in verdict(recording.summary())
-    assert "position within 4 cm: NOT EVALUATED" in verdict(recording.summary())
 
 
 def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_their_uncertainty():
@@ -717,19 +690,6 @@ def test_empty_bag_gives_a_report():
     assert "No constant force was commanded" in told(empty)
 
 
-def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
-    recording = Played()
-    recording.statuses = [(name, at, 0) for name, at in (("move", START), ("move", START + 4000 * MS))]
-    bag = recording.bag()
-    reacts = [
-        status("force_loop", "", stamp=str(START + at * MS), **events)
-        for at, events in ((1000, event("at_limit")), (1500, {}))
-    ]
-    stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
-    force = section_of(bag._replace(topics={**bag.topics, "/wam/status": stated}), "force")
-    assert any(line.startswith("move: reported (at_limit) from 1.20 to 1.70 s") for line in force.sentences)
-
-
 def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
     recording = Played()
     recording.recording = {"mode": "lockstep"}
@@ -757,13 +717,6 @@ def test_view_keeps_lengths_across_and_shows_everything():
         for end in view.project(np.array([tube.start, tube.end])):
             assert abs(end[0]) + tube.radius < view.width / 2
             assert abs(end[1]) + tube.radius < view.height / 2
-
-
-def test_a_force_that_points_out_of_the_arm_is_within_the_view():
-    bag = read(Path(__file__).parents[2] / "bags" / "sample" / "wam-touch", OF_STEPS, may_lack=True)
-    title, svg = arm_plot(AnalysedRecording(bag))
-    assert "true and the estimated contact force" in title
-    assert svg.startswith(b"<?xml")
 
 
 def with_outcome(folder, *statuses: tuple[str, str, int]):

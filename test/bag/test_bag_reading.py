@@ -16,11 +16,9 @@ import zstandard
 from bag_mutations import break_bags
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
-from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
@@ -175,24 +173,6 @@ def test_a_part_of_a_bag_is_that_part_however_it_was_written(tmp_path: Path, way
     assert bag.topics.keys() == {"/jointstate", "/string"}
     for topic, columns in bag.topics.items():
         assert_columns(columns, expected[topic])
-
-
-@pytest.mark.slow
-def test_every_value_is_that_of_mcap_ros2(tmp_path: Path) -> None:
-    kinds = [kind for kind in [*OURS, *FOREIGN] if kind != "std_msgs/msg/Empty"]
-    path = write(tmp_path / "bag.mcap", random_samples(kinds, 25, seed=7))
-    messages: dict[str, list[Any]] = {}
-    with path.open("rb") as stream:
-        for item in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
-            messages.setdefault(item.channel.topic, []).append(item.decoded_message)
-    bag = read(path)
-    for topic, columns in bag.topics.items():
-        if isinstance(columns, JointColumns):
-            assert columns.stamp_ns.tolist() == [nanoseconds(message.header.stamp) for message in messages[topic]]
-        if isinstance(columns, WrenchColumns):
-            np.testing.assert_array_equal(columns.force, xyz([m.wrench.force for m in messages[topic]]))
-        if isinstance(columns, Messages):
-            assert_equal(list(columns.messages), messages[topic])
 
 
 @pytest.mark.parametrize("kind", [*OURS, *FOREIGN])

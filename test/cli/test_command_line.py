@@ -15,10 +15,7 @@ import numpy as np
 import pytest
 
 from wam_bag.bag import BagError, JointColumns, read
-from wam_cli.commands.demo import report_task
 from wam_cli.main import COMMANDS, EXTRAS, main
-from wam_description.configuration import Configuration, packaged
-from wam_sim.recording import recorded_run
 
 ROOT = Path(__file__).parents[2]
 
@@ -104,19 +101,6 @@ def test_an_empty_name_is_refused_and_not_taken_for_the_usual_one(
     assert "it is empty; give a name or a file, or leave the option out" in err
 
 
-def test_a_library_of_the_system_that_is_missing_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def fail(name: str) -> None:
-        raise ImportError("libgomp.so.1: cannot open shared object file: No such file or directory")
-
-    monkeypatch.setattr("wam_cli.main.importlib.import_module", fail)
-    with pytest.raises(SystemExit) as end:
-        main(["demo"])
-    assert str(end.value).startswith("wam demo: libgomp.so.1: cannot open shared object file")
-    assert not capsys.readouterr().out
-
-
 def test_an_extra_that_is_missing_is_named_in_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,17 +120,6 @@ def test_an_extra_that_is_missing_is_named_in_one_sentence(
 def test_the_extras_are_those_of_the_package() -> None:
     declared = (ROOT / "setup.py").read_text(encoding="utf-8")
     assert all(f'"{extra}": [' in declared for extra in EXTRAS)
-
-
-def test_what_is_printed_at_a_prompt_is_one_line() -> None:
-    bag = read(ROOT / "bags" / "sample" / "wam-touch")
-    assert re.search(r"wam-touch', 38 topics, \d+ messages\)$", repr(bag))
-    assert repr(bag.topics["/wam/joint_states"]) == "JointColumns(461 messages: joint1, joint2, joint3, joint4)"
-    run, configuration = recorded_run(bag), Configuration.load(packaged("wam"))
-    assert "changed" in repr(configuration.with_values({"timing.mode": "realtime"}))
-    assert "changed" not in repr(configuration)
-    shown = [bag, run, run.parameters, configuration, *bag.topics.values()]
-    assert max(len(repr(one)) for one in shown) < 300
 
 
 def test_a_topic_becomes_series_of_equal_length() -> None:
@@ -239,18 +212,6 @@ def test_values_are_those_of_the_usual_configuration_where_none_is_named(capsys:
     assert found[0] == 1
     code, _, err = said(capsys, "guard", *values, "--gain", "1.0")
     assert (code, "leave out --config and --set" in err) == (1, True)
-
-
-@pytest.mark.parametrize(
-    ("left_out", "who"), [((), "the force loop presses with"), (("force_loop",), "commanded forces:")]
-)
-def test_the_force_loop_is_named_only_where_it_runs(
-    left_out: tuple[str, ...], who: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    base = Configuration.load(packaged("wam"))
-    without = [name for name in base.shared.nodes if name not in left_out]
-    report_task(base.with_values({"nodes": without}), Path("bag"))
-    assert f"  {who} 5, 10, 5 N" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -3,18 +3,17 @@
 import copy
 import dataclasses
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from arms import CONFIGURATION
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact.thresholds import CONTACT
 from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Arm
-from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.reasons import NO_REASON, Reason
@@ -26,7 +25,6 @@ from wam_driver.plant import Plant
 from wam_sim.simulation import Simulation
 from wam_studies.contact.scenarios import base_values
 
-CONFIGURATION = Configuration.load(Path(__file__).parents[2] / "config" / "wam.yaml")
 ARM, TIMING = CONFIGURATION.shared.arm, CONFIGURATION.shared.timing
 SENSORS = dataclasses.replace(
     CONFIGURATION.node("contact_estimator", ContactEstimatorParameters), use_joint_sensors=True

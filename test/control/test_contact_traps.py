@@ -1,10 +1,10 @@
 """What looks fine but is wrong: each way to fool oneself about contact estimation is walked into here, and shows."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
+from arms import CONFIGURATION, WAM
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact.contact_estimator import ContactEstimate, ContactEstimatorParameters
@@ -13,14 +13,11 @@ from wam_control.contact.momentum_observer import MomentumObserver
 from wam_control.contact.shaft_friction import ShaftFriction
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
-from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_sim.simulation import Simulation
 from wam_studies.contact.scenarios import ScenarioGenerator
 
-CONFIGURATION = Configuration.load(Path(__file__).parents[2] / "config" / "wam.yaml")
-ARM = CONFIGURATION.shared.arm
 PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
 OWN = dataclasses.replace(
     PARAMETERS.observer, mass_scale=(1.0,) * 4, friction_scale=1.0, payload=(0.0, 0.0), payload_uncertainty=0.0
@@ -32,7 +29,7 @@ DT = 1e-3
 
 def felt_while_sliding(arm: Arm, observer: MomentumObserver, ticks: int, friction: float = 1.0) -> np.ndarray:
     """Residuals, a row per millisecond, of an arm that all motors drive one way against friction."""
-    plant, rows = RigidArm(ARM, POSE, friction), []
+    plant, rows = RigidArm(WAM, POSE, friction), []
     push = np.array([4.0, 5.0, 3.5, 2.0])
     for _ in range(ticks):
         motor = np.linalg.solve(DRIVE, plant.gravity() + push)
@@ -47,9 +44,9 @@ def test_truth_does_not_share_masses_and_friction_with_the_estimator() -> None:
     """With shared ones the residual is zero and every error looks like 0.00 cm."""
     assert set(PARAMETERS.observer.mass_scale) != {1.0}
     assert PARAMETERS.observer.friction_scale != 1.0
-    shared = felt_while_sliding(ARM, MomentumObserver(ARM, OWN, False), 200)
+    shared = felt_while_sliding(WAM, MomentumObserver(WAM, OWN, False), 200)
     nominal = dataclasses.replace(PARAMETERS.observer, payload=(0.0, 0.0))
-    departed = felt_while_sliding(ARM, MomentumObserver(ARM, nominal, False), 200)
+    departed = felt_while_sliding(WAM, MomentumObserver(WAM, nominal, False), 200)
     assert np.abs(departed[180:]).max() > 5.0 * np.abs(shared[180:]).max()
     for scenario in ScenarioGenerator(CONFIGURATION, 1).contacts(4):
         assert len({*scenario.values["driver:mismatch.mass"], *scenario.values["driver:mismatch.motor_friction"]}) == 8
@@ -58,11 +55,11 @@ def test_truth_does_not_share_masses_and_friction_with_the_estimator() -> None:
 @pytest.mark.slow
 def test_a_textbook_differential_mistakes_gravity_for_a_push() -> None:
     """Motors averaged, (m2 + m3)/2 and (m3 - m2)/2, without the 2:1 of (A.5)."""
-    matrix = np.array(ARM.joint_from_motor).reshape(4, 4)
+    matrix = np.array(WAM.joint_from_motor).reshape(4, 4)
     matrix[2] *= 0.5
-    textbook = dataclasses.replace(ARM, joint_from_motor=tuple(matrix.ravel().tolist()))
+    textbook = dataclasses.replace(WAM, joint_from_motor=tuple(matrix.ravel().tolist()))
     worst = {}
-    for name, arm in (("right", ARM), ("textbook", textbook)):
+    for name, arm in (("right", WAM), ("textbook", textbook)):
         observer = MomentumObserver(arm, OWN, False)
         worst[name] = np.abs(felt_while_sliding(arm, observer, 200)[180:]).max(axis=0)
     assert worst["right"].max() < 0.1
@@ -71,7 +68,7 @@ def test_a_textbook_differential_mistakes_gravity_for_a_push() -> None:
 
 def test_more_samples_of_the_same_friction_do_not_make_it_better_known() -> None:
     """Taken as independent, 1 kHz samples of one bias would shrink the spread by the root of their number."""
-    observer = MomentumObserver(ARM, OWN, False)
+    observer = MomentumObserver(WAM, OWN, False)
     theta, spreads = motor_from_joint(np.array(POSE)), []
     speed = np.array([3.0, -4.0, 5.0, 3.0])
     for k in range(1000):
@@ -79,7 +76,7 @@ def test_more_samples_of_the_same_friction_do_not_make_it_better_known() -> None
         if k in (150, 999):
             spreads.append(np.sqrt(observer.torques()[1].diagonal()))
     np.testing.assert_allclose(spreads[1], spreads[0], rtol=0.05)
-    least = OWN.moving_uncertainty * np.array(ARM.joints.dynamic_friction)
+    least = OWN.moving_uncertainty * np.array(WAM.joints.dynamic_friction)
     assert np.all(spreads[1] > least)
 
 
@@ -121,7 +118,7 @@ def test_dither_feels_5_newton_at_rest() -> None:
     assert abs(found.position - 0.28) < max(0.03, 2.0 * found.position_sd)
     assert np.linalg.norm(np.subtract(found.force, (0.0, 4.0, 3.0))) < 1.0
     tip = [row.values[:4] for row in run.rows["sim/joint_states"][60:100]]
-    moved = np.ptp([RigidBody(ARM).tool_pose(q).position for q in tip], axis=0)
+    moved = np.ptp([RigidBody(WAM).tool_pose(q).position for q in tip], axis=0)
     assert 0.0 < np.linalg.norm(moved) < 0.6e-3
 
 
@@ -130,7 +127,7 @@ def test_dither_averaged_over_less_than_a_cycle_is_felt_as_a_push() -> None:
     swings = {}
     for cycle in (40, 27):
         _, run = resting(0.0, 0.3, **{"timing.dither_cycle": 40})
-        observer = MomentumObserver(ARM, OWN, False, cycle)
+        observer = MomentumObserver(WAM, OWN, False, cycle)
         felt = []
         for row in run.rows["motor_states"][60:]:
             observer.observe(State(list(row.values[:4]), list(row.values[4:8]), list(row.values[8:])), DT)
@@ -144,11 +141,11 @@ def test_dither_averaged_over_less_than_a_cycle_is_felt_as_a_push() -> None:
 def test_friction_along_the_tube_makes_the_place_a_set_that_holds_the_truth(lean: float) -> None:
     """Near 90 deg at the elbow the force of friction has the lever of the inner link, and moves the answer by 9 cm."""
     q, place, force = (0.3, -1.0, 0.2, 0.2), 0.2, (10.0 * lean, 6.0, 8.0)
-    surface = (place, -0.6 * ARM.covers.radius[1], -0.8 * ARM.covers.radius[1])
+    surface = (place, -0.6 * WAM.covers.radius[1], -0.8 * WAM.covers.radius[1])
     tau, precision = torques(q, "outer_link", surface, force).tolist(), np.eye(4) / 0.05**2
     smooth = dataclasses.replace(PARAMETERS.inference, friction=0.0)
-    sure = ContactInference(ARM, RigidBody(ARM), smooth).infer(q, tau, precision)[0]
-    wide = ContactInference(ARM, RigidBody(ARM), PARAMETERS.inference).infer(q, tau, precision)[0]
+    sure = ContactInference(WAM, RigidBody(WAM), smooth).infer(q, tau, precision)[0]
+    wide = ContactInference(WAM, RigidBody(WAM), PARAMETERS.inference).infer(q, tau, precision)[0]
     assert not sure.low <= place <= sure.high
     assert wide.low <= place <= wide.high
 
@@ -158,7 +155,7 @@ def test_the_friction_of_a_shaft_that_creeps_back_is_uncertain_before_it_reaches
     rest = OWN.motor_rest_velocity
     sizes = {}
     for keep in (0.97, 0.0):
-        shafts = ShaftFriction(ARM.motors, OWN, rest)
+        shafts = ShaftFriction(WAM.motors, OWN, rest)
         for _ in range(400):
             shafts.of([40.0 * rest] * 4, keep, DT)
         sizes[keep] = [shafts.of([speed * rest] * 4, keep, DT).shape[0] for speed in (0.9, -0.9)]

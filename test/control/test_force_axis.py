@@ -7,15 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import BODY, CONFIGURATION, WAM
 from numpy.typing import NDArray
 
 from wam_control.force.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-BODY = RigidBody(WAM)
 SENSING = replace(CONFIGURATION.node("force_loop", ForceLoopParameters).sensing, least_apparent_mass=0.6)
 OUTER, TIP = "outer_link", WAM.covers.length_of("outer_link")
 POSES = ((0.3, -1.2, 0.2, 1.0), (0.0, -1.0, 0.0, 1.2), (0.5, 0.2, -0.4, 0.3))

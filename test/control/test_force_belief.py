@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import BODY, CONFIGURATION, WAM
 from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis, TaskAxes
@@ -17,10 +17,8 @@ from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import ForceAxes, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
-from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-BODY = RigidBody(WAM)
 OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
 FORCES, OUTER = ForceAxes(WAM, BODY, PLAIN.sensing), "outer_link"

@@ -5,13 +5,12 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import BODY, CONFIGURATION
 from test_force_plant import MOTORS
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, unit
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.event import Code
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
@@ -26,7 +25,6 @@ from wam_studies.force_benchmark.trial import TaskWatch
 
 pytestmark = pytest.mark.slow  # seconds each: the plant in contact
 
-BODY = RigidBody(WAM)
 OUTER, PLACE = "outer_link", 0.28
 POSE = (0.0, -1.8, 0.0, 1.45)  # of the demonstration
 DIRECTION = triple(-BODY.cover_pose(POSE, OUTER).rotation[:, 1])

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import BODY, CONFIGURATION, WAM
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
 from wam_control.force.stability_guard import StabilityGuard
 from wam_control.force.task import AxisKind, TaskCommand, joint_axes
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.event import Code
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.outcome import TaskEnd
@@ -21,7 +20,6 @@ from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, triple
 from wam_studies.force_benchmark.trial import perform
 
-BODY = RigidBody(WAM)
 OUTER = "outer_link"
 FAR_AWAY = {"driver:world.obstacles.positions": [3.0, 3.0, 3.0]}
 POSE = (0.3, -1.2, 0.2, 1.0)

@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from arms import SHARED
 
 from wam_control.task.motion import LineMotion, PostureMotion, SCurve
 from wam_control.task.trajectory_goal import TrajectoryPlayer
-from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import PathPoint, PosturePath
 
-SHARED = Configuration.load(packaged("wam")).shared
 ARM, LIMITS = SHARED.arm, SHARED.motion
 BODY = RigidBody(ARM)
 START = [0.0, -1.2, 0.2, 0.3]

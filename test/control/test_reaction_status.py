@@ -5,18 +5,14 @@ import math
 import pytest
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
-from wam_control.task.scenario import ScenarioStep
-from wam_description.configuration import Configuration, packaged
 from wam_description.event import OBEYED, Code, Event, Level, holding, refused, warning
 from wam_description.event_text import sentence
 from wam_description.signals import BASE, NodeStatus
 from wam_description.status import pairs, parse, with_refused
 from wam_sim.reactions import RecordedReaction, is_too_short, lasting, settling_time_in, unmet, watched_times
 from wam_sim.recording import RecordedStep
-from wam_sim.sweep import SweepPoint, outcome
 
 SECOND = 1_000_000_000
-ELBOW = [0.0, -1.2, 0.0, 2.35]  # rad, joint4 near its end at 2.44
 
 
 def named(code: Code, joint: str) -> Event:
@@ -125,66 +121,3 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     found = [settling_time_in(settling, one) for one in during]
     assert found == [2.0, 60.0, 1.0]
     assert math.isnan(settling_time_in([], steps[0]))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("start", "torques", "seconds", "failure", "unassessed"),
-    [
-        (ELBOW, (0.0, 0.0, 0.0, 3.0), 3.0, "torque not reached: force of joint 4: ", ""),  # at the end of joint4
-        (
-            ELBOW,
-            (0.0, 0.0, 0.0, 3.0),
-            1.0,
-            "",
-            "torque: not assessed: force, torque or motion of a task commanded for no longer than",
-        ),
-    ],
-)
-def test_a_sweep_states_each_torque_that_is_not_reached_or_too_short(
-    start: list[float], torques: tuple[float, ...], seconds: float, failure: str, unassessed: str
-) -> None:
-    found = swept(start, ScenarioStep("torque", seconds, task=TaskCommand(BASE, joint_axes(AxisKind.FORCE, torques))))
-    for words, given in ((failure, found.failure), (unassessed, found.unassessed)):
-        assert given.startswith(words)
-        assert bool(given) == bool(words)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "value", "failure"),
-    [
-        (AxisKind.POSITION, 2.43, "motion not reached: position of joint 4: 2.43 rad is commanded"),
-        (
-            AxisKind.VELOCITY,
-            0.2,
-            "motion not reached: velocity of joint 4: ",
-        ),
-        (AxisKind.VELOCITY, -0.2, ""),
-    ],
-)
-def test_a_sweep_states_each_motion_that_is_not_reached(kind: AxisKind, value: float | None, failure: str) -> None:
-    found = swept(ELBOW, ScenarioStep("motion", 2.1, task=TaskCommand(BASE, (TaskAxis(kind, 3, value=value),))))
-    assert found.failure.startswith(failure)
-    assert bool(found.failure) == bool(failure)
-    assert not found.unassessed
-
-
-@pytest.mark.slow
-def test_a_posture_that_the_force_loop_refuses_is_a_failure_of_a_sweep() -> None:
-    step = ScenarioStep("go", 1.0, posture=(0.1, -1.2, 0.0, 1.0))
-    found = swept([0.0, -1.2, 0.0, 1.0], step, {"force_loop:mode": "joint_torque"})
-    assert found.failure.startswith("go refused: joint_posture_command has no effect in the mode joint_torque")
-    assert not swept([0.0, -1.2, 0.0, 1.0], step).failure
-
-
-def swept(start: list[float], step: ScenarioStep, values: dict | None = None):
-    configuration = Configuration.load(packaged("wam")).with_values(
-        {
-            "arm.joints.start": start,
-            "force_loop:guard.posture": start,
-            "driver:world.obstacles.positions": [3.0, 3.0, 3.0],
-            **(values or {}),
-        }
-    )
-    return outcome(SweepPoint(configuration, (ScenarioStep("release", 0.1, request="enable"), step)))

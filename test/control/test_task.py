@@ -8,22 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arms import BODY, CONFIGURATION, SHARED, WAM
 
 from wam_control.force.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.force.force_loop_parameters import force_law, sensing_of
 from wam_control.force.force_loop_parameters import task_of as task_of_parameters
 from wam_control.force.stability_guard import GuardedForces, GuardedTask, StabilityGuard
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes, line_axes, table_of, task_of
-from wam_description.configuration import Configuration, packaged
 from wam_description.event import Code
 from wam_description.event_text import sentence
 from wam_description.parameters import ParameterError
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State, Table, Triple
 
-CONFIGURATION = Configuration.load(packaged("wam"))
-SHARED = CONFIGURATION.shared
-ARM, BODY = SHARED.arm, RigidBody(SHARED.arm)
 GIVEN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 OWN = replace(GIVEN, guard=replace(GIVEN.guard, mode="off"))
 COVER, PLACE = "outer_link", 0.28
@@ -53,17 +49,17 @@ class Springs:
     def __init__(self, q: list[float] = POSE, springs: dict[Triple, float] | None = None, place: float = PLACE) -> None:
         self.q, self.place, self.springs, self.hand = np.array(q), place, springs or {}, np.zeros(4)
         self.rest = {n: np.array(n) @ self.point(n) for n in self.springs}
-        self.loop = ForceLoop(ARM, SHARED.servo, OWN, SHARED.timing)
+        self.loop = ForceLoop(WAM, SHARED.servo, OWN, SHARED.timing)
 
     def point(self, n: Triple, q: Any = None) -> np.ndarray:
         q = self.q if q is None else q
         normal = BODY.cover_pose(q, COVER).rotation.T @ np.array(n)
-        return BODY.point(q, COVER, np.array([self.place, 0.0, 0.0]) + ARM.covers.radius[1] * normal)
+        return BODY.point(q, COVER, np.array([self.place, 0.0, 0.0]) + WAM.covers.radius[1] * normal)
 
     def lever(self, n: Triple) -> np.ndarray:
         """Torque per force on the frozen surface point, by finite differences."""
         normal = BODY.cover_pose(self.q, COVER).rotation.T @ np.array(n)
-        point = np.array([self.place, 0.0, 0.0]) + ARM.covers.radius[1] * normal
+        point = np.array([self.place, 0.0, 0.0]) + WAM.covers.radius[1] * normal
         h = np.eye(4) * 1e-6
         ends = [(BODY.point(self.q + d, COVER, point) - BODY.point(self.q - d, COVER, point)) / 2e-6 for d in h]
         return np.array([np.array(n) @ end for end in ends])
@@ -214,7 +210,7 @@ def test_an_impedance_is_sensed_at_the_side_that_is_touched_whichever_way_it_is_
         task = base(impedance(along, float(BODY.point(POSE, COVER, (PLACE, 0.0, 0.0)) @ along) + 0.04 * sign))
         for _ in range(400):
             rotation = BODY.cover_pose(world.q, COVER).rotation
-            surface = (PLACE, *(ARM.covers.radius[1] * (rotation.T @ DOWN))[1:])
+            surface = (PLACE, *(WAM.covers.radius[1] * (rotation.T @ DOWN))[1:])
             rubbing = 0.3 * world.force(DOWN) * rotation[:, 0]
             world.hand = -rubbing @ BODY.point_jacobian(world.q, COVER, surface)
             out = world.step(task)
@@ -264,7 +260,7 @@ def test_the_stated_error_of_a_force_counts_the_friction_of_another_one_on_the_s
             for i, (f, n, x) in enumerate(zip(newtons, along, places, strict=True)):
                 across = np.cross(n, X)
                 friction = 0.3 * f * (math.cos(angle) * np.array(X) + math.sin(angle) * across) if i == pressed else 0.0
-                point = [x, 0.0, 0.0] + ARM.covers.radius[1] * (BODY.cover_pose(POSE, COVER).rotation.T @ n)
+                point = [x, 0.0, 0.0] + WAM.covers.radius[1] * (BODY.cover_pose(POSE, COVER).rotation.T @ n)
                 torque += (f * n + friction) @ BODY.point_jacobian(POSE, COVER, tuple(point))
             world.hand = -torque
             rows = world.step(task).rows
@@ -304,7 +300,7 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
 
 def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:
     """What the guard considers of a task."""
-    guard = StabilityGuard(ARM, SHARED.servo, SHARED.timing, GIVEN.guard, sensing_of(GIVEN))
+    guard = StabilityGuard(WAM, SHARED.servo, SHARED.timing, GIVEN.guard, sensing_of(GIVEN))
     seen: list[GuardedForces] = []
 
     def factor(where: Callable[[], list[GuardedForces]], dt: float) -> tuple[float, bool]:
@@ -355,7 +351,7 @@ def test_a_line_is_held_while_the_link_slides_along_it() -> None:
     world = Springs(LEVEL)
     ends = [BODY.point(LEVEL, COVER, (s, 0.0, 0.0)) for s in (0.0, 0.4064)]
     u = (ends[1] - ends[0]) / 0.4064
-    line = line_axes(ARM, COVER, tuple(ends[0].tolist()), tuple(u.tolist()))
+    line = line_axes(WAM, COVER, tuple(ends[0].tolist()), tuple(u.tolist()))
     for direction in (0.05, -0.05):
         slide = TaskAxis(AxisKind.VELOCITY, -1, COVER, 0.2, tuple(u.tolist()), direction)
         world.step(base(*line[1:], slide), 120)
@@ -418,7 +414,7 @@ def test_a_task_that_ends_leaves_the_arm_where_it_is() -> None:
 
 
 def test_a_task_without_sensors_is_not_done() -> None:
-    loop = ForceLoop(ARM, SHARED.servo, OWN, SHARED.timing)
+    loop = ForceLoop(WAM, SHARED.servo, OWN, SHARED.timing)
     out = loop.step(State(POSE, REST, [1.0] * 4), None, None, None, None, None, None, DT, base(force(5.0)))
     assert out.rows == ()
     assert out.velocity == pytest.approx(REST)
@@ -528,9 +524,9 @@ TASK = TaskCommand(
 
 
 def test_a_task_is_the_same_after_it_was_a_table() -> None:
-    assert task_of(table_of(TASK, ARM.covers.names), ARM) == TASK
-    assert table_of(None, ARM.covers.names).rows == ()
-    assert task_of(Table("base", ()), ARM) is None
+    assert task_of(table_of(TASK, WAM.covers.names), WAM) == TASK
+    assert table_of(None, WAM.covers.names).rows == ()
+    assert task_of(Table("base", ()), WAM) is None
 
 
 @pytest.mark.parametrize(
@@ -547,12 +543,12 @@ def test_a_task_is_the_same_after_it_was_a_table() -> None:
     ],
 )
 def test_a_row_that_is_none_is_refused_with_what_is_allowed(column: int, value: float, reason: str) -> None:
-    row = list(table_of(base(force(10.0)), ARM.covers.names).rows[0])
+    row = list(table_of(base(force(10.0)), WAM.covers.names).rows[0])
     row[column] = value
     with pytest.raises(ParameterError, match=reason):
-        task_of(Table("base", (tuple(row),)), ARM)
+        task_of(Table("base", (tuple(row),)), WAM)
 
 
 def test_a_position_along_an_axis_that_turns_is_refused() -> None:
     with pytest.raises(ParameterError, match="turns with it"):
-        task_of(table_of(TaskCommand(COVER, (position(0.0, Y),)), ARM.covers.names), ARM)
+        task_of(table_of(TaskCommand(COVER, (position(0.0, Y),)), WAM.covers.names), WAM)

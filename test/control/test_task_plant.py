@@ -5,19 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import BODY, CONFIGURATION, WAM
 
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, line_axes, unit
 from wam_control.task.scenario import ScenarioStep
 from wam_description.event_text import sentence
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand, PathPoint, PosturePath
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, triple
 from wam_studies.force_benchmark.trial import TaskWatch
 
-BODY = RigidBody(WAM)
 LEVEL = (-0.031, -1.083, -1.826, -0.482)  # the outer link is level
 OUTER = "outer_link"
 

@@ -6,21 +6,18 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from arms import CONFIGURATION, SHARED, WAM
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wam_control.force.task import AxisKind, TaskCommand
 from wam_control.task.scenario import Scenario, ScenarioStep, load
-from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, PathPoint, PosturePath
 from wam_ros.messages import Refused, read_trajectory
 from wam_sim.simulation import Simulation
 
-CONFIGURATION = Configuration.load(packaged("wam"))
-SHARED = CONFIGURATION.shared
-ARM = SHARED.arm
-NAMES = list(ARM.joints.names)
+NAMES = list(WAM.joints.names)
 START = [0.0, -1.2, 0.2, 0.3]
 EXAMPLE = Path(__file__).parents[2] / "examples" / "tasks.yaml"
 AT = {"along": [0, 0, -1], "cover": "outer_link", "contact_position": 0.28}
@@ -135,11 +132,11 @@ def test_a_step_streams_its_task_and_takes_it_back(tmp_path: Path) -> None:
 
 
 def test_a_motion_is_commanded_with_its_velocity_and_ends_at_its_goal(tmp_path: Path) -> None:
-    goal = RigidBody(ARM).tool_pose(START).position + np.array([-0.05, 0.1, -0.05])
+    goal = RigidBody(WAM).tool_pose(START).position + np.array([-0.05, 0.1, -0.05])
     scenario = Scenario([step_of(tmp_path, tip=goal.tolist(), seconds=2.0)], SHARED)
     outs = [scenario.step(START, NO_CONTACT, 0.005) for _ in range(399)]
     postures, rates = np.array([out.posture for out in outs]), np.array([out.rate for out in outs])
-    assert RigidBody(ARM).tool_pose(postures[-1]).position == pytest.approx(goal, abs=1e-6)
+    assert RigidBody(WAM).tool_pose(postures[-1]).position == pytest.approx(goal, abs=1e-6)
     assert np.gradient(postures, 0.005, axis=0)[1:-1] == pytest.approx(rates[1:-1], abs=5e-3)
 
 
@@ -191,7 +188,7 @@ def test_a_trajectory_message_that_is_none_is_refused(given: JointTrajectory, re
 def test_the_example_presses_slides_moves_straight_and_is_led() -> None:
     run = Simulation(CONFIGURATION, load(EXAMPLE, SHARED))
     assert run.play() == ""
-    body = RigidBody(ARM)
+    body = RigidBody(WAM)
     rows = run.rows["sim/joint_states"]
     times = np.array([row.stamp for row in rows]) / 1e9
     tips = np.array([body.tool_pose(row.values[:4]).position for row in rows])

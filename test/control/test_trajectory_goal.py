@@ -3,16 +3,14 @@
 from itertools import count
 
 import pytest
+from arms import SHARED, WAM
 
 from wam_control.task.motion import PostureMotion
 from wam_control.task.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
 from wam_control.thresholds import MOTION
-from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import PathPoint, PosturePath, State
 
-SHARED = Configuration.load(packaged("wam")).shared
-ARM = SHARED.arm
 START = (0.0, -0.8, 0.0, 0.3)
 GOAL = (0.2, -0.9, 0.0, 0.5)
 PERIOD = 0.005
@@ -23,7 +21,7 @@ def follow(
     goal: TrajectoryGoal, offset: float = 0.0, lag: float = 0.0, joint: int = 0, moves: bool = True
 ) -> tuple[GoalEnd, float]:
     """Play an arm that is off by an angle, or late by a time, in one joint; how the goal ended and when."""
-    motion = PostureMotion(START, PATH, ARM, SHARED.motion)
+    motion = PostureMotion(START, PATH, WAM, SHARED.motion)
     for k in count():
         time = k * PERIOD
         assert time < 10.0
@@ -45,7 +43,7 @@ def goal(
     at_goal: dict[str, JointTolerance] | None = None,
     path: PosturePath = PATH,
 ) -> TrajectoryGoal:
-    return TrajectoryGoal(path, ARM, SHARED.motion, on_path or {}, at_goal or {}, 0.0)
+    return TrajectoryGoal(path, WAM, SHARED.motion, on_path or {}, at_goal or {}, 0.0)
 
 
 def test_an_arm_that_follows_reaches_the_goal_at_its_time() -> None:
@@ -89,15 +87,15 @@ def test_a_trajectory_that_the_arm_cannot_follow_is_refused_with_what_to_do() ->
 
 def test_a_first_point_at_zero_is_where_the_arm_is() -> None:
     planned = PosturePath((PathPoint(START, (0.0,) * 4), *PATH.points))
-    with_start, without = (PostureMotion(START, path, ARM, SHARED.motion) for path in (planned, PATH))
+    with_start, without = (PostureMotion(START, path, WAM, SHARED.motion) for path in (planned, PATH))
     assert with_start.duration == without.duration
     assert with_start.at(0.37) == without.at(0.37)
     elsewhere = PosturePath((PathPoint((0.1, *START[1:])), *PATH.points))
     with pytest.raises(ParameterError, match=r"joint1 of the trajectory starts at .* rad and is at 0 rad"):
-        PostureMotion(START, elsewhere, ARM, SHARED.motion)
+        PostureMotion(START, elsewhere, WAM, SHARED.motion)
     moving = PosturePath((PathPoint(START, (0.1, 0.0, 0.0, 0.0)), *PATH.points))
     with pytest.raises(ParameterError, match="starts with a velocity"):
-        PostureMotion(START, moving, ARM, SHARED.motion)
+        PostureMotion(START, moving, WAM, SHARED.motion)
 
 
 def test_it_waits_until_the_arm_is_at_rest() -> None:

@@ -16,23 +16,6 @@ def numbers() -> list[float]:
     return RANDOM.uniform(-10.0, 10.0, 4).tolist()
 
 
-def test_power_of_the_motors_is_power_of_the_joints() -> None:
-    transform = Transform(ARM)
-    for _ in range(100):
-        thetad, torque = numbers(), numbers()
-        joints = transform.joint_state(State(numbers(), thetad, torque))
-        assert np.dot(joints.velocity, joints.effort) == pytest.approx(np.dot(thetad, torque), rel=1e-12, abs=1e-11)
-
-
-def test_power_of_a_joint_command_is_power_of_the_motor_command() -> None:
-    transform = Transform(ARM)
-    for _ in range(100):
-        velocity, gravity, effort = numbers(), numbers(), numbers()
-        asked = np.dot(velocity, np.add(gravity, effort))
-        given = np.dot(transform.motor_velocity(velocity), transform.motor_effort(gravity, effort))
-        assert given == pytest.approx(asked, rel=1e-12, abs=1e-10)
-
-
 def test_commands_come_back_as_states() -> None:
     transform = Transform(ARM)
     velocity, torque = numbers(), numbers()

@@ -53,14 +53,6 @@ def test_every_number_of_the_arm_has_exactly_one_row(name: str) -> None:
     assert sorted(covered) == sorted(expected)
 
 
-def test_cable_stages_come_to_the_stiffness_that_was_measured_with() -> None:
-    """plant-notes of the project: 34 and 11.8 N m/rad; the testbed's 8.33 gives the 638 lb/in of (4.9)."""
-    stiffness = [circuit.stiffness for circuit in Configuration.load(packaged("wam")).shared.arm.circuits]
-    assert stiffness == pytest.approx([34.0, 34.0, 34.0, 11.8], rel=1e-4)
-    (testbed,) = Configuration.load(packaged("testbed")).shared.arm.circuits
-    assert testbed.stiffness == pytest.approx(2 * 262 * 0.375**2 * 0.1129848290276167, rel=1e-6)
-
-
 def test_each_row_has_a_source_or_a_reason() -> None:
     for row in CONSTANTS:
         assert (row.source != "") != (row.reason != ""), row
@@ -106,11 +98,6 @@ def test_joint_friction_is_the_printed_part_of_peak_torque() -> None:
     at_motor, at_joint = numbers["arm.motors.static_friction"], numbers["arm.joints.static_friction"]
     for i, percent in enumerate((1.4, 1.0, 1.0, 1.0)):
         assert at_motor[i] * ratios[i] + at_joint[i] == pytest.approx(percent / 100 * ratios[i] * peak[i], rel=1e-3)
-
-
-def test_assumed_pretension_leaves_no_strand_slack_at_peak_torque() -> None:
-    (pretension,) = (row for row in TABLES["wam"] if row.symbol == "T_0")
-    assert 2 * pretension.si[0] == pytest.approx(si(43, "in-lb") / si(0.375, "in"), rel=0.01)
 
 
 def test_corrections_are_noted_with_wrong_prints() -> None:

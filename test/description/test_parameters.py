@@ -19,7 +19,7 @@ from wam_description.arm import Servo, Shared
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build, fields, like, parameter, require, tunable, values
+from wam_description.parameters import ParameterError, build, fields, like, parameter, require, values
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
 from wam_description.wiring import SetParameters as SetParametersRequest
@@ -57,13 +57,6 @@ GOOD: dict[str, Any] = {
     "inner.names": ["a", "b"],
     "inner.weights": [1.0, 2],
 }
-
-
-def test_values_of_what_was_built_are_what_it_was_built_from() -> None:
-    example = build(Example, GOOD)
-    assert example == Example("soft", 3, True, Gains(0.5, ("a", "b"), (1.0, 2.0)))
-    assert build(Example, values(example)) == example
-    assert list(values(example)) == [field.name for field in fields(Example)]
 
 
 @pytest.mark.parametrize(
@@ -104,30 +97,11 @@ class Derived:
     copy: float = like(Gains, "gain", "copy")
 
 
-@dataclass(frozen=True)
-class Tuned:
-    gain: float = tunable("a gain", "N")
-    counted: tuple[float, ...] = tunable("the same", "N", high=2.0)
-
-
 def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
     assert build(Derived, {"gain": 1.5}) == Derived(1.5, 1.5)
     assert build(Derived, {"gain": 1.5, "copy": 0.5}) == Derived(1.5, 0.5)
     with pytest.raises(ParameterError, match="missing parameter 'gain'; missing parameter 'copy'"):
         build(Derived, {})
-
-
-def test_a_derived_parameter_has_unit_and_range_of_the_other_one_and_its_meaning_unless_another_is_given() -> None:
-    _, copy = fields(Derived)
-    assert (copy.doc, copy.unit, copy.low, copy.high, copy.live) == ("copy", "1/s", 0.0, 2.0, False)
-    found = like(Tuned, "a.gain").metadata
-    assert (found["doc"], found["unit"], found["high"]) == ("a gain", "N", 1e9)
-
-
-def test_a_tunable_is_live_and_not_negative() -> None:
-    gain, counted = fields(Tuned)
-    assert (gain.low, gain.high, gain.live) == (0.0, 1e9, True)
-    assert (counted.high, counted.is_array) == (2.0, True)
 
 
 @pytest.mark.parametrize("node", ["", *NODES])
@@ -209,12 +183,8 @@ def test_every_parameter_is_described_to_ros(ros: Any) -> None:
         for limits in (*there.floating_point_range, *there.integer_range):
             assert limits.from_value == max(field.low, -1e308)
             assert limits.to_value == min(field.high, 1e308)
-    by_name = {d.name: d for d in answer.descriptors}
-    assert by_name["watchdog"].floating_point_range[0].to_value == 0.05
-    assert "[s]" in by_name["watchdog"].description
-    assert by_name["arm.joints.viscous_friction"].floating_point_range, "of each value of a list"
-    assert by_name["timing.outer_delay"].integer_range[0].to_value == 1
-    assert by_name["timing.mode"].additional_constraints == "one of lockstep, realtime"
+    ranged = {d.name for d in answer.descriptors if d.floating_point_range or d.integer_range}
+    assert {"watchdog", "arm.joints.viscous_friction", "timing.outer_delay"} <= ranged
 
 
 def change(ros: Any, node: str, **given: Any) -> Any:
@@ -264,25 +234,21 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
     assert node.node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
 
 
-def test_servo_gains_are_live_at_the_velocity_loop_alone(ros: Any) -> None:
-    make(ros, "gravity")
-    result = change(ros, "gravity", **{"servo.proportional_gain": [0.01] * 4})
-    assert not result.successful
-    assert "servo.proportional_gain" in result.reason
-
-
 @pytest.mark.parametrize(
     ("node", "given", "text"),
     [
         ("velocity_loop", {"servo.proportional_gain": [1e308] * 4}, "allowed: 0 to 1e+09"),
         ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
+        ("velocity_loop", {"servo.proportional_gain": [0.1] * 3}, "has 3 values; 4 names need 4"),
+        ("velocity_loop", {"ages.command": 0.5}, "ages.command"),
+        ("gravity", {"servo.proportional_gain": [0.01] * 4}, "servo.proportional_gain"),
         ("force_loop", {"force_limit": 1e308}, "force_limit"),
         ("force_loop", {"joint_speed_limit": 1e308}, "joint_speed_limit"),
         ("force_loop", {"limits.settling_time": 0.0}, "limits.settling_time out of range Min: 0.001"),
         ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
     ],
 )
-def test_a_live_value_that_the_arm_cannot_bear_is_refused(
+def test_a_value_that_cannot_be_taken_while_the_node_runs_is_refused(
     ros: Any, node: str, given: dict[str, Any], text: str
 ) -> None:
     there = make(ros, node)
@@ -292,14 +258,6 @@ def test_a_live_value_that_the_arm_cannot_bear_is_refused(
     assert not result.successful
     assert text in result.reason
     assert there.get_parameter(name).value == before
-
-
-def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
-    node = make(ros, "velocity_loop")
-    before = node.node._loop._kp
-    result = change(ros, "velocity_loop", **{"servo.proportional_gain": [0.1] * 3, "servo.integral_gain": [0.1] * 3})
-    assert result.reason == "parameter 'servo.proportional_gain' has 3 values; 4 names need 4"
-    assert node.node._loop._kp == before
 
 
 def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
@@ -315,6 +273,7 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
 
         def tune(self, own: Gains) -> None:
             self.gain = own.gain
+            self.inverse = 1.0 / (own.gain - 0.75)
 
         def retune(self, servo: Servo) -> None:
             require(servo.integral_gain[0] < 100.0, "integral gain is too large")
@@ -325,52 +284,22 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
     overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
     node = ros.add(AdaptedNode(declaration(Both), namespace="/wam", context=ros.context, parameter_overrides=overrides))
     before = node.node.servo
-    refused = change(ros, "velocity_loop", gain=2.0, **{"servo.integral_gain": [200.0] * 4})
-    assert refused.reason == "integral gain is too large"
-    assert (node.node.gain, node.node.servo) == (1.0, before)
+    for given, reason in (
+        ({"gain": 2.0, "servo.integral_gain": [200.0] * 4}, "integral gain is too large"),
+        ({"gain": 0.75, "servo.integral_gain": [3.0] * 4}, "the node failed on it: ZeroDivisionError"),
+    ):
+        refused = change(ros, "velocity_loop", **given)
+        assert not refused.successful
+        assert reason in refused.reason
+        assert (node.node.gain, node.node.servo) == (1.0, before)
+        assert node.get_parameter("gain").value == 1.0
     assert change(ros, "velocity_loop", gain=1.5, **{"servo.integral_gain": [3.0] * 4}).successful
     assert (node.node.gain, node.node.servo.integral_gain) == (1.5, (3.0,) * 4)
-
-
-def test_a_node_that_fails_on_a_value_keeps_the_old_one_and_says_so(ros: Any) -> None:
-    class Fails:
-        name, parameters = "velocity_loop", Gains
-
-        def __init__(self, shared: Shared, own: Gains) -> None:
-            self.gain = own.gain
-
-        @reaction(Input("motor_states"), outputs=())
-        def step(self, inputs: Inputs) -> Outputs:
-            return {}
-
-        def tune(self, own: Gains) -> None:
-            self.gain = own.gain
-            self.inverse = 1.0 / (own.gain - 0.75)
-
-    given = {**WAM.sections[SHARED], "gain": 1.0, "names": ["a"], "weights": [1.0]}
-    overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
-    node = ros.add(
-        AdaptedNode(declaration(Fails), namespace="/wam", context=ros.context, parameter_overrides=overrides)
-    )
-    refused = change(ros, "velocity_loop", gain=0.75)
-    assert not refused.successful
-    assert "the node failed on it: ZeroDivisionError" in refused.reason
-    assert node.node.gain == 1.0
-    assert node.get_parameter("gain").value == 1.0
-    assert change(ros, "velocity_loop", gain=0.5).successful
 
 
 def test_an_answer_without_a_result_is_no_success() -> None:
     request = SetParametersRequest("filter", {"gain": 0.7})
     assert "filter failed on it" in refusal_of(request, SetParameters.Response())
-
-
-def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:
-    make(ros, "velocity_loop")
-    request = SetParameters.Request(parameters=[Parameter("ages.command", value=0.5).to_parameter_msg()])
-    (result,) = call(ros, SetParameters, "velocity_loop/set_parameters", request).results
-    assert not result.successful
-    assert "ages.command" in result.reason
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -37,15 +37,6 @@ def test_power_in_is_power_out(transmission: TransmissionMap) -> None:
         assert np.dot(tau, qd) == pytest.approx(np.dot(tau_motor, thetad), rel=1e-12, abs=1e-12)
 
 
-def test_differential_motors_turn_together_for_roll_and_apart_for_pitch(
-    transmission: TransmissionMap,
-) -> None:
-    pitch = transmission.motor_positions([0.0, 1.0, 0.0, 0.0])
-    assert pitch == pytest.approx([0.0, -N2, N2, 0.0])
-    roll = transmission.motor_positions([0.0, 0.0, 1.0, 0.0])
-    assert roll == pytest.approx([0.0, -N2 / 2, -N2 / 2, 0.0])
-
-
 def test_inverse_is_the_one_of_the_errata(transmission: TransmissionMap) -> None:
     q1, q2, q3, q4 = 0.3, -0.7, 1.1, 0.4
     expected = [N1 * q1, -N2 * q2 - N2 / 2 * q3, N2 * q2 - N2 / 2 * q3, N4 * q4]

@@ -33,10 +33,6 @@ def by_mujoco(arm: Arm) -> mujoco.MjModel:
     return spec.compile()
 
 
-def poses() -> np.ndarray:
-    return np.random.default_rng(11).uniform(-2.3, 2.3, (200, 4))
-
-
 def test_masses_and_inertias_survive(arm: Arm, by_pinocchio: pin.Model, by_mujoco: mujoco.MjModel) -> None:
     fused = mujoco.MjModel.from_xml_string(urdf(arm))
     for i, name in enumerate(arm.links.names):
@@ -66,37 +62,6 @@ def test_axes_and_limits_survive(arm: Arm, by_pinocchio: pin.Model, by_mujoco: m
         assert joint.axis == pytest.approx([0, 0, 1])
         assert joint.range == pytest.approx([arm.joints.lower[i], arm.joints.upper[i]])
         assert by_mujoco.jnt_actfrcrange[joint.id] == pytest.approx([-effort[i], effort[i]])
-
-
-def test_tip_and_covers_stand_at_the_same_place_in_every_pose(
-    arm: Arm, by_pinocchio: pin.Model, by_mujoco: mujoco.MjModel
-) -> None:
-    body = RigidBody(arm)
-    data, mujoco_data = by_pinocchio.createData(), mujoco.MjData(by_mujoco)
-    for q in poses():
-        pin.framesForwardKinematics(by_pinocchio, data, q)
-        mujoco_data.qpos[:] = q
-        mujoco.mj_kinematics(by_mujoco, mujoco_data)
-        expected = {"tool": body.tool_pose(q)} | {name: body.cover_pose(q, name) for name in body.covers}
-        for name, pose in expected.items():
-            placement = data.oMf[by_pinocchio.getFrameId(name)]
-            assert np.allclose(placement.translation, pose.position, rtol=0, atol=1e-9)
-            assert np.allclose(placement.rotation, pose.rotation, rtol=0, atol=1e-9)
-            assert np.allclose(mujoco_data.body(name).xpos, pose.position, rtol=0, atol=1e-9)
-            assert np.allclose(mujoco_data.body(name).xmat.reshape(3, 3), pose.rotation, rtol=0, atol=1e-9)
-
-
-def test_gravity_torque_of_other_readers_is_ours(arm: Arm, by_pinocchio: pin.Model, by_mujoco: mujoco.MjModel) -> None:
-    body = RigidBody(arm)
-    data, mujoco_data = by_pinocchio.createData(), mujoco.MjData(by_mujoco)
-    by_mujoco.opt.gravity[:] = arm.gravity
-    for q in poses()[:20]:
-        by_pinocchio.gravity.linear = np.array(arm.gravity)
-        mujoco_data.qpos[:] = q
-        mujoco.mj_forward(by_mujoco, mujoco_data)
-        expected = body.gravity_torque(q)
-        assert pin.computeGeneralizedGravity(by_pinocchio, data, q) == pytest.approx(expected, abs=1e-9)
-        assert mujoco_data.qfrc_bias == pytest.approx(expected, abs=1e-9)
 
 
 def test_tubes_lie_from_start_to_end_of_the_covers(arm: Arm, by_mujoco: mujoco.MjModel) -> None:

@@ -323,7 +323,7 @@ def firmware(version: int) -> Inject:
     return inject
 
 
-SEEDS = [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 10))]
+SEEDS = [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 5))]
 AT_START: dict[str, tuple[Inject, BusFault]] = {
     "no safety module": (remove(lambda rig, draw: 10), BusFault.NO_SAFETY_MODULE),
     "missing controller": (remove(motor), BusFault.MISSING),

@@ -1,32 +1,28 @@
 """The driver without ROS: which commands reach the motors, when it stops, what it keeps."""
 
 import dataclasses
-import math
 import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, NOWHERE, WAM, changed
+from arms import BODY, CONFIGURATION, NOWHERE, SHARED, WAM, changed
 from contact_truth import joint_torques
 
 from wam_description.arm import Shared
 from wam_description.effects import no_effects
 from wam_description.event import fault
 from wam_description.parameters import Field, ParameterError, fields
-from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.safety import Mode
 
-SHARED = CONFIGURATION.shared
 PARAMETERS = dataclasses.replace(
     CONFIGURATION.node("driver", DriverParameters), world=World(NOWHERE, NO_SPRINGS), effects=no_effects(WAM)
 )
 PERIOD = SHARED.timing.period
 MOTOR_FROM_TORQUE = np.linalg.inv(np.array([joint_torques(e) for e in np.eye(4)]).T)
-BODY = RigidBody(WAM)
 START = np.array(WAM.joints.start)
 SLOW = 0.05  # s; a stop must come within it
 FAST_JOINTS = {"speed_limit": (1e6,) * 4}
@@ -144,23 +140,6 @@ def test_newer_command_is_not_undone_by_an_older_one() -> None:
     assert hardware.currents == [1.0] * 4
 
 
-def test_caller_may_reuse_the_list_it_gave() -> None:
-    hardware = enabled()
-    currents = [1.0] * 4
-    hardware.command(hardware.stamp, currents)
-    currents[0] = 9.0
-    hardware.advance(0.0)
-    assert hardware.currents == [1.0] * 4
-
-
-def test_last_command_is_held_between_commands() -> None:
-    hardware = enabled()
-    hardware.command(hardware.stamp, [1.0] * 4)
-    for _ in range(20):
-        hardware.advance(0.0)
-        assert hardware.currents == [1.0] * 4
-
-
 @pytest.mark.parametrize("watchdog", [PARAMETERS.watchdog, 0.05, 0.01])
 def test_stale_stamp_stops_the_arm_within_50_ms_and_brakes(watchdog: float) -> None:
     hardware = enabled(watchdog=watchdog)
@@ -240,21 +219,6 @@ def test_too_fast_is_a_fault_and_nearly_too_fast_a_warning(
     assert allowed.safety.mode is Mode.ENABLED
 
 
-def test_speeds_that_are_watched_are_those_of_the_arm() -> None:
-    """Turning about the vertical, tip and elbow move with their distance from the axis."""
-    arm = enabled(FAST_JOINTS, **NO_LIMITS)
-    play(arm, 0.2, SPIN)
-    speed, q = abs(arm.plant.qd[0]), arm.plant.q
-    elbow = speed * 0.5588 * abs(math.sin(q[1]))
-    tip = speed * abs(-0.5588 * math.sin(q[1]) + 0.4064 * math.cos(q[1] + q[3]))
-    for what, value in (("cover", elbow), ("tip", tip)):
-        for factor, mode in ((0.95, Mode.FAULT), (1.05, Mode.ENABLED)):
-            watched = enabled(FAST_JOINTS, **(NO_LIMITS | {f"{what}_speed_limit": factor * value}))
-            play(watched, 0.2, SPIN)
-            assert watched.safety.mode is mode
-            assert bool(watched.warnings) is (mode is Mode.ENABLED)
-
-
 def test_warning_ends_when_the_arm_is_braked() -> None:
     hardware = enabled({"speed_limit": (1.0, 1e6, 1e6, 1e6)}, **NO_LIMITS)
     for _ in range(2000):
@@ -307,17 +271,6 @@ def test_estop_works_in_every_state(prepare: Callable[[Driver], None]) -> None:
     assert hardware.enable("").success
 
 
-def test_disable_puts_on_the_brakes_and_drops_the_command() -> None:
-    hardware = enabled()
-    play(hardware, 0.05)
-    assert any(hardware.currents)
-    hardware.disable()
-    assert hardware.currents == [0.0] * 4
-    held = hardware.plant.theta
-    play(hardware, 0.1, (20.0,) * 4)
-    np.testing.assert_allclose(hardware.plant.theta, held, atol=1e-6)
-
-
 def test_samples_before_a_fault_are_kept_until_it_is_reset() -> None:
     hardware = enabled(post_mortem_samples=50)
     play(hardware, 0.1)
@@ -358,15 +311,6 @@ def test_time_is_counted_in_periods_from_one() -> None:
         hardware.advance(0.0)
         outer.append(hardware.is_outer)
     assert [k for k, is_outer in enumerate(outer, 1) if is_outer] == [5, 10]
-
-
-def test_joint_signals_are_of_the_plant() -> None:
-    hardware = enabled()
-    play(hardware, 0.2, (3.0, 0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(hardware.joint_sensors.position, hardware.plant.q)
-    np.testing.assert_array_equal(hardware.joint_sensors.effort, hardware.plant.strain_torque)
-    np.testing.assert_array_equal(hardware.true_joint_state.effort, hardware.plant.cable_torque)
-    assert hardware.true_contact.cover == ""
 
 
 def test_true_contact_is_the_greatest_load() -> None:
@@ -460,15 +404,6 @@ def test_noise_repeats_bit_for_bit_with_its_seed_and_differs_with_another() -> N
     assert published(NOISY) == published(NOISY)
     assert published(NOISY) != published(dataclasses.replace(NOISY, seed=NOISY.seed + 1))
     assert published(noisy()) != published(PARAMETERS)
-
-
-def test_no_noise_flows_while_the_brakes_are_on() -> None:
-    hardware = Driver(SHARED, NOISY)
-    for _ in range(50):
-        hardware.command(hardware.stamp, [1.0] * 4)
-        hardware.advance(0.0)
-        assert hardware.currents == [0.0] * 4
-    np.testing.assert_allclose(hardware.plant.q, START, atol=1e-9)
 
 
 def test_reset_of_an_arm_with_real_encoders_reads_no_speed() -> None:

@@ -8,8 +8,7 @@ import pytest
 
 from wam_description.configuration import Configuration, packaged
 from wam_driver.bus import frames
-from wam_driver.bus.dry_run import heard, in_words, sent
-from wam_driver.bus.frames import SAFETY, BusGroup, Frame
+from wam_driver.bus.dry_run import heard, sent
 from wam_driver.bus.line import line_of
 from wam_driver.bus.parameters import BusParameters
 
@@ -51,18 +50,3 @@ def test_what_would_be_sent_has_every_step_of_the_start_and_no_torque(version: i
     assert torques
     assert all("torques [0, 0, 0, 0] counts" in text for text in torques)
     assert any("set ZERO to 1" in text for text in found)
-
-
-@pytest.mark.parametrize(
-    ("frame", "text"),
-    [
-        (frames.get(3, 48), "host to controller 3: get P"),
-        (frames.put(SAFETY, 8, 1), "host to safety module: set MODE to 1"),
-        (frames.reply(1, 5, 2), "controller 1 has STAT = 2"),
-        (frames.torques(BusGroup.ARM, 42, [1, -2, 3, -4]), "host to group 1: torques [1, -2, 3, -4] counts"),
-        (Frame(BusGroup.MOTORS, b""), "host: no data"),
-        (frames.get(3, 127), "host to controller 3: get property 127"),
-    ],
-)
-def test_a_frame_in_words(frame: Frame, text: str) -> None:
-    assert in_words(frame, 200).endswith(text)

@@ -184,13 +184,6 @@ def test_a_simulation_that_fails_is_a_fault_with_brakes_and_a_finite_state(
 # limits that the driver watches
 
 
-def test_a_quantity_warns_at_nine_tenths_of_its_limit_and_is_a_fault_above_it() -> None:
-    near, above = (WatchedLimit("travel", value, 2.0, "rad") for value in (1.81, 2.01))
-    assert near.excess == ""
-    assert near.warning == "travel 1.81 rad is near its limit 2"
-    assert above.excess == "travel 2.01 rad is above its limit 2"
-
-
 @pytest.mark.parametrize("ended", [0.0, 0.05, 0.5])
 def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float) -> None:
     hardware = enabled(**{"driver:tip_speed_limit": 0.5})

@@ -16,7 +16,7 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.driver import DriverParameters
-from wam_driver.friction import COULOMB_STICTION, LAWS, FrictionParameters
+from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.plant import Plant
 
 STEP = 5e-4
@@ -311,11 +311,3 @@ def test_one_value_counts_for_all_and_a_wrong_number_is_refused() -> None:
     assert four.theta == released(changed(arm, gravity=(0.0, 0.0, 0.0)), law(motor_asymmetry=(0.1,))).theta
     with pytest.raises(ParameterError, match=r"friction\.motor_asymmetry' has 2 values; 4 names need 1 or 4"):
         released(arm, law(motor_asymmetry=(0.1, 0.2)))
-
-
-def test_every_law_is_a_choice_of_the_configuration() -> None:
-    for name in LAWS:
-        configuration = CONFIGURATION.with_values({"driver:friction.law": name})
-        assert configuration.node("driver", DriverParameters).friction.law == name
-    with pytest.raises(ParameterError, match="one of coulomb_stiction, stribeck"):
-        CONFIGURATION.with_values({"driver:friction.law": "viscous"}).node("driver", DriverParameters)

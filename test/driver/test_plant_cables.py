@@ -131,33 +131,6 @@ def test_arm_that_hangs_in_slack_cables_starts_at_rest(pretension: float) -> Non
 # creep and loss
 
 
-def turn(plant: Plant, way: float, seconds: float, torque: float, together: int = 1) -> tuple[float, float, float]:
-    """Turn the rotor smoothly by an angle against a load; travel, work put in, work got out at the joint."""
-    begin, speed = plant.theta[0], 0.0
-    travel = put_in = got_out = 0.0
-    steps = round(seconds / STEP / together)
-    for k in range(1, steps + 1):
-        s = k / steps
-        goal = begin + way * (s - math.sin(2 * math.pi * s) / (2 * math.pi))
-        goal_speed = way / seconds * (1 - math.cos(2 * math.pi * s))
-        before = plant.theta[0], plant.q[0]
-        speed = plant.thetad[0]
-        tau = torque + 5.0 * (goal - before[0]) + 0.02 * (goal_speed - speed)
-        plant.step([tau], together)
-        travel += abs(plant.theta[0] - before[0])
-        put_in += tau * (plant.theta[0] - before[0])
-        got_out += torque * N * (plant.q[0] - before[1])
-    return travel, put_in, got_out
-
-
-def test_rotor_that_does_not_turn_does_not_creep() -> None:
-    plant = plant_of(frictionless(WAM, damping=1.0), creep=True)
-    plant.brake(True)
-    begin = plant.q
-    drive(plant, 5.0, [0.0] * 4)
-    np.testing.assert_allclose(plant.q, begin, atol=1e-12)
-
-
 def efficiency(arm: Arm, creep: bool, way: float, torque: float) -> tuple[float, float]:
     """Power out over power in, and the torque at the motor over that of the load, at a slow and steady speed."""
     plant = plant_of(
@@ -397,25 +370,6 @@ def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
 
 
 @pytest.mark.slow
-def test_friction_of_a_slack_cable_goes_when_the_cable_is_tight_again() -> None:
-    """Under 5 N m the rotor holds more; without, 0.02 N m and 40 N x 5e-5 m, 0.1 % as above."""
-    plant = gripping(20.0)
-    stretch = 2 * 20 * PINION / CABLE + (5.0 - 2 * 20 * PINION) / (CABLE / 2)
-    plant.data.qpos[0] = stretch
-    load(plant, [-N * 5.0])
-    drive(plant, 0.1, [5.0])
-    assert min(plant.tensions[0]) == 0.0
-    load(plant, [0.0])
-    plant.data.qpos[0] -= stretch  # at once, so that nothing else changes the friction
-    drive(plant, 0.1, [0.0])
-    excess, begin, expected = 0.0, plant.theta[0], BASE + COEFFICIENT * 40.0
-    while abs(plant.theta[0] - begin) < 1e-7 and excess < 2 * expected:
-        excess += 1e-4 * expected
-        plant.step([excess])
-    assert excess == pytest.approx(expected, rel=THOUSANDTH)
-
-
-@pytest.mark.slow
 def test_parallel_circuits_of_the_first_stage_share_its_tension() -> None:
     """2 N m on 10 mm are 200 N for one cable, 100 N each for two; slack from 2 x 300 N x 10 mm x 2 on."""
     for circuits, difference in ((1.0, 200.0), (2.0, 100.0)):
@@ -428,19 +382,6 @@ def test_parallel_circuits_of_the_first_stage_share_its_tension() -> None:
         load(plant, [9.0 * N])
         drive(plant, 2.0, [0.0])
         assert (min(plant.tensions[0]) == 0.0) is (circuits == 1.0)
-
-
-def test_what_rubs_on_a_joint_adds_to_its_friction_at_once() -> None:
-    """Momentum over time, while it slides."""
-    plant = plant_of(damped(one_joint(), 0.02))
-    plant.data.qvel[:] = (20.0, 20.0 / N)
-    for rod in (0.0, 0.8, 0.3):
-        plant.set_added_friction([rod])
-        drive(plant, 0.1, [0.0])
-        momentum = ROTOR * plant.thetad[0] + LINK_INERTIA / N * plant.qd[0]
-        drive(plant, 0.1, [0.0])
-        lost = momentum - ROTOR * plant.thetad[0] - LINK_INERTIA / N * plant.qd[0]
-        assert lost / 0.1 == pytest.approx(rod / N, rel=THOUSANDTH, abs=1e-9)
 
 
 # active pretension
@@ -548,29 +489,6 @@ def test_plants_with_every_effect_are_equal_bit_for_bit_and_reset_undoes_creep()
     assert first_story == story(first)
     first.release()
     assert first_story != story(first)
-
-
-@pytest.mark.slow
-def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_reset() -> None:
-    arm = changed(WAM, cables={"pretension": (5.0,) * 4}, joints={"start": (0.0, -1.5, 0.0, 0.5)})
-    plant = plant_of(arm, slack=True, tension_friction=(1e-3,) * 4)
-    assert min(low for _, low in plant.tensions) == 0.0
-    first_story = []
-    for _ in range(2):
-        plant.brake(False)
-        plant.step([0.0] * 4)
-        first = plant.thetad
-        drive(plant, 1.0, [0.0] * 4)
-        first_story.append([*first, *plant.thetad, *plant.q])
-        plant.reset()
-    assert first_story[0] == first_story[1]
-    base, gripped = plant_of(arm, slack=True), plant_of(arm, slack=True, tension_friction=(1e-3,) * 4)
-    for one in (base, gripped):
-        one.step([0.0] * 4)
-    pull, (tight, _) = 2.0 * 5.0, gripped.tensions[1]
-    slower = (abs(base.thetad[1]) - abs(gripped.thetad[1])) * WAM.motors.inertia[1] / STEP
-    assert tight > pull
-    assert slower == pytest.approx(1e-3 * tight, rel=THOUSANDTH)
 
 
 def test_a_pretension_without_room_for_the_load_is_refused_by_name() -> None:

@@ -29,7 +29,6 @@ from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
-from wam_theory.regimes import gamma_b
 from wam_theory.stick_slip import FrictionNode
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
@@ -225,23 +224,6 @@ def test_stiction_cycle_of_a_slow_loop_is_that_of_5_8_and_5_9_corrected() -> Non
         4.0 / (gain * KTR) * (KTR + KC) / KC * jump / (static - dynamic) * (2.0 * static / (static - dynamic) - 1.0)
     )
     assert abs(found[1] / printed - 1.0) > 0.5
-
-
-def coulomb(gamma: float) -> tuple[FrictionNode, float]:
-    """A node of zeta = 0.25 with Coulomb friction, and the gain of this gamma."""
-    model = node(0.25, 4.0, 4.0)
-    return model, gamma * model.damping / (LINK_INERTIA * SHARE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("gamma", [0.2, 0.57])
-def test_motor_never_turns_back_below_gamma_b(gamma: float) -> None:
-    """Straight to the desired force below gamma_a, by a staircase from there on; never beyond it."""
-    assert gamma < float(gamma_b(0.25))
-    response = controlled(*coulomb(gamma), seconds=20.0, step=STEP, start=(0.0, 0.0))
-    assert np.all(np.diff(response.motor) >= 0.0)
-    assert np.all(response.contact < FORCE)
-    assert abs(response.contact[-1] - FORCE) < 1e-6
 
 
 # impact (3.1)
@@ -675,18 +657,6 @@ def test_rod_adds_its_friction_to_the_sliding_friction(added: float) -> None:
             turn(plant, 6.0)
         gained = LINK_INERTIA * plant.qd[0] + RATIO * 4.067e-5 * plant.thetad[0] - momentum
         assert 6.0 - gained / (50 * STEP) == pytest.approx(0.171 + more, abs=1e-6)
-
-
-def test_rod_taken_off_lets_a_stuck_joint_go() -> None:
-    plant = rod((0.19, 0.171))
-    plant.set_added_friction([2.0])
-    for _ in range(1000):
-        turn(plant, 1.5)
-    assert abs(plant.q[0]) < 1e-12
-    plant.set_added_friction([0.0])
-    for _ in range(10):
-        turn(plant, 1.5)
-    assert plant.q[0] > 1e-6
 
 
 def with_riding_rotors(turn: str) -> mujoco.MjModel:

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import pickle
 from typing import Any
 
 import mujoco
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from arms import NOWHERE, WAM, ideal_mjcf
 
-from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError
@@ -145,10 +143,6 @@ def test_a_hand_without_force_is_not_in_the_model() -> None:
 # the arm as it is built
 
 
-def test_an_arm_without_departure_is_the_configured_one() -> None:
-    assert true_arm(WAM, AS_CONFIGURED) == WAM
-
-
 def test_model_mismatch_is_in_the_compiled_plant() -> None:
     mismatch = ModelMismatch(
         (1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0, (1.0,) * 4
@@ -182,11 +176,3 @@ def test_a_payload_weighs_at_the_tool() -> None:
 def test_departures_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"mismatch.mass.*3 values"):
         true_arm(WAM, dataclasses.replace(AS_CONFIGURED, mass=(1.0,) * 3))
-
-
-def test_a_configuration_goes_to_another_process_and_stays_read_only() -> None:
-    configuration = Configuration.load(packaged("wam")).with_values({"driver:seed": 9})
-    copy = pickle.loads(pickle.dumps(configuration))
-    assert copy == configuration
-    with pytest.raises(TypeError):
-        copy.sections["driver"]["seed"] = 3

@@ -38,13 +38,6 @@ def test_request_leads_where_it_should(mode: Mode, request_name: str, after: Mod
     assert answer.message.startswith("refused" if not success else after.value)
 
 
-@pytest.mark.parametrize("mode", Mode)
-def test_trip_stops_in_every_state(mode: Mode) -> None:
-    safety = in_mode(mode)
-    safety.trip(fault("test", reason="second"))
-    assert safety.mode is Mode.FAULT
-
-
 def test_first_fault_is_kept_until_reset() -> None:
     safety = in_mode(Mode.FAULT)
     safety.trip(fault("test", reason="second"))
@@ -54,11 +47,3 @@ def test_first_fault_is_kept_until_reset() -> None:
     assert not safety.fault
     safety.trip(fault("test", reason="third"))
     assert safety.fault == "third"
-
-
-def test_enable_is_refused_while_something_speaks_against_it() -> None:
-    safety = Safety()
-    answer = safety.enable("two publishers; stop one")
-    assert (answer.success, answer.message) == (False, "refused: two publishers; stop one")
-    assert safety.mode is Mode.BRAKED
-    assert safety.enable("").success

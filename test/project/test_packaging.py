@@ -152,12 +152,6 @@ def test_every_python_module_is_installed(installed):
     assert {path.relative_to(site) for path in site.glob("wam_*/**/*.py")} == modules
 
 
-def test_pip_puts_one_command_on_path_and_colcon_none(prefix, workspace):
-    assert files_in(prefix / "bin") == {"wam"}
-    assert not (workspace / "install" / "wam_stack" / "bin").exists()
-    assert "demo" in run(prefix / "bin" / "wam", "--help", cwd=prefix, env=environment(prefix))
-
-
 def test_launchers_and_console_scripts_have_the_same_names_and_start_the_same_module(prefix, workspace):
     launchers = {}
     for path in (prefix / "lib" / "wam_stack").iterdir():
@@ -427,14 +421,6 @@ def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
         assert whole.sections["/**"] == Configuration.load(packaged("testbed")).sections["/**"]
         with pytest.raises(ParameterError, match="no configuration 'nosuch' comes with wam_stack"):
             named_file("nosuch", "--params-file", files)
-
-
-def test_launch_takes_a_file_that_changes_a_configuration(launch_file, tmp_path):
-    _, start = launch_file
-    changed = tmp_path / "changed.yaml"
-    changed.write_text("base: wam\n/**: {ros__parameters: {nodes: [driver, velocity_loop]}}\n")
-    nodes = start({**CHOSEN, "config": str(changed), "record": "false"})
-    assert [node.executable for node in nodes] == ["driver", "velocity_loop"]
 
 
 def test_nodes_end_with_the_launch_even_where_it_ends_at_once(launch_file, tmp_path, domain_id):

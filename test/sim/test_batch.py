@@ -248,26 +248,6 @@ def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) 
             time.sleep(0.02)
 
 
-LARGE = """
-import time
-from pathlib import Path
-from wam_sim import batch
-
-def piece(given):
-    Path("began").touch()
-    time.sleep(600.0)
-
-if __name__ == "__main__":
-    with batch.processes(1) as executor:
-        for _ in range(4):
-            executor.submit(piece, bytes(1_000_000))  # more than a pipe takes
-        while not Path("began").exists():
-            time.sleep(0.01)
-        time.sleep(0.2)
-        raise SystemExit(3)
-"""
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("workers", "pieces", "count"), [(5, 1, 1), (2, 7, 2)])
 def test_no_more_processes_are_started_than_there_are_pieces(
@@ -277,14 +257,6 @@ def test_no_more_processes_are_started_than_there_are_pieces(
     with batch_of(given, pieces) as options:
         assert isinstance(options.executor, ProcessPoolExecutor)
         assert len(options.executor._processes) == count
-
-
-@pytest.mark.slow
-def test_an_end_does_not_wait_for_inputs_that_no_worker_takes(tmp_path: Path) -> None:
-    (tmp_path / "large.py").write_text(LARGE)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "large.py"], cwd=tmp_path, env=environment, timeout=LONG, check=False)
-    assert done.returncode == 3
 
 
 @pytest.mark.slow

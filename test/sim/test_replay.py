@@ -14,14 +14,14 @@ from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.metadata import INFINITE
 from wam_cli import main as cli
-from wam_cli.commands.replay import other_values, reasons, stated
+from wam_cli.commands.replay import other_values
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
 from wam_ros.testing import RunningArm, playing
 from wam_ros.topics import stamp_of
 from wam_sim.recording import recorded_run
-from wam_sim.replay import REPLAYED, Compared, Replay, replay
+from wam_sim.replay import REPLAYED, replay
 
 STEPS = {
     "steps": [
@@ -257,16 +257,6 @@ def test_a_hole_in_an_input_is_named(bag: Path, tmp_path: Path, capsys: pytest.C
     assert "without an input gravity has no output" in said
 
 
-def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
-    """25 of 101 messages differ, the largest by 0.97 N m."""
-    different = Compared("gravity_effort", 101, 0, 0, 25, None, 0.97, "N m", None)
-    done = Replay("gravity", "realtime", (different,), ())
-    assert stated(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
-    (why,) = reasons(done)
-    assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity used the newest inputs")
-    assert reasons(done._replace(mode="lockstep")) == []
-
-
 def test_a_parameter_to_set_that_is_not_in_the_bag_is_refused_by_name(bag: Path) -> None:
     for name, said in (
         ("force_loop:gain", "node 'force_loop' has no parameter 'gain'"),
@@ -274,11 +264,6 @@ def test_a_parameter_to_set_that_is_not_in_the_bag_is_refused_by_name(bag: Path)
     ):
         with pytest.raises(ParameterError, match=said):
             replay(bag, "force_loop", values={name: 1.0})
-
-
-def test_the_driver_cannot_be_replayed(bag: Path) -> None:
-    with pytest.raises(ParameterError, match="node 'driver' cannot be replayed; nodes: transform, velocity_loop"):
-        replay(bag, "driver")
 
 
 def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,6 @@ from wam_cli.main import main
 from wam_control.task.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_sim.simulation import Simulation
 from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points, sweep
 from wam_studies.thesis import definition, sweeping
 
@@ -132,18 +131,6 @@ steps:
     assert row["reported"] == "press: refused"
     assert float(row["force_worst"]) > 1.0
     assert "1 sets, 0 failed, 1 with a force that may be wrong (column reported)" in capsys.readouterr().out
-
-
-def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) -> None:
-    file, found = tmp_path / "force.yaml", []
-    for newtons in ("[0.0, -20.0, 0.0]", "[20.0, 0.0, 0.0]"):
-        file.write_text(STEPS.replace("[0.0, -20.0, 0.0]", newtons))
-        run = Simulation(*runs(file, (0.004,))[0])
-        assert not run.play()
-        found.append(run.unmet)
-    assert not found[0]
-    assert found[1].startswith("press refused: 20 N at 0.914 m of link may be wrong by inf N")
-    assert [one.step.name for one in run.played] == ["release", "press"]
 
 
 @pytest.mark.slow

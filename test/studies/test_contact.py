@@ -17,7 +17,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_LOAD, Load
 from wam_sim.simulation import Simulation
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore, EstimatedMoment
-from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator, dither_values
+from wam_studies.contact.scenarios import BenchmarkScenario, PlannedContact, ScenarioGenerator
 from wam_studies.contact.simulation import Played, play, score, spans, torques_of
 from wam_studies.contact.study import ContactCase, ContactStudy
 from wam_studies.figures.style import draw_panels
@@ -300,14 +300,6 @@ def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_decla
         )
     assert CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer.payload == (0.0, 0.0)
     assert not any(scenario.values["contact_estimator:use_joint_sensors"] for scenario in drawn)
-
-
-def test_dither_is_asked_for_only_where_the_velocity_loop_has_it() -> None:
-    sections = {name: dict(flat) for name, flat in CONFIGURATION.sections.items()}
-    sections["/**"].pop("timing.dither_cycle", None)
-    assert dither_values(CONFIGURATION._replace(sections=sections)) == {}
-    sections["/**"]["timing.dither_cycle"] = 0
-    assert dither_values(CONFIGURATION._replace(sections=sections)) == {"timing.dither_cycle": 40}
 
 
 def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a_shorter_one() -> None:

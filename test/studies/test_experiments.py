@@ -15,8 +15,7 @@ from wam_control.task import scenario
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.units import si
-from wam_studies.figures.panels import Panel
-from wam_studies.page import END, section_of
+from wam_studies.page import section_of
 from wam_studies.thesis import (
     arm_forces,
     cables,
@@ -31,7 +30,6 @@ from wam_studies.thesis import (
 from wam_studies.thesis.definition import configured, load, names
 from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.one_link import growth, one_link, played
-from wam_studies.thesis.page import write
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result
 from wam_studies.thesis.sweeping import SweptRun, record_run
@@ -350,24 +348,6 @@ def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) 
 # the page
 
 
-def test_the_page_gets_a_row_and_the_picture_of_each_experiment_and_keeps_the_others(tmp_path: Path) -> None:
-    page, picture = tmp_path / "page.md", tmp_path / "result.png"
-    page.write_text(f"# Title\n<!-- written: experiments -->\n{END}\nafter\n")
-    picture.write_bytes(b"picture")
-    rows = [Comparison(name, 1.0, value, "N", 0.02) for name, value in (("far", 1.0), ("q", 1.01))]
-    for name, panels in (("creep", [Panel("creep", "x", "y", [])]), ("efficiency", []), ("efficiency", [])):
-        write(page, [(load(name), Result(rows, panels), picture)])
-    text = page.read_text()
-    for name in ("creep", "efficiency"):
-        assert text.count(f"| `{name}` | 2 of 2 | q, N | 1 | 1.01 | +1.00 % | 2.00 % |") == 1
-    assert text.count("(page/creep.png)") == 1
-    assert "efficiency.png" not in text
-    assert text.endswith(f"{END}\nafter\n")
-    assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
-    write(page, [(load("creep"), Result([*rows, Comparison("off", 1.0, 1.03, "N", 0.02)], []), picture)])
-    assert "| `creep` | 2 of 3 MISSED | off, N | 1 | 1.03 | +3.00 % | 2.00 % MISSED |" in page.read_text()
-
-
 def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -459,18 +439,6 @@ def test_creep_runs_and_is_judged_again_from_its_bag(tmp_path: Path, capfd) -> N
     other.write_text(text.replace("  - name: out_and_back\n", "  - name: out_and_back\n    stops: true\n"))
     assert run_command(str(other), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 1
     assert "stops the arm  does not stop" in capfd.readouterr().out
-
-
-def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, capfd) -> None:
-    """The large step of section 5.6 alone, in a file of one's own."""
-    whole = yaml.safe_load(packaged("experiments/testbed-5.6").read_text())
-    whole["runs"] = [run for run in whole["runs"] if run["name"] == "large_step"]
-    file = tmp_path / "large.yaml"
-    file.write_text(yaml.safe_dump(whole))
-    assert run_command(str(file), "--directory", str(tmp_path), "--name", "bags") == 0
-    said = capfd.readouterr().out
-    assert "large step, press 10 lb       diverged       diverged" in said
-    assert "the driver stopped the arm at" in said
 
 
 def test_a_run_that_is_not_whole_is_not_judged(tmp_path: Path, capfd) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
-from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_description.event import OBEYED, Code, warning
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
@@ -20,7 +19,6 @@ from wam_studies.force_benchmark.study import GROUPINGS, ForceStudy
 from wam_studies.force_benchmark.surfaces import Surface
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, draw, steps, triple
 from wam_studies.force_benchmark.trial import ForceTrial, inertia, knowable, perform
-from wam_studies.harness import chosen_cases
 
 DRAWN = [draw(WAM, 1, number) for number in range(300)]
 Q = (0.0, -1.0, 0.0, 0.8)
@@ -96,16 +94,6 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
             assert bool(driver.plant.data.ncon) is touches, (task, distance)
 
 
-def test_a_ramp_rises_to_the_whole_force_in_its_time() -> None:
-    task = TASK._replace(ramp=1.0)
-    _, *ramp, press = steps(task, RANGES.seconds)
-    forces = [math.hypot(*step.force.force) for step in ramp]
-    assert sum(step.seconds for step in ramp) == pytest.approx(1.0)
-    assert forces == sorted(forces)
-    assert forces[0] == pytest.approx(2.0)
-    assert math.hypot(*press.force.force) == pytest.approx(10.0)
-
-
 def test_another_force_comes_first_and_a_small_one_lasts_longer() -> None:
     stepped = TASK._replace(before=30.0, ramp=0.5)
     _, *ramp, first, press = steps(stepped, RANGES.seconds)
@@ -130,22 +118,6 @@ def test_the_last_command_limits_the_force_at_the_end() -> None:
     assert evaluated(task, trace(down + [10.1] * 3000, **held_back)).outcome is TaskEnd.GIVEN_UP
     pressing = evaluated(task, trace(down + [18.0] * 3000, **held_back))
     assert (pressing.outcome, pressing.is_over) == (TaskEnd.ENDED, True)
-
-
-def test_motors_with_dither_have_no_joint_sensors() -> None:
-    configuration = configured(CONFIGURATION, TASK._replace(is_dithered=True))
-    assert not configuration.shared.arm.joint_sensors
-    assert configuration.shared.timing.dither_cycle == 40
-    assert configuration.node("force_loop", ForceLoopParameters).feedback == "contact_estimate"
-
-
-def test_an_estimated_position_is_not_given_away() -> None:
-    for surface in (ACROSS, ACROSS._replace(cover="inner_link", position=0.2)):
-        configuration = configured(CONFIGURATION, TASK._replace(surface=surface, is_pinned=False))
-        own = configuration.node("force_loop", ForceLoopParameters)
-        given = CONFIGURATION.node("force_loop", ForceLoopParameters)
-        assert (own.contact_cover, own.contact_position) == (given.contact_cover, given.contact_position)
-        assert own.contact_source == "estimated"
 
 
 def test_true_motors_give_another_torque_than_their_reported_one() -> None:
@@ -325,11 +297,6 @@ def test_what_a_user_would_write_presses_on_a_soft_rod_at_a_known_position(contr
     across = triple(-RigidBody(WAM).cover_pose(q, cover).rotation[:, 1])
     task = Task(q, Surface(cover, 0.3, across, 4000.0, 0.3, is_plane=False), 8.0)
     assert perform(CONFIGURATION, task, controller=controller).mean == pytest.approx(8.0, rel=0.1)
-
-
-def test_cases_are_the_tasks_of_the_seed() -> None:
-    assert [case.task for case in chosen_cases(STUDY, 1, 3)] == DRAWN[:3]
-    assert "pose" in STUDY.details(trials()[0])
 
 
 def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:

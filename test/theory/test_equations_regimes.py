@@ -112,22 +112,6 @@ def test_order_of_the_regimes_holds_above_zeta_0_1372_alone() -> None:
     assert np.array_equal(a == b, zeta > math.sqrt(0.75))
 
 
-@pytest.mark.parametrize("zeta", [0.3, 0.8, 0.9, 1.4])
-def test_gamma_a_is_where_three_real_modes_or_equal_decay_begin(zeta: float) -> None:
-    """Roots of (5.14): below, a real mode is the slowest and no pair swings faster than it decays."""
-    bound = float(regimes.gamma_a(zeta))
-
-    def real_mode_leads(gamma: float) -> bool:
-        roots = np.roots([1.0, 2.0 * zeta, 1.0, 2.0 * zeta * gamma])
-        slowest = roots[np.argmax(roots.real)]
-        return abs(slowest.imag) < 1e-9
-
-    assert real_mode_leads(bound * (1.0 - 1e-6))
-    assert not real_mode_leads(bound * (1.0 + 1e-6))
-    short = 1.0 / 3.0 - 8.0 * zeta * zeta / 27.0
-    assert (abs(short / bound - 1.0) < 1e-12) is (zeta < math.sqrt(0.75))
-
-
 @pytest.mark.parametrize(("ktr", "kc"), [(2.0, 2.0), (4.0, 1.0), (1.0, 3.0)])
 def test_point_b_parts_first_slips_that_stick_from_those_that_reverse(ktr: float, kc: float) -> None:
     zeta, j = 0.25, 0.8

@@ -90,14 +90,6 @@ def test_useful_length_and_largest_cylinder_are_those_of_two_bars(aspect: float,
     assert math.tan(theta / 2.0) == pytest.approx(mu)
 
 
-def test_angle_of_which_the_tangent_is_mu_does_not_give_3_3() -> None:
-    aspect, mu = 5.0, 0.3
-    wrong = math.atan(mu)
-    diameter = 2.0 * float(useful_length(aspect, wrong)) * math.tan(wrong / 2.0)
-    assert diameter < 0.3 * largest_cylinder(aspect, mu)
-    assert largest_cylinder(aspect, mu) == pytest.approx(2.0 * useful_length(aspect, secure_angle(mu)) * mu)
-
-
 def test_stubby_links_grasp_nothing_and_slender_ones_nearly_all() -> None:
     assert useful_length([0.5, 1e6], 0.3) == pytest.approx([0.0, 1.0], abs=1e-5)
     assert largest_cylinder([1.0, 1e6], 0.3) == pytest.approx([0.0, 0.6], abs=1e-5)

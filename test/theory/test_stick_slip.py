@@ -201,29 +201,6 @@ def test_no_event_is_missed() -> None:
         assert np.all(np.abs(springs[signs == 0]) <= node.static_friction * (1.0 + 1e-9))
 
 
-def test_state_is_continuous_over_every_event() -> None:
-    for node, loop, force in random_cases(40):
-        trajectory = simulate(node, loop, force, 20.0)
-        events = trajectory.events
-        for before, after in pairwise(events):
-            index = events.index(before)
-            reached = trajectory._at(index, after.time)[:3]
-            assert reached == pytest.approx((after.x, after.v, after.x_m), rel=1e-9, abs=1e-9)
-
-
-def test_motion_goes_on_from_any_state_as_if_never_stopped() -> None:
-    for node, loop, force in random_cases(30):
-        if loop.sample_period:
-            continue
-        whole = simulate(node, loop, force, 12.0)
-        for event in whole.events[1:8]:
-            if event.time > 6.0 or event.kind in (Kind.SLIP, Kind.REVERSE):
-                continue  # at breakaway the state alone does not tell slip from stick
-            rest = simulate(node, loop, force, 6.0, (event.x, event.v, event.x_m))
-            ahead = [0.7, 2.1, 5.9]
-            np.testing.assert_allclose(rest.at(ahead), whole.at([event.time + t for t in ahead]), atol=1e-6)
-
-
 def test_energy_put_in_is_energy_stored_and_dissipated() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(24)
     for name in ("coulomb", "stiction", "saturated, with deadband", "impact", "overdamped", "hold"):
@@ -261,17 +238,6 @@ def stored(node: FrictionNode, motion: Motion) -> float:
     )
 
 
-def test_frictionless_response_is_the_matrix_exponential() -> None:
-    system = np.array([[0.0, 1.0, 0.0], [-4.0, -1.0, 2.0], [-2.0 * 0.8, 0.0, 0.0]])
-    values, vectors = np.linalg.eig(system)
-    rest = -np.linalg.solve(system, [0.0, 0.0, 0.8 * 3.0])
-    times = np.linspace(0.0, 30.0, 61)
-    modes = np.linalg.solve(vectors, -rest)
-    expected = [(rest + vectors @ (np.exp(values * t) * modes)).real for t in times]
-    motion = simulate(unit_node(0.0), IntegralLoop(0.8), 3.0, 30.0).at(times)
-    np.testing.assert_allclose(np.transpose([motion.x, motion.v, motion.x_m]), expected, atol=1e-12)
-
-
 # --------------------------------------------------------------------------- the errata's numbers
 def test_first_peaks_shrink_and_the_response_still_diverges() -> None:
     trajectory = simulate(unit_node(), IntegralLoop(1.5), 4.0, 400.0)
@@ -291,15 +257,6 @@ def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None
         ends = SmallSteps(node, loop, step).run([60.0, 120.0, 180.0, 240.0, 300.0], 1.0 / 64, REST)
         spans = np.abs(step - 2.0 * ends[:, 0])
         assert bool(spans[-1] < 0.2 * step) is stable, spans
-
-
-def test_a_size_that_has_not_converged_is_no_limit_cycle() -> None:
-    node = FrictionNode(1.0, 1.5012051, 2.1646104, 43.5124522, 1.0, 1.0)
-    loop = IntegralLoop(0.2164, 0.56938673, sample_period=0.7614, delay_samples=4)
-    early, late, later = (assess(node, loop, 5.0, max_events=count) for count in (300, 1500, 3000))
-    assert early.verdict is Verdict.UNDECIDED
-    assert late.verdict is later.verdict is Verdict.LIMIT_CYCLE
-    assert late.peak_to_peak == pytest.approx(later.peak_to_peak, rel=0.02)
 
 
 def test_early_verdicts_are_those_of_long_runs() -> None:
@@ -325,25 +282,6 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
             span = max(e.contact_force for e in long.events[-40:]) - min(e.contact_force for e in long.events[-40:])
             assert span == pytest.approx(outcome.peak_to_peak, rel=1e-6)
     assert seen == {Verdict.DIVERGED, Verdict.SETTLED, Verdict.LIMIT_CYCLE}
-
-
-def test_standstills_ever_nearer_to_the_target_are_rest_and_not_a_cycle_of_rounded_samples() -> None:
-    node = FrictionNode(1.0, 1.2882191346522565, 0.8398435082087737, 0.41877963987125794, 1.0, 1.0)
-    loop = IntegralLoop(0.5140619411273989, 3.749510458586118, sample_period=0.793266855126162, delay_samples=2)
-    start = (0.0, 47.26389283360043, 0.0)
-    errors = [abs(e.contact_force) for e in simulate(node, loop, 0.0, 1e9, start).events if e.kind is Kind.STICK]
-    assert len(errors) >= 5
-    assert all(late < 0.01 * early for early, late in pairwise(errors))
-    assert assess(node, loop, 0.0, start).verdict is Verdict.SETTLED
-
-
-def test_slip_slower_than_gamma_a_never_ends() -> None:
-    slow = simulate(unit_node(), IntegralLoop(0.30), 4.0, 1e4)
-    assert slow.ended
-    assert [event.kind for event in slow.events] == [Kind.START, Kind.SLIP]
-    assert slow.at([1e4]).contact_force[0] == pytest.approx(4.0, abs=1e-12)
-    fast = simulate(unit_node(), IntegralLoop(0.33), 4.0, 1e4)
-    assert Kind.STICK in [event.kind for event in fast.events]
 
 
 # ---------------------------------------------------------------------------- stiction limit cycle
