@@ -114,7 +114,7 @@ class OutputFile:
         folder, suffix = file.parent, file.suffix.lower()
         if suffix not in self.suffixes:
             allowed = ", ".join(filter(None, self.suffixes))
-            return f"{file} would be {self.kind}; give a file that ends in {allowed}"
+            return f"{file} cannot be {self.kind}; give a file that ends in {allowed}"
         why = ""
         if file.is_dir():
             why = "it is a directory"
@@ -144,8 +144,9 @@ PICTURE = OutputFile("a picture", (".png", ".pdf", ".svg", ".jpg", ".eps"))
 
 def take_configuration(parser: argparse.ArgumentParser, default: str | None = BASE_CONFIGURATION) -> None:
     """Give a command the options --config and --set."""
+    known = f"; default: {default}" if default else ""
     parser.add_argument(
-        "--config", default=default, help="configuration: a YAML file, or the name of one that is installed"
+        "--config", default=default, help=f"configuration: a YAML file, or the name of a packaged one{known}"
     )
     parser.add_argument(
         "--set",
@@ -226,9 +227,9 @@ def recording_folder(configuration: Configuration, name: str) -> Path:
     """The directory in which the recorder makes a bag of this name; refused where it cannot."""
     folder = Path(str(configuration.sections["recorder"]["directory"]))
     if reason := unwritable(folder):
-        raise ValueError(f"{reason}; give another one as --set recorder:directory=DIRECTORY")
+        raise ValueError(f"{reason}; give another one with --set recorder:directory=DIRECTORY")
     if name and (folder / name).exists():
-        raise ValueError(f"bag {folder / name} exists already; give another name as --name, or move it away")
+        raise ValueError(f"bag {folder / name} exists already; give another name with --name, or move that bag away")
     return folder
 
 
@@ -239,19 +240,20 @@ def take_time(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=EACH,
         choices=(EACH, GROUPED),
-        help="each: one process per node; grouped: one for driver and velocity loop, one for the recorder, one for "
-        "all others; default: one process for all, in realtime grouped",
+        help="each, also without a value: one process per node; grouped: one for driver and velocity loop, one for the "
+        "recorder, one for all others; default: one process for all, in realtime grouped",
     )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="follow the wall clock and wait for no command, as a real arm does; default: lockstep (timing.mode)",
+        help="follow the wall clock without waiting for commands, as a real arm does; default: as "
+        "timing.mode is configured",
     )
     parser.add_argument(
         "--real-time-factor",
         type=bounded(float),
         metavar="FACTOR",
-        help="pace of lockstep: 1 is that of the wall clock, 0 as fast as possible; default: timing.real_time_factor",
+        help="pace of lockstep; 1: as the wall clock, 0: as fast as possible; default: timing.real_time_factor",
     )
 
 
@@ -283,7 +285,8 @@ def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
         "--live",
         action=argparse.BooleanOptionalAction,
         default=default,
-        help="show the arm in the browser; default: " + ("no" if default is False else "yes, if that is possible"),
+        help="show the arm in the browser; default: "
+        + ("no" if default is False else "yes, if ROS and viser are installed"),
     )
     take_port(parser)
 
@@ -298,7 +301,7 @@ class BatchOptions(NamedTuple):
 
 def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
     """Give a command of this name the options of a long computation."""
-    parser.add_argument("--jobs", type=_JOBS, help="processes; default: one for each core")
+    parser.add_argument("--jobs", type=_JOBS, help="number of processes; default: one for each core")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
     )
@@ -308,16 +311,16 @@ def take_batch(parser: argparse.ArgumentParser, name: str) -> None:
         type=Path,
         default=default_file(name),
         metavar="FILE",
-        help="file of finished runs, which are not computed again; default: %(default)s",
+        help="file of finished runs; a run in it is not computed again; default: %(default)s",
     )
-    kept.add_argument("--fresh", action="store_true", help="compute every run again and keep none")
+    kept.add_argument("--fresh", action="store_true", help="compute every run again and do not keep the results")
 
 
 @contextmanager
 def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
     """What the options of `take_batch` name, with no more processes than pieces; progress goes to stderr."""
     if not given.fresh and (reason := unwritable(given.results.parent)):
-        raise ValueError(f"{reason}; give another directory as --results")
+        raise ValueError(f"{reason}; give another directory with --results")
     with executor(min(given.jobs or os.cpu_count() or 1, pieces), given.dask) as found:
         progress = Progress(getattr(given, "part", given.command), sys.stderr)
         yield BatchOptions(found, None if given.fresh else given.results, progress)
@@ -326,11 +329,11 @@ def batch_of(given: argparse.Namespace, pieces: int) -> Iterator[BatchOptions]:
 OTHER_ROBOT = (
     ("--topic", "TOPIC", "analyse this topic only; with --map it may have any type"),
     ("--joint", "JOINT", "analyse this joint only; or give names to the joints of messages without names"),
-    ("--command", "TOPIC", "topic of the commands; default: the reference in the controller state"),
+    ("--command", "TOPIC", "topic of the commands; default: the reference in the messages of the controller's state"),
     (
         "--map",
         "QUANTITY=FIELD",
-        f"field of the messages, e.g. effort=current or stamp=sec,nanosec; {', '.join(MAPPED)}",
+        f"field with a quantity, e.g. effort=current or stamp=sec,nanosec; quantities: {', '.join(MAPPED)}",
     ),
     ("--unit", "QUANTITY=UNIT", "unit of a quantity, e.g. position=deg or effort=mA; or a factor, e.g. effort=0.12"),
 )

@@ -145,7 +145,7 @@ def replay(
     inputs = [topic for topic in declaration.inputs if rows[topic].is_replayed]
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
     if not any(name.endswith(f"/{topic}") for name in bag.topics for topic in (*inputs, *outputs)):
-        raise BagError(f"{bag.path} has no topic of the node {node}; it has no arm, or another one recorded it")
+        raise BagError(f"{bag.path} has no topic of the node {node}; give a bag of this stack")
     run = recorded_run(bag, namespace)
     run = run._replace(parameters=run.parameters.with_options(values))
     namespace = run.namespace
@@ -166,8 +166,8 @@ def replay(
         compared.append(_compare(topic, columns, published.get(topic.name, []), owners(topic, shared.arm)))
     if not any(one.compared or one.only_recorded or one.only_replayed for one in compared):
         raise BagError(
-            f"{path}: {declaration.name} publishes nothing from what is recorded, and no message of it is there: "
-            "nothing to compare; a bag of the stack's recorder with all topics can be replayed"
+            f"{path}: {declaration.name} publishes nothing from these inputs, and the bag has no message of it: "
+            "there is nothing to compare; give a bag with all topics, from the recorder of the stack"
         )
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)

@@ -172,7 +172,7 @@ def test_a_configuration_that_differs_from_the_recording_is_reported_with_the_va
     assert {one.name for one in done.changed} >= {"contact_estimator:use_joint_sensors", "arm.gravity"}
     (line,) = other_values(done)
     assert line.startswith("--config differs from the recording in contact_estimator:use_joint_sensors=false, ")
-    assert line.endswith("to keep one: --set contact_estimator:use_joint_sensors=true")
+    assert line.endswith("to keep a recorded value: --set contact_estimator:use_joint_sensors=true")
     assert "arm.gravity" in line
     assert replay(bag, "contact_estimator").changed == ()
 
@@ -231,7 +231,7 @@ def test_a_topic_that_had_another_type_is_named_and_not_left_out(tmp_path: Path,
 
 
 def test_a_comparison_of_nothing_is_no_success() -> None:
-    with pytest.raises(BagError, match="velocity_loop publishes nothing from what is recorded"):
+    with pytest.raises(BagError, match="velocity_loop publishes nothing from these inputs"):
         replay(Path(__file__).parents[2] / "bags/sample/active-pretension", "velocity_loop")
 
 
@@ -253,8 +253,8 @@ def test_a_hole_in_an_input_is_named(bag: Path, tmp_path: Path, capsys: pytest.C
     assert ended.value.code == 1
     said = capsys.readouterr().out
     assert "INCOMPLETE: The recorder received 10 messages (10 of /wam/joint_states) that are not in the bag." in said
-    assert f"first only recorded at {stamps[40] / 1e9:.9f} s" in said
-    assert "without an input gravity has no output" in said
+    assert f"first message that was only recorded: at {stamps[40] / 1e9:.9f} s" in said
+    assert "where an input was lost, gravity has no output" in said
 
 
 def test_a_parameter_to_set_that_is_not_in_the_bag_is_refused_by_name(bag: Path) -> None:

@@ -16,7 +16,7 @@ STANDARD_OUTPUT = Path("-")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "bag", type=Path, help="directory of the bag, or its file: MCAP, CSV, or .bag and .db3 through rosbags"
+        "bag", type=Path, help="directory of a bag, or a file: .mcap, .csv; with the package rosbags also .bag, .db3"
     )
     parser.add_argument(
         "--html", type=HTML, metavar="FILE", help="also write one HTML page with pictures; it needs no network"

@@ -29,8 +29,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         )
     text = "record every topic of a running stack until Ctrl-C"
     record = requests.add_parser("record", help=text, description=text, epilog=OF_RECORDER)
-    record.add_argument("--name", default="", help="name of the bag; default: arm, date and time")
-    record.add_argument("--directory", type=writable_directory, help="directory of the bag; default: as configured")
+    record.add_argument("--name", default="", help="name of the bag; default: name of the arm, date and time")
+    record.add_argument(
+        "--directory",
+        type=writable_directory,
+        help="directory for the bag; default: recorder:directory of the configuration",
+    )
     take_stack(record)
     take_configuration(record)
 

@@ -35,7 +35,10 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
     "tare": ("take the present external torques as zero force", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
-    "step": ("pause, then advance by one period", (Call("driver", "pause", True), Call("driver", "step"))),
+    "step": (
+        "pause, then advance the simulated arm by one period",
+        (Call("driver", "pause", True), Call("driver", "step")),
+    ),
     "resume": ("resume the time of the simulated arm", (Call("driver", "pause", False),)),
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
@@ -75,11 +78,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded(float, -math.inf, unit="N"),
         nargs=3,
         metavar="N",
-        help="x, y and z, in the frame of the link",
+        help="force: x, y and z in N, in the frame of the link",
     )
-    pushed.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
+    pushed.add_argument("--at", type=float, metavar="M", help="position along the link in m; default: its middle")
     pushed.add_argument(
-        "--seconds", type=bounded(float, unit="s"), default=1.0, help="in the arm's time; default: %(default)g"
+        "--seconds",
+        type=bounded(float, unit="s"),
+        default=1.0,
+        help="duration of the push, in the arm's time; default: %(default)g",
     )
 
 
@@ -127,7 +133,7 @@ def _get(given: argparse.Namespace, stack: StackClient) -> int:
         if keys:
             print(f"# {what}", *(f"{node}:{key}={values[key]}" for key in sorted(keys)), sep="\n")
     if hidden:
-        print(f"# and {hidden} of all nodes; to see them: wam call get {node} --all")
+        print(f"# {hidden} more are shared by all nodes; to see them: wam call get {node} --all")
     return 0
 
 
@@ -176,14 +182,14 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
     def check(silent: float) -> None:
         nonlocal is_reported
         of = f" of {given.count}" if given.count is not None else ""
-        waits = f"waits for message {taken + 1}{of} of {given.topic}"
+        waits = f"waiting for message {taken + 1}{of} on {given.topic}"
         if given.timeout is not None and silent > given.timeout:
-            raise TimeoutError(f"{waits}; none for {given.timeout:g} s (--timeout){_hint(given.topic, stack)}")
+            raise TimeoutError(f"{waits}; none came for {given.timeout:g} s (--timeout){_hint(given.topic, stack)}")
         if not is_reported and silent > CALL_LIMITS.silence:
             is_reported = True
             row = BY_NAME.get(given.topic)
             seldom = ", which is published only when it changes" * bool(row and row.latched)
-            ends = "Ctrl-C ends, --timeout S after S seconds"
+            ends = "Ctrl-C ends this; --timeout S ends it after S seconds"
             print(f"{waits}{seldom}{_hint(given.topic, stack)}; {ends}", file=sys.stderr, flush=True)
 
     try:

@@ -38,7 +38,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=COUNT,
         default=0,
         metavar="VERSION",
-        help="put a simulated arm with this firmware on that bus, e.g. udp_multicast:239.74.163.2, in its own process",
+        help="firmware of a simulated arm, which runs in its own process on the bus of --bus, e.g. "
+        "udp_multicast:239.74.163.2",
     )
     parser.add_argument(
         "--dry-run",
@@ -56,7 +57,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded(float, unit="A"),
         default=0.4,
         metavar="A",
-        help="extra current of the first motor, of either sign, above what carries the links; default: %(default)s",
+        help="test current of the first motor in A, of either sign, added to what carries the links; default: "
+        "%(default)s",
     )
     parser.add_argument(
         "--share",
@@ -70,7 +72,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=COUNT,
         default=5,
         metavar="N",
-        help="attempts at each row; a busy computer delays a correct driver; default: %(default)s",
+        help="attempts at each row of the contract; on a busy computer a correct driver may need more; default: "
+        "%(default)s",
     )
     parser.epilog = (
         "The test enables the driver many times, and small currents flow. On a real arm, keep its range clear and "

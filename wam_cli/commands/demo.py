@@ -30,14 +30,14 @@ from wam_sim.simulated_bag import record
 from wam_studies.thesis.definition import Experiment, load, tasks, with_run
 
 EXIT_CODES = (
-    "Exit code: 0 if it was played to its end and every result is right; 1 if it failed, or a result is NO or MISSED; "
+    "Exit code: 0 if the run was complete and every result is right; 1 if the run failed, or a result is NO or MISSED; "
     "130 if you stopped it."
 )
 PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
 LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
 WITHOUT_ROS = (
-    "ROS is not installed (no rclpy): the same nodes run in this process, with the same numbers, without topics and "
-    "live page; for those: pip install 'wam_stack[ros,live]'"
+    "ROS is not installed (no rclpy): the same nodes run in this process and give the same numbers, but there are no "
+    "topics and no live page; for these: pip install 'wam_stack[ros,live]'"
 )
 
 
@@ -60,7 +60,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help=f"play this task instead of the demonstration: {', '.join(tasks())}, or a YAML file of your own",
     )
     played.add_argument("--scenario", type=filled, help="play these steps instead of the demonstration: a YAML file")
-    parser.add_argument("--name", type=filled, help="name of the bag; default: demo or the task, date and time")
+    parser.add_argument(
+        "--name", type=filled, help="name of the bag; default: 'demo' or the name of the task, date and time"
+    )
     take_page(parser, default=None)
     take_configuration(parser)
 
@@ -91,7 +93,7 @@ def run(given: argparse.Namespace) -> int:
         if stated.is_there:
             print(f"next: wam analyse {bag_word}", file=stream)
         if configuration.shared.timing.mode == "realtime":
-            print("next: wam demo    # without --realtime: lockstep waits for a busy machine", file=stream)
+            print("next: wam demo    # without --realtime: lockstep waits for a busy computer", file=stream)
         return 1
     print(f"next     wam live {bag_word}       # the recording in the browser")
     print(f"         wam analyse {bag_word}    # measured and compared with theory")

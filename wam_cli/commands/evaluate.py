@@ -55,7 +55,7 @@ def study_arguments(parser: argparse.ArgumentParser, name: str, kind: type[Study
     parser.add_argument("--write", type=PAGE, help=f"write the result into a page, for example {kind.page}")
     for one in _options(kind):
         _add(parser, one)
-    take_configuration(parser)
+    take_configuration(parser, kind.base)
     take_batch(parser, name)
     parser.set_defaults(part=name, config=kind.base, study=kind)
 

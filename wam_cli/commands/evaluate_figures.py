@@ -9,8 +9,12 @@ from wam_studies.figures.style import draw_panels
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}; default: all")
-    parser.add_argument("--to", type=writable_directory, default="docs/figures", help="directory; default: %(default)s")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"figures to draw, of {', '.join(FIGURES)}; default: all"
+    )
+    parser.add_argument(
+        "--to", type=writable_directory, default="docs/figures", help="directory for the figures; default: %(default)s"
+    )
     take_batch(parser, "figures")
 
 

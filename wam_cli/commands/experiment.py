@@ -37,15 +37,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         choices=("check", "make"),
-        help="check the sample bags in the index of --directory, or record and cut them again; default: of all "
-        "experiments and tasks",
+        help="check: compare the sample bags with the index in --directory; make: record and cut them again; without "
+        "experiment names: those of all experiments and tasks",
     )
     parser.add_argument(
         "--directory", type=Path, default=Path("bags"), help="directory for bags and pictures; default: bags"
     )
-    parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
     parser.add_argument(
-        "--jobs", type=bounded(int, 1), default=os.cpu_count() or 1, help="processes; default: one for each core"
+        "--name", default="", help="subdirectory for the bags; default: name of the experiment, date and time"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=bounded(int, 1),
+        default=os.cpu_count() or 1,
+        help="number of processes; default: one for each core",
     )
     parser.add_argument(
         "--write", type=PAGE, metavar="PAGE", help="also write tables and pictures into this documentation page"
@@ -114,7 +119,8 @@ def _samples(given: argparse.Namespace) -> int:
     for experiment in chosen:
         if experiment.name not in entries:
             wrong.append(
-                f"{folder} lists no sample of {experiment.name}; 'wam experiment {experiment.name} --samples make'"
+                f"{folder} lists no sample of {experiment.name}; make it: 'wam experiment {experiment.name} --samples "
+                "make'"
             )
             continue
         entry = entries[experiment.name]

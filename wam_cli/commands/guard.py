@@ -14,13 +14,13 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop
 PLANT = {  # option: what it is
     "inertia": "inertia of the driven link, kg m^2 or kg",
     "damping": "viscous damping, N m s/rad or N s/m",
-    "transmission": "stiffness k_tr, N m/rad or N/m",
+    "transmission": "stiffness k_tr of the transmission, N m/rad or N/m",
     "contact": "stiffness k_c of the stiffest surface, N m/rad or N/m",
     "friction": "dynamic (Coulomb) friction, N m or N",
-    "gain": "G_I, rad/s per N m or m/s per N",
+    "gain": "integral gain G_I, rad/s per N m or m/s per N",
 }
 LOOP = {  # option: default, what it is
-    "limit": (math.inf, "saturation of the error; default: none"),
+    "limit": (math.inf, "saturation of the error, N m or N; default: none"),
     "rate": (0.0, "sampling rate, Hz; default: 0, a continuous loop"),
     "delay": (0.0, "delay from sample to command, s; default: 0"),
 }
@@ -30,10 +30,12 @@ WHILE_IT_RUNS = ("margin here", "margin here, assessed", "gain factor", "lowered
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_configuration(parser, default=None)
-    own = parser.add_argument_group("a force loop of your own", "give the first six, in consistent units")
+    own = parser.add_argument_group(
+        "a force loop of your own", "give the first six, all in rotary or all in linear units"
+    )
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
-    own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
+    own.add_argument("--stiction", type=float, help="static friction, N m or N; default: the dynamic friction")
     for name, (_, text) in LOOP.items():
         own.add_argument(f"--{name}", type=float, help=text)
     own.add_argument(

@@ -55,9 +55,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="write a scenario with informative moves, play it in the simulation and identify from its bag",
     )
     length = bounded(float, 10.0, 3600.0, "s")  # the choice of its moves takes minutes
-    parser.add_argument("--seconds", type=length, help="with --excite: length of the motion, default 60")
+    parser.add_argument("--seconds", type=length, help="with --excite: length of the motion in s, default 60")
     parser.add_argument("--seed", type=SEED, help="with --excite: seed of the moves, default 1")
-    parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
+    parser.add_argument(
+        "--only-write", action="store_true", help="with --excite: write the scenario and do not play it"
+    )
     parser.add_argument(
         "--directory", type=writable_directory, help="with --excite: directory of the bag, default bags"
     )
@@ -106,7 +108,9 @@ def run(given: argparse.Namespace) -> int:
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         write_overlay(given.write, _base(given), values, command)
-        print(f"written: {given.write}; use it with --config {given.write}, or as base: of your own configuration")
+        print(
+            f"written: {given.write}; use it with --config {given.write}, or as `base` of a configuration of your own"
+        )
     return 0
 
 
@@ -131,7 +135,7 @@ def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
     if there != shared.arm.joint_from_motor:
         raise ValueError(
             f"{run.bag.path} is of an arm with joint_from_motor {list(there)}; the configuration has "
-            f"{list(shared.arm.joint_from_motor)}; give the configuration of that arm as --config"
+            f"{list(shared.arm.joint_from_motor)}; give the configuration of that arm with --config"
         )
 
 

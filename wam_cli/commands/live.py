@@ -19,21 +19,23 @@ PATIENCE: Final = 1.0  # s, in which a page ends by itself
 LATE: Final = 30.0  # s, for which a stack waits for its page
 NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 NEEDS = (
-    "The page needs viser: pip install 'wam_stack[live]'. Only this machine reaches it. --tf needs tf2_msgs, "
-    "--trajectories control_msgs, from a ROS installation."
+    "The page needs viser: pip install 'wam_stack[live]'. It can be opened on this computer only. --tf needs "
+    "tf2_msgs and --trajectories needs control_msgs, both from a ROS installation."
 )
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", nargs="?", type=Path, help="show this recording instead of a running stack")
-    where = "namespace of the stack, default wam; or of the arm in the bag, default the one with most topics"
+    where = "namespace of the stack; default: wam. With a bag: that of the arm in it; default: the one with most topics"
     parser.add_argument("--namespace", type=namespace, help=where)
     take_port(parser)
     way = parser.add_mutually_exclusive_group()
-    way.add_argument("--tf", action="store_true", help="no page: publish the frames on /tf and /tf_static")
+    way.add_argument("--tf", action="store_true", help="instead of a page, publish the frames on /tf and /tf_static")
     way.add_argument(
-        "--trajectories", action="store_true", help="no page: serve the action FollowJointTrajectory, as for MoveIt"
+        "--trajectories",
+        action="store_true",
+        help="instead of a page, serve the action FollowJointTrajectory, as for MoveIt",
     )
     parser.add_argument("--frame-prefix", help="with --tf: prefix of every frame, for example left/")
     parser.epilog = NEEDS

@@ -15,7 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "format",
         choices=("urdf", "mjcf", "scorecard"),
-        help="the arm as URDF or MJCF, or the requirements for force control of chapter 3",
+        help="urdf, mjcf: the arm in this format; scorecard: the requirements for force control of chapter 3",
     )
     parser.add_argument(
         "--ros2-control",
@@ -29,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Print the model or the table."""
     if given.ros2_control and given.format != "urdf":
-        raise ValueError("--ros2-control is a tag of URDF; print wam model urdf")
+        raise ValueError("--ros2-control adds a tag to the URDF; call: wam model urdf --ros2-control")
     configuration = configuration_of(given)
     shared = configuration.shared
     if given.format == "scorecard":

@@ -8,7 +8,7 @@ from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
 ENDS = (
     "Without --config the values are those in the bag. "
-    "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
+    "Exit code: 0 if every topic is the same bit for bit, 1 if one is not, 2 if the bag cannot be used."
 )
 LISTED = 8  # values that are named one by one
 
@@ -45,7 +45,7 @@ def other_values(done: Replay) -> list[str]:
     if not named:
         return []
     scalar = next((one for one in done.changed if not isinstance(one.recorded, tuple)), None)
-    keep = f"; to keep one: --set {scalar.name}={_brief(scalar.recorded)}" if scalar else ""
+    keep = f"; to keep a recorded value: --set {scalar.name}={_brief(scalar.recorded)}" if scalar else ""
     more = f" and {len(named) - LISTED} more" if len(named) > LISTED else ""
     return [f"--config differs from the recording in {', '.join(named[:LISTED])}{more}{keep}"]
 
@@ -59,7 +59,9 @@ def without_effect(values: list[str], done: Replay) -> list[str]:
     if not values or not done.is_same:
         return []
     why = f"either the recording had these values, or they have no effect on {done.node} with its other parameters"
-    return [f"nothing changed with {', '.join(values)}: {why}. For example, friction has none with use_joint_sensors"]
+    return [
+        f"nothing changed with {', '.join(values)}: {why}. For example, friction has no effect with use_joint_sensors"
+    ]
 
 
 def reasons(done: Replay) -> list[str]:
@@ -69,8 +71,8 @@ def reasons(done: Replay) -> list[str]:
     lines = []
     if done.lost:
         lines.append(
-            f"without an input {done.node} has no output, in lockstep perhaps for the rest of the bag; after a gap its "
-            "state differs"
+            f"where an input was lost, {done.node} has no output, in lockstep perhaps until the end of the bag; after "
+            "the gap its state differs from the recorded run"
         )
     different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
     if done.mode == "realtime" and different:
@@ -94,8 +96,8 @@ def stated(topic: Compared) -> str:
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
     if topic.alone is not None:
-        line += f"\n    first only recorded at {topic.alone / 1e9:.9f} s"
+        line += f"\n    first message that was only recorded: at {topic.alone / 1e9:.9f} s"
     if topic.first:
         stamp, field, recorded, replayed = topic.first
-        line += f"\n    first at {stamp / 1e9:.9f} s: {field} {recorded!r} recorded, {replayed!r} replayed"
+        line += f"\n    first difference at {stamp / 1e9:.9f} s: {field} {recorded!r} recorded, {replayed!r} replayed"
     return line

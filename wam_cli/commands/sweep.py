@@ -49,7 +49,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         type=filled,
         metavar="NAME",
-        help=f"YAML file, or the name of one that is installed; default: {SCENARIO}",
+        help=f"YAML file, or the name of a packaged scenario; default: {SCENARIO}",
     )
     what.add_argument(
         "--experiment",
@@ -67,13 +67,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "a constant ratio; may be repeated",
     )
     kind = parser.add_mutually_exclusive_group()
-    kind.add_argument("--list", action="store_true", help="no grid: run k takes the k-th value of each --vary")
+    kind.add_argument(
+        "--list", action="store_true", help="no grid of all combinations: run k takes the k-th value of each --vary"
+    )
     kind.add_argument(
         "--random",
         type=bounded(int, 1, MOST_SETS),
         metavar="RUNS",
-        help="draw this many random sets between the two values of each parameter: logarithmic if both are above 0, "
-        "else uniform; not for whole numbers",
+        help="draw this many random sets, each value between the two that --vary gives: log-uniform if both are above "
+        "0, else uniform; not for whole numbers",
     )
     parser.add_argument("--seed", type=SEED, help="seed of --random; default: 1")
     parser.add_argument(
@@ -96,7 +98,7 @@ def run(given: argparse.Namespace) -> int:
     doubts = f", {doubted} with a force that may be wrong (column reported)" if doubted else ""
     print(f"{len(sets)} sets, {failed} failed{doubts}, in {given.file}")
     if failed == len(sets):
-        print(f"each set failed; the first: {failures[0]}", file=sys.stderr)
+        print(f"every set failed; the first: {failures[0]}", file=sys.stderr)
     return int(failed == len(sets))
 
 
@@ -110,7 +112,7 @@ def _refuse_idle(given: argparse.Namespace, axes: list[Axis]) -> None:
         if names.count(name) > 1:
             raise ValueError(f"--vary has {name} {names.count(name)} times; give all its values in one --vary")
         if name.partition(":")[0] in ("scenario", "recorder"):
-            raise ValueError(f"--vary {name}: runs of a sweep have no such node; give the scenario as --scenario")
+            raise ValueError(f"--vary {name}: runs of a sweep have no such node; give the scenario with --scenario")
 
 
 def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> tuple[list[str], list[str]]:

@@ -3,7 +3,6 @@
 import argparse
 import sys
 
-from wam_bag.errors import command
 from wam_cli.commands.live import page_next_to
 from wam_cli.options import (
     configuration_of,
@@ -40,7 +39,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--log-level",
         choices=("debug", "info", "warn", "error", "fatal"),
         default="info",
-        help="least severity of what the nodes print; default: %(default)s",
+        help="lowest severity of the messages that the nodes print; default: %(default)s",
     )
     take_page(parser, default=False)
     take_configuration(parser)
@@ -82,8 +81,8 @@ def run(given: argparse.Namespace) -> int:
         if not code:
             print(f"node {node} has ended; all were stopped")
     if given.scenario and "scenario" in ended and not any(ended.values()):
-        bag = "BAG" if given.record else "BAG, of a run with --record,"
-        print(f"played; to see whether its commands were carried out: {command('wam analyse', bag, '--steps')}")
+        record = "" if given.record else "play it with --record, then "
+        print(f"played; to see whether its commands were carried out: {record}'wam analyse BAG --steps'")
     for failure in failures:
         print(f"error: {failure}; all others were stopped", file=sys.stderr)
     if stack.bag_failure:

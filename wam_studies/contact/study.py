@@ -64,7 +64,7 @@ class ContactStudy(Study[ContactCase, ContactScore]):
     free: float = option(200.0, "seconds of motion without contact per seed", 0.0)
     joint_sensors: bool = option(False, "estimate from the joint sensors")
     degradations: tuple[str, ...] = option((), "degradations of arm and signals", choices=(ALL, *NAMES))
-    seconds: float = option(110.0, "length of a recording with degradations", TIMES.shortest)
+    seconds: float = option(110.0, "length of a recording with degradations, s", TIMES.shortest)
 
     def cases(self, seed: int) -> list[ContactCase]:
         """The scenarios of a seed, then its drives."""

@@ -82,7 +82,7 @@ class SoakStudy(Study[SoakCase, SoakRecord]):
     seeds = (1,)
     over_topics = True
 
-    seconds: float = option(600.0, "of the arm's time", 2.0)
+    seconds: float = option(600.0, "duration in the arm's time, s", 2.0)
 
     run = staticmethod(soak)
 

@@ -62,7 +62,7 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
     over_topics = True
 
     kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
-    trials: int = option(0, "trials of each kind; 0: as many as on the page", 0)
+    trials: int = option(0, "trials of each kind; 0: as many as in docs/safety.md", 0)
     short: bool = option(False, "one or a few trials of each kind")
 
     run = staticmethod(run_fault)

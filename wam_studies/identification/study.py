@@ -190,7 +190,7 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     title = "identified and true friction of many plants"
     page = "docs/identify.md"
 
-    seconds: float = option(60.0, "length of each motion", 20.0)
+    seconds: float = option(60.0, "length of each motion, s", 20.0)
 
     def cases(self, seed: int) -> list[IdentificationTrial]:
         """Each kind of plant."""
