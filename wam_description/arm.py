@@ -43,7 +43,7 @@ class Covers:
     end: tuple[float, ...] = parameter(
         "end of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0, width=3
     )
-    radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4, high=0.5)
+    radius: tuple[float, ...] = parameter("outer radius of the tube, whose ends are rounded", "m", low=1e-4, high=0.5)
 
     def __post_init__(self) -> None:
         named("arm.covers", self, least=1)
@@ -98,7 +98,7 @@ class Arm:
 
     def __post_init__(self) -> None:
         motors, joints = len(self.motors.names), len(self.joints.names)
-        require(motors == joints, f"{motors} motors and {joints} joints; the transmission needs as many of each")
+        require(motors == joints, f"the arm has {motors} motors and {joints} joints; give as many of each")
         require(
             len(self.joint_from_motor) == motors * joints,
             f"parameter 'arm.joint_from_motor' has {len(self.joint_from_motor)} values; it needs {motors * joints}",
@@ -183,13 +183,13 @@ class Arm:
             )
             require(
                 math.sqrt(inertia / link.mass) <= size,
-                f"{link.name}: arm.links.inertia {inertia:.3g} kg m^2 is more than {link.mass:.3g} kg have at the ends "
-                f"of an arm of {size:.3g} m, {link.mass * size * size:.3g} kg m^2",
+                f"{link.name}: arm.links.inertia is {inertia:.3g} kg m^2; allowed: up to {link.mass * size * size:.3g} "
+                f"kg m^2, that of {link.mass:.3g} kg at the end of an arm of {size:.3g} m",
             )
         require(
             self.gravity[2] <= 0.0,
             f"arm.gravity points upwards in the base frame: z is {self.gravity[2]:g} m/s^2; write it negative; "
-            "for an arm that hangs from a ceiling turn its base: arm.joints.twist of the first joint plus pi",
+            "if the arm hangs from a ceiling, turn its base: add pi to arm.joints.twist of the first joint",
         )
         inverse = np.linalg.inv(np.reshape(self.joint_from_motor, (len(spans), len(spans))))
         strength = (np.abs(inverse).T @ self.motors.peak_torque).tolist()
@@ -201,7 +201,7 @@ class Arm:
             )
             require(
                 torque <= strength[i],
-                f"the motors cannot carry the links beyond {joint}: they weigh up to {torque:.3g} N m there, "
+                f"the motors cannot carry the links beyond {joint}: their weight needs up to {torque:.3g} N m there, "
                 f"the peak torque is {strength[i]:.3g} N m; check arm.links.mass, arm.links.centre, "
                 "arm.joints.length and offset" + f", and arm.payload, {self.payload:g} kg" * bool(self.payload),
             )
@@ -240,7 +240,7 @@ class Timing:
     )
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
-    outer_divisor: int = parameter("inner periods in one period of the joint side", low=1, high=1000)
+    outer_divisor: int = parameter("inner periods in one outer period, that of the joint side", low=1, high=1000)
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
@@ -304,8 +304,8 @@ class Timing:
 class Servo:
     """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
 
-    proportional_gain: tuple[float, ...] = tunable("torque per velocity error", "N m s/rad")
-    integral_gain: tuple[float, ...] = tunable("torque per angle error", "N m/rad")
+    proportional_gain: tuple[float, ...] = tunable("motor torque per velocity error", "N m s/rad")
+    integral_gain: tuple[float, ...] = tunable("motor torque per angle error", "N m/rad")
 
 
 def seconds(nanoseconds: int) -> float:
@@ -324,7 +324,7 @@ class InputAges:
         high=1.0,
     )
     command: float = parameter(
-        "age from which a command of a program is absent: force, posture, joint torque", "s", low=0.002, high=1.0,
+        "age from which a program's command counts as absent: force, posture, joint torque", "s", low=0.002, high=1.0,
     )  # fmt: skip
 
     def limit_ns(self, kind: str) -> int:
@@ -356,9 +356,9 @@ class Shared:
     servo: Servo
     motion: MotionParameters
     model: ArmModel
-    disturbance_force_limit: float = parameter("largest force of a push of sim/disturbance", "N", high=1e4)
+    disturbance_force_limit: float = parameter("largest force of a push on sim/disturbance", "N", high=1e4)
     disturbance_torque_limit: float = parameter(
-        "largest torque of a push of sim/disturbance about the cover's origin", "N m", high=1e4
+        "largest torque of a push on sim/disturbance, about the cover's origin", "N m", high=1e4
     )
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")
 
@@ -372,7 +372,8 @@ class Shared:
         require(
             self.ages.feedback >= outer,
             f"ages.feedback is {self.ages.feedback:g} s, less than an outer period, {outer:g} s (timing.period times "
-            "timing.outer_divisor): commands of outer nodes would always count as absent; raise it, or shorten that",
+            "timing.outer_divisor): commands of outer nodes would always count as absent; raise ages.feedback, or "
+            "shorten the outer period",
         )
         self.arm.links.require_bodies()
         aligned("motion", self.arm.joints.names, self.motion)

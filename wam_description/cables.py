@@ -19,14 +19,18 @@ class Cables:
     and breaking strength are those of one cable.
     """
 
-    pretension: tuple[float, ...] = parameter("T_0 of the first stage", "N", high=1e5)
+    pretension: tuple[float, ...] = parameter("pretension T_0 of the first stage", "N", high=1e5)
     breaking_strength: tuple[float, ...] = parameter(
         "tension at which a first-stage cable breaks", "N", low=1.0, high=1e6
     )
     damping: tuple[float, ...] = parameter("material damping of the circuit, motor side", "N m s/rad", high=100.0)
     reducer: tuple[str, ...] = parameter("location of the speed reducer", choices=("joint", "motor"))
-    stage_motors: tuple[str, ...] = parameter("motor of each stage, from the motor towards the joint")
-    stage_ea: tuple[float, ...] = parameter("E A of one cable of the stage", "N", low=1.0, high=1e9)
+    stage_motors: tuple[str, ...] = parameter(
+        "motor to which each stage belongs; its stages in order from the motor to the joint"
+    )
+    stage_ea: tuple[float, ...] = parameter(
+        "elastic modulus times area, E A, of one cable of the stage", "N", low=1.0, high=1e9
+    )
     stage_length: tuple[float, ...] = parameter("free length of a strand", "m", high=10.0)
     stage_radius: tuple[float, ...] = parameter("radius of the stage's driving pulley", "m", low=1e-4, high=1.0)
     stage_circuits: tuple[float, ...] = parameter("parallel circuits of the stage", low=1.0, high=100.0)

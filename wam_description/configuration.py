@@ -162,7 +162,7 @@ class Configuration(NamedTuple):
             if not any(_may_be(str(entry), name) for entry in listed):
                 known = ", ".join(section for section in self.sections if section != SHARED)
                 raise ParameterError(
-                    f"{path}: section '{SHARED}/{name}' is of no node in 'nodes'; the base has {known}"
+                    f"{path}: section '{SHARED}/{name}' belongs to no node in 'nodes'; sections of the base: {known}"
                 )
         if any(":" in str(entry) for entry in listed):  # a node of one's own may have more parameters
             for name, flat in changes.items():
@@ -193,7 +193,7 @@ class Configuration(NamedTuple):
             return build(cls, self.sections[section])
         except ParameterError as error:
             where = f"{self.path}, section '{SHARED if section == SHARED else f'/**/{section}'}'"
-            given = "an option or a replaced value in place of that in " if self._file_is_right(section, cls) else ""
+            given = "a value given in place of the one in " if self._file_is_right(section, cls) else ""
             raise ParameterError(f"{given}{where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:
@@ -364,7 +364,7 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
     base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
     if len(above) >= FILES.overlays:
         raise ParameterError(
-            f"{above[0]}: more than {FILES.overlays} files build on each other by '{BASE}'; put some of them together"
+            f"{above[0]}: more than {FILES.overlays} files build on each other by '{BASE}'; merge some of them"
         )
     if base.resolve() in (path.resolve(), *above):
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
@@ -376,7 +376,7 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     if isinstance(tree, dict) and SCENARIO_KEY in tree:
         raise ParameterError(
             f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path}', "
-            "or give that to the parameter scenario:script"
+            "or set scenario:script to it"
         )
     if isinstance(tree, dict) and (near := [key for key in tree if difflib.get_close_matches(str(key), [BASE])]):
         raise ParameterError(f"{path} has the key '{near[0]}'; did you mean '{BASE}'?")

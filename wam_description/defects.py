@@ -57,7 +57,7 @@ def defect_finder(topic: Topic, arm: Arm, arrays: str) -> Callable[[Any], str]:
 
     def defect(value: Any) -> str:
         if value.frame not in allowed:
-            return f"frame_id is '{value.frame}'; allowed are {', '.join(allowed)}"
+            return f"frame_id is '{value.frame}'; allowed: {', '.join(allowed)}"
         return find(value)
 
     return defect

@@ -17,7 +17,7 @@ class Ripples:
     amplitude 2 epsilon T_0, (6.23), and one cycle.
     """
 
-    shafts: tuple[str, ...] = parameter("motor or joint of each ripple, directly or geared")
+    shafts: tuple[str, ...] = parameter("motor or joint that turns the pulley of each ripple, directly or by a gear")
     ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft", low=-1000.0, high=1e3)
     amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", high=100.0)
     cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1, high=1e4)
@@ -32,41 +32,42 @@ class Effects:
     """Which effects the plant has, and their size."""
 
     ripples: Ripples
-    creep: bool = parameter("true if cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
+    creep: bool = parameter("true if cables creep on their pulleys (6.19); the creep is also their loss (6.15)")
     backlash: tuple[float, ...] = parameter(
-        "play of each circuit at its motor, one for all or one each; above 0 the circuit is a gear or "
-        "shaft without pretension (2.2)",
+        "play of each circuit at its motor, one value for all or one each; with play the circuit is a gear or shaft "
+        "without pretension (2.2)",
         "rad",
         high=10.0,
         is_common=True,
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     pretension_share: tuple[float, ...] = parameter(
-        "active pretension (6.5): fraction of arm.cables.pretension, one for all or one each; it changes at once",
+        "active pretension (6.5) as a fraction of arm.cables.pretension, one value for all or one each; a new value "
+        "acts at once",
         high=10.0,
         live=True,
         is_common=True,
     )
     tension_friction: tuple[float, ...] = parameter(
-        "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
+        "friction torque of bearings and cable bending at each motor, per sum of both tensions (6.5)",
         "N m/N",
         high=1.0,
     )
     included_in_friction: bool = parameter(
-        "true: the friction of arm.motors is measured and includes friction by tension and ripples "
-        "(7.2.2), so the plant's dry friction is the rest; false: they are added",
+        "true: the friction in arm.motors was measured, so it includes friction by tension and ripples (7.2.2), and "
+        "the plant's dry friction is the rest; false: both are added to it",
     )
     added_coulomb_friction: tuple[float, ...] = tunable(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0
     )
     terminated: bool = option(
-        "true if the cables end on both pulleys, which bounds their creep (6.4.3): each part creeps by half of (6.19), "
-        "once for each load under which it is wound",
+        "true if the cables end on both pulleys, which bounds their creep (6.4.3): each part creeps by half of "
+        "(6.19), and only once for each load under which it is wound",
         off=False,
     )
     capstan: float = option(
-        "friction coefficient times angle of wrap on the pinion: at tensions beyond (6.16) the whole cable slips; "
-        "0: never",
+        "friction coefficient times angle of wrap on the pinion: at tensions beyond (6.16) the whole cable slips; 0: "
+        "it never slips",
         high=50.0,
     )
 
@@ -84,7 +85,7 @@ class Effects:
         require(
             not (self.terminated and self.capstan),
             f"effects.capstan is {self.capstan:g}, and effects.terminated is true; a cable that ends on its pulleys "
-            "does not slip as a whole: set one of them to 0 or false",
+            "does not slip as a whole: set effects.capstan to 0 or effects.terminated to false",
         )
         aligned("effects", motors, self)
         shares = each(self.pretension_share, len(motors))

@@ -20,8 +20,10 @@ REASONS: Final = {
     Reason.STRAIGHT_LINK: "elbow straight and force out of plane: the links cannot be distinguished",
     Reason.LINKS: "the torques do not identify the link",
     Reason.MORE: "one contact does not explain the torques",
-    Reason.ALONG: "the force may act along the link: every position and the link before it then give the same torques",
-    Reason.PAYLOAD: "the torques may come from a picked-up payload; its probability is 1 minus those of the links",
+    Reason.ALONG: "the force may act along the link: then every position on it, and the link before it, give the same "
+    "torques",
+    Reason.PAYLOAD: "a payload that was picked up may explain the torques; its probability is 1 minus the sum of those "
+    "of the links",
     Reason.TOO_EARLY: "too few samples so far",
     Reason.BRAKED: "brakes hold the motors",
 }
@@ -32,8 +34,8 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     "torques": ("the measured torques", "use joint sensors, tare in free space, or command more force"),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
-    "resting": ("the load of the arm", "declare it (arm.payload), or end the command and tare in free space"),
-    "moving_surface": ("the motion of the surface", "let it move more slowly, or raise force_gain"),
+    "resting": ("the load of the arm", "declare the load (arm.payload), or end the command and tare in free space"),
+    "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
     "shaking_arm": ("the vibration of the arm", "use joint sensors, or declare guard.contact_stiffness"),
 }
@@ -44,20 +46,20 @@ UNCERTAIN: Final = (
 SENTENCES: Final = {  # by cause
     # the arm holds
     "error": UNCERTAIN + ": {help}",
-    "moved_fast": "the arm moved faster than {speed:g} rad/s when the force began, so its load is not known: "
-    "it comes to rest first",
+    "moved_fast": "the arm moved faster than {speed:g} rad/s when the command began, so the load of the arm is not "
+    "known: the force is applied when the arm is at rest",
     "task": "{reason}",
     "other_link": "{touched} is touched, but the force is commanded on {cover}: command it on {touched}, or free the "
-    "arm; until the command ends, it goes back to where it was free",
+    "arm; until the command ends, the arm goes back to where it was free",
     "free_travel": "the arm has moved {way:.3g} m along the force {since}; allowed: {allowed:g} m "
     "(limits.free_travel): end the command, then begin again",
     # the arm goes on
     "uncertain": UNCERTAIN + ": {part_help}",
     "force_off": "{axis}: {desired:.3g} {unit} are commanded, but for {time:b} s {measured:.3g} {unit} have been "
     "measured: command a force that the arm can reach, or bend the arm",
-    "force_strays": "{axis}: the force was reached, but is wrong by more than {allowed:b} {unit} again: "
-    "{measured:.3g} {unit} of {desired:.3g} {unit}; the surface moves, something else pushes, or the friction of the "
-    "surface has changed its direction",
+    "force_strays": "{axis}: the force was reached, but is now wrong by more than {allowed:b} {unit}: "
+    "{measured:.3g} {unit} are measured, {desired:.3g} {unit} are commanded; the surface moves, something else pushes, "
+    "or the friction of the surface has changed its direction",
     "motion_off": "{axis}: {desired:.4g} {unit} is commanded, but for {time:b} s it has been at {measured:.4g} {unit}; "
     "allowed error: {allowed:.2g} {unit}: something is in the way, a joint is at its end, or the arm cannot move in "
     "this direction here",
@@ -66,39 +68,41 @@ SENTENCES: Final = {  # by cause
     "{allowed:g}): it acts elsewhere, or a second force acts; correct the contact position, or free the arm",
     "torques_changed": "the torques have changed since the force settled (chi^2 {chi2:.3g}, allowed: {allowed:g}): a "
     "second force acts, or the friction of the surface has changed its direction; command the force again",
-    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force, whole_force): "
-    "the arm moves away, by at most limits.free_travel",
+    "pushed": "something pushes with at least {force:b} N; allowed: {allowed:b} N (limits.contact_force or "
+    "limits.whole_force): the arm moves away, by at most limits.free_travel",
     "joint_end": "{joint} is at {angle:.4g} rad, {margin:g} rad before its end at {end:.4g} rad, and stops there: "
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
     "{allowed:g} times the commanded force (limits.cycle_force): lower force_gain, or use joint sensors",
-    "model_off": "the model is off: {part}; see /diagnostics, run 'wam identify'",
+    "model_off": "the model is off: {part}; see /diagnostics, then run 'wam identify'",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
-    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {cure}",
-    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:.0f} ms; {step}: make its "
+    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:ms} s; {cure}",
+    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:ms} s; {step}: make its "
     "steps faster, or run it in its own process",
-    "unanswered": "lockstep: no {topics} for the state of {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
+    "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
     "timing.period",
     "limit": "{excess}; {cure}",
     "broken": "{excess} while the brakes hold; check the cable",
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
-    "claimed": "{nodes} publish {topic}, but only one node may; stop the others, then reset_fault",
+    "claimed": "{nodes} publish {topic}, but only one node may; stop all but one, then reset_fault",
     "stopped": "{nodes} has stopped: {topics} too old; start {nodes} again, then reset_fault",
     "long_step": "{step}: {topics} too old; make its steps faster, then reset_fault",
     "ended": "{node} has ended; start it again, then reset_fault",
 }
 HOLDING: Final = "; the arm holds its position"
-SINCE: Final = ("without a contact", "since the force was last right, or rising")
+SINCE: Final = ("without a contact", "since the force was last right or rising")
 
 
 class _Sentence(string.Formatter):
-    """Format as str.format does; `b` writes a number briefly."""
+    """Format as str.format does; `b` writes a number briefly, `ms` one in ms as s."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
+        if format_spec == "ms":
+            value, format_spec = 1e-3 * value, "g"
         return brief(value) if format_spec == "b" else str(super().format_field(value, format_spec))
 
 

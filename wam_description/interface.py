@@ -17,7 +17,7 @@ from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
 BETWEEN = (
-    "it is of the outer rate, and this step of each {} is between two outer periods, so that no node would use it; "
+    "it is sent at the outer rate, but this step, one for each {}, is between two outer periods: no node would use it; "
     "write thinned=True in @reaction, or return it only where shared.timing.is_outer(inputs.stamp)"
 )
 
@@ -70,7 +70,7 @@ def require_sections(sections: Iterable[str], entries: Iterable[str]) -> None:
     names = {declared(entry).name for entry in entries}
     for section in set(sections) - names - set(NODES):
         if near := get_close_matches(section, [*NODES, *names], n=1, cutoff=FILES.similar):
-            raise ParameterError(f"section '/**/{section}' is of no node in 'nodes'; did you mean '{near[0]}'?")
+            raise ParameterError(f"section '/**/{section}' belongs to no node in 'nodes'; did you mean '{near[0]}'?")
 
 
 def require_parameters(configuration: Configuration) -> None:

@@ -22,7 +22,7 @@ class ModelMismatch:
     motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", high=10.0)
     joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
-    payload: float = parameter("unmodelled payload at the tool, besides arm.payload", "kg", high=100.0)
+    payload: float = parameter("unmodelled payload at the tool, in addition to arm.payload", "kg", high=100.0)
     torque_constant: tuple[float, ...] = parameter("factor on the torque of each motor per current", low=0.1, high=10.0)
 
 

@@ -20,9 +20,7 @@ class LinkModel:
     mass: tuple[float, ...] = like(Links, "arm.links.mass")
     centre: tuple[float, ...] = like(Links, "arm.links.centre")
     inertia: tuple[float, ...] = like(Links, "arm.links.inertia")
-    product: tuple[float, ...] = like(
-        Links, "arm.links.product", "the other elements xy xz yz of the same inertia tensor"
-    )
+    product: tuple[float, ...] = like(Links, "arm.links.product", "elements xy xz yz of the same inertia tensor")
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class MotorModel:
     )
     static_negative: tuple[float, ...] = like(Motors, "arm.motors.static_friction", "the same in negative motion")
     viscous: tuple[float, ...] = like(Motors, "arm.motors.viscous_friction", "viscous friction b")
-    stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
+    stribeck_velocity: tuple[float, ...] = parameter("Stribeck velocity v_s", "rad/s", low=1e-6, high=1e3)
     load_positive: tuple[float, ...] = parameter(
         "friction k per transmitted torque, in positive motion",
         high=0.9,
@@ -63,7 +61,7 @@ class JointModel:
     )
     static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
     viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")
-    stribeck_velocity: tuple[float, ...] = parameter("v_s", "rad/s", low=1e-6, high=1e3)
+    stribeck_velocity: tuple[float, ...] = parameter("Stribeck velocity v_s", "rad/s", low=1e-6, high=1e3)
     load: tuple[float, ...] = parameter("friction k per transmitted torque", high=0.9)
 
 
@@ -72,9 +70,11 @@ class ModelCovariance:
     """Covariance of what was identified."""
 
     parameters: tuple[str, ...] = parameter(
-        "identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified"
+        "names of the identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified"
     )
-    values: tuple[float, ...] = parameter("their covariance, row by row", "products of their units", low=-1e9, high=1e9)
+    values: tuple[float, ...] = parameter(
+        "covariance of these parameters, row by row", "products of their units", low=-1e9, high=1e9
+    )
 
     def __post_init__(self) -> None:
         count = len(self.parameters)
@@ -83,7 +83,10 @@ class ModelCovariance:
             f"parameter 'model.covariance.values' has {len(self.values)} values; {count} parameters need {count**2}",
         )
         diagonal = self.values[:: count + 1]
-        require(min(diagonal) >= 0.0, f"parameter 'model.covariance.values' has the variance {min(diagonal):g}")
+        require(
+            min(diagonal) >= 0.0,
+            f"parameter 'model.covariance.values' has a variance of {min(diagonal):g}; give 0 or more",
+        )
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ class ArmModel:
     motors: MotorModel
     joints: JointModel
     covariance: ModelCovariance
-    source: str = parameter("recording that the values were identified from; arm: those of arm")
+    source: str = parameter("recording from which the values were identified; arm: the values are those of arm")
 
     def __post_init__(self) -> None:
         for name, part in (("links", self.links), ("motors", self.motors), ("joints", self.joints)):

@@ -35,7 +35,7 @@ class FreeBodies:
         high=10.0,
     )
     ground_stiffness: tuple[float, ...] = parameter(
-        "stiffness of each point of contact with obstacles, doors and other bodies; a box lies on four",
+        "stiffness of each point of contact with obstacles, doors and other bodies; a box lies on four points",
         "N/m",
         low=1.0,
         high=1e9,
@@ -78,8 +78,8 @@ class Doors:
     hinge_damping: tuple[float, ...] = parameter("viscous friction of the hinge", "N m s/rad", high=1e4)
     spring: tuple[float, ...] = parameter("stiffness of the hinge's spring", "N m/rad", high=1e5)
     rest: tuple[float, ...] = parameter("angle at which the spring has no torque", "rad", low=-6.3, high=6.3)
-    lower: tuple[float, ...] = parameter("smallest angle", "rad", low=-6.3, high=6.3)
-    upper: tuple[float, ...] = parameter("largest angle", "rad", low=-6.3, high=6.3)
+    lower: tuple[float, ...] = parameter("smallest angle of the door", "rad", low=-6.3, high=6.3)
+    upper: tuple[float, ...] = parameter("largest angle of the door", "rad", low=-6.3, high=6.3)
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", high=10.0)
     stiffness: tuple[float, ...] = parameter("k_c of the surface, where a cover touches it", "N/m", low=1.0, high=1e9)
     damping: tuple[float, ...] = parameter("damping of the surface, where a cover touches it", "N s/m", high=1e6)

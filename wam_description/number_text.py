@@ -22,4 +22,4 @@ def as_number(value: Any) -> str:
         return ""
     written = repr(int(number) if number.is_integer() and abs(number) < 1e15 else number)
     written = written if "." in written else written.replace("e", ".0e")
-    return f"; YAML takes {value!r} for a text: write {written}"
+    return f"; YAML reads {value!r} as a text: write {written}"

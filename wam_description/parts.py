@@ -99,7 +99,7 @@ class Links:
         width=3,
     )
     product: tuple[float, ...] = parameter(
-        "the other elements xy xz yz of the same inertia tensor; zero where the axes are principal",
+        "elements xy xz yz of the same inertia tensor; zero if the axes are principal",
         "kg m^2",
         low=-100.0,
         high=100.0,

@@ -89,7 +89,7 @@ def guidance(
     if absent:
         return f"{mode}; not connected yet: {', '.join(absent)}"
     if mode == "braked" and faulty:
-        return f"braked; enable is refused until the fault is over that is reported by {', '.join(faulty)}"
+        return f"braked; a fault is reported by {', '.join(faulty)}: enable is refused until it is over"
     if mode == ENABLED:
         return "enabled: the brakes are released"
     if is_played or (mode == "braked" and before == ENABLED):

@@ -292,8 +292,8 @@ class Synchroniser:
         if 0 < self._last < stamp - limit_ns:
             raise OutOfTime(
                 f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state, {self._last} ns; "
-                "give a command the stamp of the state that it answers; if a node of the stack sent it, this node is "
-                "late, as the computer is busy"
+                "give a command the stamp of the state that it answers; if a node of the stack sent it, the "
+                "computer is busy, and this node is late"
             )
 
     def _is_announced(self, stamp: int) -> bool:

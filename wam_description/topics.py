@@ -206,18 +206,19 @@ TOPICS: Final = (
         needs_joint_sensors=True,
     ),
     _joints("joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m"),
-    _joints("gravity_effort", "outer", "effort that carries the links, N m"),
+    _joints("gravity_effort", "outer", "effort = torque that carries the links, N m"),
     _joints(
         "joint_velocity_command",
         "outer",
-        "rad/s; an empty velocity array commands torque only; without any message the motors are held at 0 rad/s",
+        "joint velocities, rad/s; an empty velocity array commands torque only; without any message the motors are "
+        "held at 0 rad/s",
     ),
     _joints(
         "joint_effort_command",
         "outer",
         "feed-forward torque without gravity, N m; acts only together with a velocity command",
     ),
-    _motors("motor_velocity_command", "outer", "rad/s; an empty velocity array commands torque only"),
+    _motors("motor_velocity_command", "outer", "motor velocities, rad/s; an empty velocity array commands torque only"),
     _motors("motor_effort_command", "outer", "feed-forward torque with gravity, N m"),
     _joints(
         "joint_posture_command",

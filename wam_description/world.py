@@ -45,7 +45,7 @@ class Springs:
 
     joints: tuple[str, ...] = parameter("joint of each spring")
     stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", high=1e9)
-    lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3, high=3.0)
+    lever: tuple[float, ...] = parameter("distance of the spring from the axis of the joint", "m", low=1e-3, high=3.0)
     rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
     bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
 
@@ -85,7 +85,7 @@ class Pushers:
     covers: tuple[str, ...] = parameter("cover that each presses on")
     positions: tuple[float, ...] = parameter("position along the cover where each touches first", "m", high=3.0)
     angles: tuple[float, ...] = parameter(
-        "direction of the force about the cover, from its y to its z axis", "rad", low=-6.3, high=6.3
+        "direction of the force: angle about the x axis of the cover, from y towards z", "rad", low=-6.3, high=6.3
     )
     force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", high=1e3)
     begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", high=1e6)
@@ -120,11 +120,13 @@ class Pushers:
 class Folding:
     """Contact between the tubes of links that follow each other, as of a folded elbow."""
 
-    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", high=1e9)
+    stiffness: float = parameter(
+        "stiffness of the contact of inner and outer tube; 0: they never touch", "N/m", high=1e9
+    )
     damping: float = parameter("damping", "N s/m", high=1e6)
     friction: float = parameter("friction coefficient", high=10.0)
     clearance: float = parameter(
-        "length of the outer tube from the joint on that touches nothing: near it the tubes overlap",
+        "length of the outer tube, from the joint, that has no contact: near the joint the tubes overlap",
         "m",
         high=10.0,
     )

@@ -168,7 +168,7 @@ class ArmDriver(StackNode):
     def _take_currents(self, stamp: int, command: State) -> None:
         if not 0 < stamp <= self.stamp:
             raise Refused(
-                f"stamp {stamp} ns is not that of a state that was sent, newest {self.stamp} ns; "
+                f"stamp {stamp} ns is not that of a published state; the newest is {self.stamp} ns; "
                 "answer a state with its own stamp"
             )
         if stamp <= self._answered:

@@ -108,7 +108,7 @@ class CableCircuits:
         before = self._circuits
         if len(shares) != len(before) or not all(0.0 <= share < math.inf for share in shares):
             raise ValueError(
-                f"the parts of the pretension are {shares}; give one for all or one for each of {len(before)} "
+                f"effects.pretension_share is {shares}; give one for all or one for each of {len(before)} "
                 "circuits, 0 or above"
             )
         self._circuits = tuple(

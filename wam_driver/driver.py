@@ -37,9 +37,11 @@ class DriverParameters:
     amplifier: AmplifierParameters
     sensors: SensorParameters
     seed: int = parameter("seed of the random numbers of all noise", high=2**53)
-    watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
+    watchdog: float = parameter(
+        "age of the last command at which the driver stops the arm with a fault", "s", low=0.002, high=0.05
+    )
     late_periods: float = parameter(
-        "part of the newest 2000 periods that may be late when the brakes are released, in realtime",
+        "in realtime: fraction of the newest 2000 periods that may be late when the brakes are released",
         high=1.0,
     )
     brake_torque: float = parameter(
@@ -49,11 +51,11 @@ class DriverParameters:
         high=1e3,
     )
     cover_speed_limit: float = parameter(
-        "limit of the speed of the start of a cover, where it meets the link before",
+        "speed of the start of a cover, where it meets the previous link, above which there is a fault",
         "m/s",
         high=100.0,
     )
-    tip_speed_limit: float = parameter("limit of the speed of the tool", "m/s", high=100.0)
+    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 

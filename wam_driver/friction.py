@@ -142,7 +142,8 @@ class FrictionParameters:
     """
 
     law: str = parameter(
-        "how static becomes dynamic friction; coulomb_stiction: as soon as the shaft moves; stribeck: over a velocity",
+        "how static friction becomes dynamic friction; coulomb_stiction: as soon as the shaft moves; stribeck: "
+        "gradually, as the velocity rises to about v_s",
         choices=tuple(LAWS),
     )
     motor_stribeck_velocity: tuple[float, ...] = parameter(
@@ -158,11 +159,11 @@ class FrictionParameters:
         high=0.9,
         is_common=True,
     )
-    joint_asymmetry: tuple[float, ...] = parameter("the same of each joint", low=-0.9, high=0.9, is_common=True)
+    joint_asymmetry: tuple[float, ...] = parameter("the same for each joint", low=-0.9, high=0.9, is_common=True)
     motor_load_factor: tuple[float, ...] = parameter(
         "friction of each motor per torque that the cables transmit to it", high=0.9, is_common=True
     )
-    joint_load_factor: tuple[float, ...] = parameter("the same of each joint", high=0.9, is_common=True)
+    joint_load_factor: tuple[float, ...] = parameter("the same for each joint", high=0.9, is_common=True)
     motor_presliding_stiffness: tuple[float, ...] = parameter(
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
@@ -170,11 +171,11 @@ class FrictionParameters:
         is_common=True,
     )
     joint_presliding_stiffness: tuple[float, ...] = parameter(
-        "the same of each joint", "N m/rad", high=1e9, is_common=True
+        "the same for each joint", "N m/rad", high=1e9, is_common=True
     )
     warm_drop: float = option(
-        "part of the dry friction of a motor that is gone when its winding is at its thermal limit, in proportion to "
-        "the heat below; 0: friction does not depend on temperature",
+        "fraction by which the dry friction of a motor is smaller when its winding is at its thermal limit; below the "
+        "limit in proportion to the heat; 0: friction does not depend on temperature",
         high=0.9,
     )
 

@@ -14,10 +14,10 @@ class AmplifierParameters:
     torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", high=1.0)
     ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1, high=1e4)
     current_noise: tuple[float, ...] = parameter(
-        "standard deviation of the actual current, while it is not zero", "A", high=100.0
+        "standard deviation of the noise of the actual current, while it is not zero", "A", high=100.0
     )
     torque_offset: tuple[float, ...] = parameter(
-        "torque of each motor at a reported current of zero, by the offset of its current sensor",
+        "torque of each motor at a reported current of zero, due to the offset of its current sensor",
         "N m",
         low=-100.0,
         high=100.0,
@@ -31,16 +31,22 @@ class SensorParameters:
     """Imperfections of the sensors; with all zero they read true values."""
 
     encoder_resolution: tuple[float, ...] = parameter(
-        "resolution of the motor angle; if it is not zero, the velocity is the difference over one period",
+        "resolution of the motor angle; if it is not zero, the velocity is computed from the difference of two "
+        "angles, one period apart",
         "rad",
         high=1.0,
     )
-    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", high=1.0)
+    encoder_noise: tuple[float, ...] = parameter("standard deviation of the noise of the motor angle", "rad", high=1.0)
     joint_encoder_resolution: tuple[float, ...] = parameter(
-        "resolution of the joint angle, one for all or one each; the velocity as with encoder_resolution",
+        "resolution of the joint angle, one value for all or one each; the velocity is computed as with "
+        "encoder_resolution",
         "rad",
         high=1.0,
         is_common=True,
     )
-    joint_encoder_noise: tuple[float, ...] = parameter("standard deviation of the joint angle", "rad", high=1.0)
-    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", high=100.0)
+    joint_encoder_noise: tuple[float, ...] = parameter(
+        "standard deviation of the noise of the joint angle", "rad", high=1.0
+    )
+    strain_noise: tuple[float, ...] = parameter(
+        "standard deviation of the noise of the strain torque", "N m", high=100.0
+    )

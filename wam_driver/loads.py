@@ -154,9 +154,9 @@ class CoverLoads:
                 is_solid = self._model.geom_type[other] != mujoco.mjtGeom.mjGEOM_PLANE
                 if is_solid and depth > deepest:
                     return (
-                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}, "
-                        f"beyond whose middle the contact force would be to the other side; allowed: "
-                        f"{deepest * 1e3:.3g} mm; press less, or on a stiffer surface"
+                        f"{self._cover_of_geom[geom]} is {depth * 1e3:.3g} mm deep in {self._model.geom(other).name}; "
+                        f"allowed: {deepest * 1e3:.3g} mm, as beyond its middle the contact force would push to the "
+                        "other side; press less, or on a stiffer surface"
                     )
                 normal, axis = data.contact.frame[i][:3], data.geom_xmat[geom].reshape(3, 3)[:, 2]
                 nearest = data.contact.pos[i] - sign * (radius - 0.5 * depth) * normal  # point of the axis

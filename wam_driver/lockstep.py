@@ -141,11 +141,12 @@ class Lockstep:
     def _cause(self, missing: list[str]) -> str:
         """The node that is the reason, and what to do about it."""
         if silent := ", ".join(self._session.silent):
-            return f"{silent} has stopped or is very slow, start it again"
+            return f"{silent} has stopped or is very slow; start it again"
         found = self._interface.unanswered(missing, self._session.awaited)
         unknown = sorted(found.keys() - self._session.awaited.keys() - {""})
         if unknown or not found:
-            return f"check that {' and '.join(unknown or [self._senders[topic] for topic in missing])} runs"
+            senders = unknown or [self._senders[topic] for topic in missing]
+            return f"check that {' and '.join(senders)} run{'s' * (len(senders) == 1)}"
         return unpublished(found)
 
     @property
@@ -162,7 +163,7 @@ class Lockstep:
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         if self._started and self._patience < self._timing.timeout:
-            return f"no {' and '.join(self._senders)} comes in; {self._advice}, then enable"
+            return f"no {' and '.join(self._senders)} arrives; {self._advice}, then enable"
         return ""
 
     def pause(self, on: bool) -> None:

@@ -92,7 +92,7 @@ class Realtime:
         if due > most and self._driver.safety.mode is Mode.ENABLED:
             late = {"time": due * self._timing.period, "allowed_ms": self._watchdog * 1e3}
             step = self._held_up()
-            cure = "give it a processor, or use lockstep"
+            cure = "give it a processor of its own, or use lockstep"
             self._driver.fault(fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late))
         for left in range(min(due, most) - 1, -1, -1):
             self._driver.advance(age)
@@ -139,7 +139,7 @@ class Realtime:
         now = self._now()
         self._progress = now
         if now - self.command_came > self._watchdog:
-            return "no motor_current_command comes in; start velocity_loop and its peers, then enable"
+            return "no motor_current_command arrives; start velocity_loop and its peers, then enable"
         return self.lateness if now - self._connected >= DRIVER.settling else ""
 
     def pause(self, on: bool) -> None:

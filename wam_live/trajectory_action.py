@@ -110,7 +110,7 @@ class TrajectoryActionNode(Node):
     def _tolerances(self, tolerances: Sequence[Any]) -> dict[str, JointTolerance]:
         for one in tolerances:
             if one.name not in self._names:
-                raise Refused(f"unknown name '{one.name}' of a tolerance; allowed are {', '.join(self._names)}")
+                raise Refused(f"unknown name '{one.name}' of a tolerance; allowed: {', '.join(self._names)}")
             if one.acceleration > 0.0:
                 raise Refused(f"the tolerance of {one.name} names an acceleration, which is not measured; send 0")
         return {one.name: JointTolerance(one.position, one.velocity) for one in tolerances}

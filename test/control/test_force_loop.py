@@ -539,7 +539,7 @@ def test_tare_is_refused_while_a_force_is_commanded_the_arm_moves_or_is_where_it
     ask(loop, world, 5.0)
     assert "a force is commanded" in loop.tare()
     ask(loop, world)
-    assert "still is where it pressed" in loop.tare()
+    assert "is still where it pressed" in loop.tare()
     away = World(q=[angle + 0.1 for angle in POSE])
     for speed, reason in ((0.5, "the arm moves"), (0.0, "")):
         for _ in range(200):

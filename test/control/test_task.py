@@ -538,8 +538,8 @@ def test_a_task_is_the_same_after_it_was_a_table() -> None:
         (3, 2.0, "contact_position is 2.0 m; allowed: 0 to 0.4064"),
         (6, 0.0, "direction is zero"),
         (7, math.nan, "value is not a number"),
-        (8, 0.1, "rate is 0.1; it belongs to a position"),
-        (9, 5.0, "stiffness and damping belong to an impedance"),
+        (8, 0.1, "rate is 0.1; it is for a position"),
+        (9, 5.0, "stiffness and damping are for an impedance only"),
     ],
 )
 def test_a_row_that_is_none_is_refused_with_what_is_allowed(column: int, value: float, reason: str) -> None:

@@ -77,7 +77,7 @@ def test_a_torque_is_a_force_of_each_joint(tmp_path: Path) -> None:
         ({"task": {"axes": [{"position": 0, **AT}], "frame": "outer_link"}}, "turns with it"),
         (
             {"task": {"axes": [{"velocity": 0.1, **AT, "contact_position": "estimated"}]}},
-            "only that of a force is estimated",
+            "contact_position is missing; it is estimated for a force only",
         ),
         ({"torque": [1.0]}, "must be a list of 4 numbers"),
         ({"torque": [0.0] * 4, "task": {"axes": [{"force": 3, **AT}]}}, "task and torque are given"),

@@ -55,7 +55,7 @@ def test_an_arm_that_follows_reaches_the_goal_at_its_time() -> None:
 def test_an_arm_that_stays_does_not_reach_the_goal_and_is_named_with_the_number() -> None:
     end, time = follow(goal(), moves=False)
     assert end.code is GoalCode.GOAL_TOLERANCE_VIOLATED
-    assert "joint1 is off by -0.2 rad, allowed are 0.02 rad" in end.reason
+    assert "joint1 is off by -0.2 rad, allowed: 0.02 rad" in end.reason
     assert time == pytest.approx(1.0 + MOTION.goal_time, abs=2 * PERIOD)
 
 
@@ -91,7 +91,7 @@ def test_a_first_point_at_zero_is_where_the_arm_is() -> None:
     assert with_start.duration == without.duration
     assert with_start.at(0.37) == without.at(0.37)
     elsewhere = PosturePath((PathPoint((0.1, *START[1:])), *PATH.points))
-    with pytest.raises(ParameterError, match=r"joint1 of the trajectory starts at .* rad and is at 0 rad"):
+    with pytest.raises(ParameterError, match=r"joint1 of the trajectory starts at .* rad, but the arm is at 0 rad"):
         PostureMotion(START, elsewhere, WAM, SHARED.motion)
     moving = PosturePath((PathPoint(START, (0.1, 0.0, 0.0, 0.0)), *PATH.points))
     with pytest.raises(ParameterError, match="starts with a velocity"):

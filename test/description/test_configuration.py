@@ -232,7 +232,10 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
         ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
         ("base: nothing\n", "no configuration 'nothing' comes with wam_stack"),
         ("base: odd.yaml\n", "base is the file itself"),
-        ("base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n", r"section '/\*\*/drivr' is of no node in 'nodes'"),
+        (
+            "base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n",
+            r"section '/\*\*/drivr' belongs to no node in 'nodes'",
+        ),
         ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
         ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
         ("base: wam\ndriver: {ros__parameters: {}}\n", "section 'driver' is not allowed"),
@@ -253,14 +256,16 @@ def test_a_misspelt_section_next_to_a_node_of_ones_own_is_refused(tmp_path: Path
         "/**: {ros__parameters: {nodes: [driver, transform, 'wam_control.velocity.gravity_node:GravityNode']}}\n"
     )
     found = Configuration.load(path)
-    with pytest.raises(ParameterError, match=r"section '/\*\*/force_lop' is of no node.*did you mean 'force_loop'"):
+    with pytest.raises(
+        ParameterError, match=r"section '/\*\*/force_lop' belongs to no node.*did you mean 'force_loop'"
+    ):
         Simulation(found, [])
 
 
 def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_path: Path) -> None:
     for k in range(100):
         (tmp_path / f"{k}.yaml").write_text(f"base: {k + 1}.yaml\n")
-    with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; put some"):
+    with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; merge some"):
         Configuration.load(tmp_path / "0.yaml")
 
 
@@ -271,7 +276,7 @@ def test_a_section_may_be_empty(tmp_path: Path) -> None:
     assert Configuration.load(path).sections == WAM.sections
 
 
-IN_PLACE = f"an option or a replaced value in place of that in {WAM.path}, section '/**': "
+IN_PLACE = f"a value given in place of the one in {WAM.path}, section '/**': "
 
 
 @pytest.mark.parametrize(
@@ -331,11 +336,11 @@ def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: 
 @pytest.mark.parametrize(
     ("value", "hint"),
     [
-        ("1e-3", "; YAML takes '1e-3' for a text: write 0.001"),
-        ("1e-7", "; YAML takes '1e-7' for a text: write 1.0e-07"),
-        (".5e3", "; YAML takes '.5e3' for a text: write 500"),
-        ("1e22", "; YAML takes '1e22' for a text: write 1.0e+22"),
-        ("'4'", "; YAML takes '4' for a text: write 4"),
+        ("1e-3", "; YAML reads '1e-3' as a text: write 0.001"),
+        ("1e-7", "; YAML reads '1e-7' as a text: write 1.0e-07"),
+        (".5e3", "; YAML reads '.5e3' as a text: write 500"),
+        ("1e22", "; YAML reads '1e22' as a text: write 1.0e+22"),
+        ("'4'", "; YAML reads '4' as a text: write 4"),
         ("fast", ""),
         ("1e400", ""),
         ("nan", ""),

@@ -299,7 +299,7 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
 
 def test_an_answer_without_a_result_is_no_success() -> None:
     request = SetParametersRequest("filter", {"gain": 0.7})
-    assert "filter failed on it" in refusal_of(request, SetParameters.Response())
+    assert "filter failed while it set the parameters" in refusal_of(request, SetParameters.Response())
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -56,7 +56,10 @@ def enabled(**values: Any) -> Driver:
             {"arm.links.centre": [0.0] * 9 + [1.36, 0.0, 0.0]},
             r"link4: arm.links.centre is 1.36 m .* arm is 0.965 m long",
         ),
-        ({"arm.links.inertia": [20.0] * 12}, r"link1: arm.links.inertia 20 kg m\^2 is more than 7.68 kg have at the"),
+        (
+            {"arm.links.inertia": [20.0] * 12},
+            r"link1: arm.links.inertia is 20 kg m\^2; allowed: up to .* kg m\^2, that of 7.68 kg at the",
+        ),
         (
             {"arm.links.inertia": [0.01, 0.02, 0.04] * 4},
             r"link1: .* inertias 0.01, 0.02 and 0.04 kg m\^2; of no body .* above the sum of the others, 0.03 kg m\^2",

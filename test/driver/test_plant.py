@@ -342,7 +342,7 @@ def test_a_tube_at_the_middle_of_a_thin_object_is_sunk(shape: str, part: float, 
         thin = dataclasses.replace(thin, shapes=("cylinder",), sizes=(2.0, half, 0.0))
     plant = at(ideal_plant(WAM, thin, 5e-4), q)
     assert shape == "cylinder" or float(plant.data.contact[0].frame[2]) == sign
-    assert (" mm deep in block, beyond whose middle the contact force would be to the other" in plant.sunk()) is sunk
+    assert (" mm deep in block; allowed: " in plant.sunk()) is sunk
 
 
 def test_a_plane_has_no_middle() -> None:

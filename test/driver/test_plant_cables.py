@@ -418,9 +418,7 @@ def test_a_pretension_that_is_refused_changes_nothing(shares: list[float], slack
     plant = plant_of(damped(one_joint()), slack=slack, tension_friction=(1e-4,), creep=True)
     plant.set_pretension([0.5])
     before = repr((plant.tensions, plant.data.plastic.tolist(), plant._friction.levels, plant._circuits.each))
-    with pytest.raises(
-        ValueError, match=r"the parts of the pretension are .*; give one for all or one for each of 1 c"
-    ):
+    with pytest.raises(ValueError, match=r"effects.pretension_share is .*; give one for all or one for each of 1 c"):
         plant.set_pretension(shares)
     plant.set_pretension([0.5])
     after = repr((plant.tensions, plant.data.plastic.tolist(), plant._friction.levels, plant._circuits.each))

@@ -83,6 +83,6 @@ def test_the_console_names_the_nodes_that_are_missing_and_the_arm_that_is_called
         "(or: ros2 service call /left/driver/enable std_srvs/srv/SetBool '{data: true}')"
     )
     assert guidance("braked", "fault", [], ["gravity"], "/wam", False) == (
-        "braked; enable is refused until the fault is over that is reported by gravity"
+        "braked; a fault is reported by gravity: enable is refused until it is over"
     )
     assert guidance("braked", "", [], [], "/wam", True) == "braked: the brakes are on"

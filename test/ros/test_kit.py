@@ -140,7 +140,7 @@ def test_a_condition_that_does_not_come_fails_by_the_arms_time(arm: RunningArm) 
     ("values", "text"),
     [
         ({"driver": {"watchdogg": 1.0}}, "did you mean"),
-        ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' is of no node"),
+        ({"nobody": {"gain": 1.0}}, "section '/\\*\\*/nobody' belongs to no node"),
         ({"timing": {"period": -1.0}}, "period"),
     ],
 )

@@ -231,7 +231,7 @@ def test_two_publishers_of_the_command_are_a_fault_and_the_second_never_reaches_
     second = other.create_publisher(JointState, "motor_current_command", qos(BY_NAME["motor_current_command"]))
     live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="a fault")
     assert live.driver.currents == [0.0] * 4
-    text = "/wam/intruder and /wam/velocity_loop publish motor_current_command, but only one node may; stop the others"
+    text = "/wam/intruder and /wam/velocity_loop publish motor_current_command, but only one node may; stop all but one"
     live.ros.wait(lambda: any(text in m.message and m.level == DiagnosticStatus.ERROR for m in heard.seen["status"]))
     for _ in range(20):
         second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
@@ -374,7 +374,7 @@ def test_lockstep_time_out_names_what_is_missing_and_lockstep_goes_on_with_the_n
         hand.enable()
     hand.is_answering = False
     ros.wait(lambda: hand.driver.safety.mode is Mode.FAULT, what="the time-out")
-    text = f"lockstep: no motor_current_command for the state of {hand.last + MS} ns within 0.3 s"
+    text = f"lockstep: no motor_current_command for the state at {hand.last + MS} ns within 0.3 s"
     assert hand.driver.safety.fault == f"{text}; check that velocity_loop runs, then reset_fault"
     assert hand.driver.currents == [0.0] * 4
     unanswered = hand.driver.stamp

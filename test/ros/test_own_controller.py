@@ -407,7 +407,9 @@ class Waiting(Inner):
 def test_a_topic_of_the_outer_rate_between_two_outer_periods_is_refused_with_the_node_that_returned_it() -> None:
     """Four of five of these commands were dropped by the nodes that take them."""
     wam, steps = without(Configuration.load(packaged("wam")), "force_loop"), [ScenarioStep("wait", 0.1)]
-    text = "node 'inner' returned an unusable joint_velocity_command: it is of the outer rate, .* write thinned=True"
+    text = (
+        "node 'inner' returned an unusable joint_velocity_command: it is sent at the outer rate, .* write thinned=True"
+    )
     with pytest.raises(UnusableOutput, match=text):
         Simulation(wam, steps, {"inner": Inner}).play()
     for kind in (Thinned, Waiting):
@@ -422,7 +424,7 @@ INNER_NODES = ["driver", "transform", "velocity_loop", "gravity"]
 
 def test_over_topics_a_command_between_two_outer_periods_is_a_fault_of_its_node(arm: RunningArm) -> None:
     fault = arm.start(Inner, nodes=INNER_NODES).run_until_fault()
-    assert fault.startswith("inner: unusable joint_velocity_command: it is of the outer rate")
+    assert fault.startswith("inner: unusable joint_velocity_command: it is sent at the outer rate")
 
 
 @pytest.mark.slow

@@ -134,7 +134,7 @@ def enable(ros: Any, stack: Stack) -> None:
         ros.wait(future.done, what=f"an answer; {stack.said()}")
         if future.result().success:
             break
-        assert "no motor_current_command comes in" in future.result().message
+        assert "no motor_current_command arrives" in future.result().message
     ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
 
 

@@ -35,11 +35,11 @@ class ContactEstimatorParameters:
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter(
-        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice "
+        "value of r^T S^-1 r of the external torques; a contact is detected above it in two periods, or above twice "
         "this value in one",
         high=1e6,
     )
-    release: float = parameter("the same, below which the contact has ended", high=1e6)
+    release: float = parameter("value of r^T S^-1 r below which the contact has ended", high=1e6)
 
     def __post_init__(self) -> None:
         require(

@@ -10,21 +10,21 @@ class InferenceParameters:
     """Prior probabilities of a contact, before it is detected."""
 
     weights: tuple[float, ...] = parameter(
-        "relative frequency of contacts on each cover; the outer one sweeps more", low=1e-3, high=1e3
+        "relative frequency of contacts on each cover; the outer one moves through more space", low=1e-3, high=1e3
     )
     force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
         "sd of the distance between the line of the force and the tube's axis, per radius", high=2.0
     )
     friction: float = parameter("sd of the friction force along a cover, per force", high=2.0)
-    end_weight: float = parameter("relative frequency of contacts where two links meet, on each", high=1e3)
+    end_weight: float = parameter("relative frequency of contacts where two links meet, for each of the two", high=1e3)
     along_weight: float = parameter(
         "relative frequency of forces along the last link: on its surface, and on its end",
         high=1e3,
     )
     payload_weight: float = parameter(
-        "relative frequency of a mass that is picked up at the tool; the weights of all links are 2.65, "
-        "so 0.1 is one contact of 28",
+        "relative frequency of a mass that is picked up at the tool; the weights of the links add up to 2.65, so 0.1 "
+        "is one of 28 contacts",
         high=1e3,
     )
     fusion_time: float = parameter(

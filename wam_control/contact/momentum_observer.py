@@ -260,9 +260,11 @@ class MomentumObserver:
         if not self._is_link_side:
             error = self._errors.by_name["payload"]
             mass = self._parameters.payload[0] + error.value
-            return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {error.sd:.2f} kg now"
+            return (
+                f"without joint sensors the payload is tracked while the arm moves; now {mass:.2f} +- {error.sd:.2f} kg"
+            )
         if not self.is_ready:
-            return "too few samples so far"
+            return "too few samples so far; try again"
         if self._last.speed > CONTACT.at_rest:
             return "the arm moves: let it come to rest"
         self.torques()

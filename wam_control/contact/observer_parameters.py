@@ -11,21 +11,21 @@ class ObserverParameters:
 
     time_constant: float = parameter("time in which the estimate reaches 63 % of a step", "s", low=1e-3, high=1.0)
     detection_time: float = parameter(
-        "the same of a second, faster estimate for the detection from the motors; 0: none",
+        "the same for a second, faster estimate, which detects contacts from the motors; 0: none",
         "s",
         high=1.0,
     )
     mass_scale: tuple[float, ...] = parameter(
-        "nominal mass and inertia of each link per configured one", low=0.1, high=10.0
+        "ratio of nominal to configured mass and inertia of each link", low=0.1, high=10.0
     )
-    friction_scale: float = parameter("nominal friction per configured friction", high=10.0)
+    friction_scale: float = parameter("ratio of nominal to configured friction", high=10.0)
     mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", high=1.0)
     centre_uncertainty: float = parameter("sd of each coordinate of the centre of mass of each link", "m", high=1.0)
     moving_uncertainty: float = parameter(
-        "sd of the friction of a moving shaft before any motion, per dynamic friction", high=10.0
+        "sd of the friction of a moving shaft at the start, before it is tracked, per dynamic friction", high=10.0
     )
     asymmetry_uncertainty: float = parameter(
-        "sd of the difference from that in each direction, per dynamic friction", high=10.0
+        "sd of the difference of each direction from the common friction, per dynamic friction", high=10.0
     )
     load_uncertainty: float = parameter(
         "sd of the friction of a motor, and of a joint that several drive, per transmitted torque",
@@ -33,7 +33,7 @@ class ObserverParameters:
     )
     torque_scale_uncertainty: float = parameter("sd of a motor's torque constant, per constant", high=1.0)
     torque_delay_uncertainty: float = parameter(
-        "sd of the time by which the motors' torques are older than their angles, of all together",
+        "sd of the delay of the motor torques with respect to the motor angles; one delay for all motors",
         "s",
         high=0.1,
     )
@@ -42,7 +42,7 @@ class ObserverParameters:
         high=10.0,
     )
     payload_uncertainty: float = parameter("sd of the mass at the tool where no payload is declared", "kg", high=50.0)
-    drift: float = parameter("change of these errors of the model within a second, per standard deviation", high=10.0)
+    drift: float = parameter("drift of these model errors within a second, per standard deviation", high=10.0)
     rest_uncertainty: float = parameter("sd of the friction of a shaft at rest, per static friction", high=10.0)
     motor_rest_velocity: float = parameter(
         "motor speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
@@ -56,7 +56,7 @@ class ObserverParameters:
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
     motor_torque_fraction: float = parameter("sd of the motor torques per torque", high=1.0)
     motor_noise: float = parameter(
-        "sd of a moving motor's torque at the start, per dynamic friction; then it is followed",
+        "sd of the torque of a moving motor at the start, per dynamic friction; afterwards it is tracked",
         high=10.0,
     )
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)

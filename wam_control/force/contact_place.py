@@ -138,6 +138,6 @@ def _rejection(contact: Contact, lean: float) -> str:
         return (
             f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "
             f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
-            "pin the position (contact_source, or the torque of the command); the last position is used"
+            "pin the position (contact_source, or the torque of the command); until then the last position is used"
         )
     return ""

@@ -30,10 +30,12 @@ class SensingParameters:
     """What disturbs the measured force, and how exactly it has to be known."""
 
     torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3)
-    torque_fraction: float = tunable("the same, per torque of the commanded force", high=1.0)
-    estimated_torque_sd: float = tunable("torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3)
+    torque_fraction: float = tunable(
+        "further sd of each measured joint torque, per torque of the commanded force", high=1.0
+    )
+    estimated_torque_sd: float = tunable("as torque_sd, with feedback contact_estimate", "N m", low=1e-6, high=1e3)
     estimated_torque_fraction: float = tunable(
-        "torque_fraction with feedback contact_estimate: constants and friction of the motors", high=1.0
+        "as torque_fraction, with feedback contact_estimate: torque constants and friction of the motors", high=1.0
     )
     friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0)
     zero_limit: float = tunable(

@@ -176,18 +176,17 @@ class CommandAdmission:
         covers, pinned = self._covers, pinned_position(command)
         if pinned is None or command.frame not in covers.names:
             return (
-                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the position of a "
-                f"force across a cover, in the frame of that cover ({', '.join(covers.names)}); send zero torque, "
-                f"or such a force"
+                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque is for a force across "
+                f"a cover, whose position it pins, in the frame of that cover ({', '.join(covers.names)}); send zero "
+                f"torque, or such a force"
             )
         cover, place = pinned
         length = covers.length_of(cover)
         own = torque_of_position(command.force, place)
         if math.dist(own, command.torque) > FORCE.cross_lever * _size(command):
             return (
-                f"torque {command.torque} N m is commanded; that of the force {command.force} N about the origin of "
-                f"{cover} is (0, -x fz, x fy), at the position x: send zero torque, or such a one; joint torques are "
-                f"commanded on joint_torque_command"
+                f"torque {command.torque} N m is commanded with the force {command.force} N on {cover}; allowed: zero, "
+                f"or (0, -x fz, x fy) for the contact position x; send joint torques on joint_torque_command"
             )
         if not 0.0 <= place <= length:
             return f"torque {command.torque} N m pins the force at {place:.3g} m of {cover}; allowed: 0 to {length:g} m"

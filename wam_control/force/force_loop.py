@@ -160,7 +160,7 @@ class ForceLoop:
         if self._measurement.speed >= MOTION.at_rest:
             return "the arm moves: let it come to rest"
         if not self._has_left:
-            return "the arm still is where it pressed: free it first"
+            return "the arm is still where it pressed: move it away first"
         self._measurement.tare()
         return ""
 

@@ -185,7 +185,7 @@ class ForceLoopNode:
 
     @property
     def guard_report(self) -> Report:
-        """What the guard reports of the parameters in force."""
+        """What the guard reports of the parameters in use."""
         return self._loop.report
 
     def diagnostics(self) -> dict[str, str]:

@@ -19,7 +19,7 @@ class LimitParameters:
     """Where the force loop stops the arm."""
 
     joint_gain: float = tunable(
-        "largest speed of a joint over its distance from the end; 0: the ends are not watched",
+        "largest speed of a joint towards its end, per distance from it; 0: the ends are not watched",
         "1/s",
         high=100.0,
     )
@@ -33,11 +33,11 @@ class LimitParameters:
         "largest force on the arm, as the joints measure it; above it the arm moves away", "N"
     )
     whole_force: float = tunable(
-        "largest whole force at the contact over the commanded one; above it the arm moves away",
+        "largest whole force at the contact, as a multiple of the commanded force; above it the arm moves away",
     )
     impact: float = tunable(
-        "largest predicted impact (3.1) on a surface of guard.contact_stiffness, over the commanded "
-        "force; it limits the speed before the touch; 0: no limit",
+        "largest predicted impact (3.1) on a surface of guard.contact_stiffness, as a multiple of the commanded "
+        "force; it limits the speed before the contact; 0: no limit",
         high=1e3,
     )
     settling_time: float = tunable("time after which a force that is still not reached is reported", "s", low=1e-3)
@@ -46,21 +46,23 @@ class LimitParameters:
         "the arm holds its position",
         "m",
     )
-    tolerance: float = tunable("tolerated error of a force, over the commanded one; up to it a force counts as reached")
+    tolerance: float = tunable(
+        "tolerated error of a force, as a fraction of the commanded force; up to it a force counts as reached"
+    )
     doubt: float = tunable(
-        "largest doubt, predicted over tolerated error, with which a force is applied; with a larger "
-        "limit fewer forces are refused and more are wrong",
+        "largest ratio of predicted to tolerated error with which a force is applied; with a larger limit fewer "
+        "forces are refused and more are wrong",
         low=0.01,
     )
     least_tolerance: float = tunable(
-        "least error up to which a force counts as reached, however small it is", "N", high=1e3
+        "error up to which a force counts as reached, however small the commanded force is", "N", high=1e3
     )
     cycle_force: float = tunable(
-        "swing of the measured force, per commanded force, from which it is reported as a limit cycle"
+        "swing of the measured force from which a limit cycle is reported, as a fraction of the commanded force"
     )
     shake_force: float = tunable(
-        "largest swing of the force by the dither on a surface of guard.contact_stiffness, over the "
-        "commanded force; above it the arm holds its position; with feedback contact_estimate",
+        "with feedback contact_estimate: largest swing of the force due to the dither, on a surface of "
+        "guard.contact_stiffness, as a fraction of the commanded force; above it the arm holds its position",
     )
     surface_speed: float = tunable(
         "largest speed of the surface along the force; the lag of the force behind it counts as an error",
@@ -68,8 +70,8 @@ class LimitParameters:
         high=10.0,
     )
     slide_speed: float = tunable(
-        "largest speed of the surface across the force; its approach while the arm's friction reverses "
-        "counts as an error",
+        "largest speed of the surface across the force; a sloping surface approaches the arm while friction reverses, "
+        "which counts as an error",
         "m/s",
         high=10.0,
     )
@@ -118,7 +120,9 @@ class ForceLoopParameters:
         "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
     )
     torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
-    delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
+    delay_samples: int = parameter(
+        "additional delay of the velocity that the force law commands, in outer periods", low=0, high=20, live=True
+    )
     force_feedforward: float = tunable(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it "
         "accelerates a free arm towards the surface",
@@ -129,7 +133,7 @@ class ForceLoopParameters:
         "force; none with feedback contact_estimate",
         high=1.0,
     )
-    posture_gain: float = tunable("joint velocity per posture error", "1/s", high=1e3)
+    posture_gain: float = tunable("joint velocity per error of the posture", "1/s", high=1e3)
     joint_speed_limit: float = tunable("largest joint speed due to the posture and to the force", "rad/s", high=1e3)
     force_filter: float = tunable("time constant of the low pass on the measured force", "s", high=10.0)
     spring_stiffness: tuple[float, ...] = tunable(
@@ -143,15 +147,15 @@ class ForceLoopParameters:
         live=True,
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
-    contact_position: float = tunable("contact position assumed along it", "m", high=3.0)
+    contact_position: float = tunable("assumed contact position along that cover", "m", high=3.0)
     contact_position_sd: float = tunable(
         "standard deviation of a pinned contact position",
         "m",
         high=1.0,
     )
     schedule: str = parameter(
-        "off: the gains stay; position: the gains follow the estimated contact position and keep the "
-        "margin of contact_position; the worst position counts if the estimate is uncertain",
+        "off: constant gains; position: the gains follow the estimated contact position, so that the margin is the "
+        "one at contact_position; if the estimate is uncertain, the worst position counts",
         choices=("off", "position"),
         live=True,
     )

@@ -13,7 +13,7 @@ from wam_theory.linear_loop import damping_ratio, gain_ratio
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
-ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop leaves another margin"
+ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop changes the margin"
 
 
 class LoopDesign(NamedTuple):
@@ -56,8 +56,8 @@ class LoopDesign(NamedTuple):
         ]
         if undecided > verdict.stable_error:
             lines.append(
-                f"undecided: up to {undecided:.4g} no response was found that does not come to rest, but not all were "
-                f"followed to their end ({EVENTS} events)"
+                f"undecided: up to {undecided:.4g} all responses that were followed to their end come to rest, but "
+                f"some were not followed to their end ({EVENTS} events)"
             )
         if verdict.saturated_cycle:
             lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
@@ -68,7 +68,7 @@ class LoopDesign(NamedTuple):
             finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
             lines.append(f"{finding}: {lower}{saturate}")
         elif GUARD.close < part <= 1.0:
-            lines.append(f"close to the margin: a plant a little other than the one given may be unstable; {lower}")
+            lines.append(f"close to the margin: a plant that differs a little may be unstable; {lower}")
         return "\n".join(lines)
 
 

@@ -38,7 +38,7 @@ class GuardParameters:
     """Assumptions of the guard, and its reaction to unstable parameters."""
 
     mode: str = parameter(
-        "off: no guard; warn: report; refuse: refuse unstable parameters; limit: lower them, in domain II the "
+        "off: no guard; warn: report unstable parameters; refuse: refuse them; limit: lower them, in domain II the "
         "saturation to the stable error, else the gains",
         choices=("off", "warn", "refuse", "limit"),
         live=True,
@@ -50,9 +50,11 @@ class GuardParameters:
     stability_fraction: float = tunable(
         "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0
     )
-    feedback_lag: float = tunable("time constant of the estimate with feedback contact_estimate", "s", high=10.0)
+    feedback_lag: float = tunable(
+        "time constant of the estimated force, with feedback contact_estimate", "s", high=10.0
+    )
     extra_delay: int = parameter(
-        "inner periods by which a command may be later than timing.outer_delay, as in real time",
+        "inner periods by which a command may be later than timing.outer_delay, as in realtime",
         low=0,
         high=100,
         live=True,

@@ -194,16 +194,22 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         names the value that is not allowed.
     """
     is_place = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
-    require(axis.value is not None or is_place, f"{where}: value is not a number; only a position may be left out")
+    require(
+        axis.value is not None or is_place,
+        f"{where}: value is not a number; give one, only that of a position or an impedance may be left out",
+    )
     require(
         axis.kind is AxisKind.IMPEDANCE or not (axis.stiffness or axis.damping),
-        f"{where}: stiffness and damping belong to an impedance; it is a {axis.kind.name.lower()}",
+        f"{where}: stiffness and damping are for an impedance only; this axis is a {axis.kind.name.lower()}",
     )
     require(
         axis.stiffness >= 0.0 and axis.damping >= 0.0,
         f"{where}: stiffness is {axis.stiffness:g} and damping {axis.damping:g}; allowed: 0 and above",
     )
-    require(axis.rate == 0.0 or is_place, f"{where}: rate is {axis.rate:g}; it belongs to a position")
+    require(
+        axis.rate == 0.0 or is_place,
+        f"{where}: rate is {axis.rate:g}; it is for a position or an impedance only: leave it out",
+    )
     if axis.joint >= 0:
         low, high = arm.joints.lower[axis.joint], arm.joints.upper[axis.joint]
         require(
@@ -213,7 +219,8 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         return axis
     length = arm.covers.length_of(axis.cover)
     require(
-        axis.position is not None or axis.is_sensed, f"{where}: no position given; only that of a force is estimated"
+        axis.position is not None or axis.is_sensed,
+        f"{where}: contact_position is missing; it is estimated for a force only",
     )
     require(
         axis.position is None or 0.0 <= axis.position <= length,

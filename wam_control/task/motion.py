@@ -199,8 +199,8 @@ class PostureMotion:
         for name, angle, begin in zip(self._joints.names, start, first.position, strict=True):
             require(
                 abs(angle - begin) <= MOTION.arrived,
-                f"{name} of the trajectory starts at {begin:.4g} rad and is at {angle:.4g} rad; allowed are "
-                f"{MOTION.arrived:g} rad between them: plan from where the arm is, or leave out the point at 0 s",
+                f"{name} of the trajectory starts at {begin:.4g} rad, but the arm is at {angle:.4g} rad; allowed: a "
+                f"difference of {MOTION.arrived:g} rad: plan from where the arm is, or leave out the point at 0 s",
             )
         require(not any(first.velocity), "the trajectory starts with a velocity; allowed: 0 rad/s, the arm is at rest")
 

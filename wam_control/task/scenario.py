@@ -319,7 +319,8 @@ def motion_of(
         if motion is not None and shared is not None:
             require(
                 motion.duration <= step.seconds + MOTION.rounding,
-                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
+                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}: "
+                "give the step more time",
             )
             _require_speed(step, motion, start, shared, followed)
     except ParameterError as error:
@@ -333,7 +334,7 @@ def _planned(step: ScenarioStep, start: Sequence[float], shared: Shared | None) 
     if not step.moves:
         return None
     if shared is None:
-        raise ParameterError("a motion has limits; give them to the scenario: Scenario(steps, shared)")
+        raise ParameterError("a motion needs the limits of the arm; give them: Scenario(steps, shared)")
     if step.trajectory is not None:
         return PostureMotion(start, step.trajectory, shared.arm, shared.motion)
     assert step.tip is not None
@@ -678,7 +679,7 @@ def _require_push(where: str, push: Push, shared: Shared, seconds: float) -> Non
     require(
         0.0 <= begin < end <= seconds + MOTION.rounding,
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
-        f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
+        f"{seconds:g} s of the step; a push ends with its step: to continue it, give it again in the next step",
     )
     excess = shared.push_excess(push.force, push.torque)
     require(not excess, f"{where}: push: {excess}")

@@ -24,7 +24,7 @@ class ScenarioNode:
     """Streams postures, forces and pushes; releases the brakes and puts them on.
 
     While a request is under way nothing is streamed, so that in lockstep the arm does not move
-    until the driver has answered; where it refuses, the scenario has failed and is over.
+    until the driver has answered.  If it refuses, the scenario fails and ends.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
 
 def _line(where: str, body: Mapping[str, Any], own: str, arm: Arm) -> list[TaskAxis]:
     known(where, body, ("line", "point", "along", "hold"), ("line", "point", "along"))
-    require(own == BASE, f"{where}: a line is given in the base frame; the task is in that of {own}")
+    require(own == BASE, f"{where}: the frame of the task is {own}; a line needs the frame base")
     cover = _cover(where, body["line"], arm)
     held = body.get("hold", list(PARTS))
     require(

@@ -110,7 +110,7 @@ class TrajectoryGoal:
         for k, (desired, actual, unit) in enumerate(pairs):
             for name, want, got, most in zip(self._arm.joints.names, desired, actual, allowed, strict=True):
                 if 0.0 < most[k] < abs(got - want):
-                    return f"{name} is off by {got - want:.3g} {unit}, allowed are {most[k]:g} {unit}"
+                    return f"{name} is off by {got - want:.3g} {unit}, allowed: {most[k]:g} {unit}"
         return ""
 
 

@@ -23,7 +23,8 @@ class DitherParameters:
     """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
     level: float = tunable(
-        "amplitude per static friction of motor and joints, reflected to the motor; 0: off", high=3.0
+        "torque amplitude of the dither over the static friction of motor and joints, reflected to the motor; 0: off",
+        high=3.0,
     )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 

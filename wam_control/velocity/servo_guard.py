@@ -33,12 +33,12 @@ class ServoGuardParameters:
         choices=("off", "refuse"),
     )
     stability_fraction: float = parameter(
-        "fraction of the largest stable gains that is accepted, with commands on time",
+        "fraction of the largest stable gains that is accepted, for commands on time",
         low=0.05,
         high=1.0,
     )
     extra_delay: int = parameter(
-        "inner periods of extra delay of a current in realtime, with which the gains have to be stable",
+        "extra delay of a current in realtime with which the gains have to be stable, in inner periods",
         high=10,
     )
     velocity_by_difference: bool = parameter(

@@ -14,7 +14,7 @@ class TransformParameters:
     """What the transform knows of the cables."""
 
     creep_correction: bool = parameter(
-        "true: joint angles are corrected by the creep of the cables (6.19), from the motor torques",
+        "true: joint angles are corrected for the creep of the cables (6.19), which is computed from the motor torques",
     )
 
 

@@ -70,7 +70,7 @@ class VelocityLoopNode:
         self._dither = dither
 
     def tune(self, own: VelocityLoopParameters) -> None:
-        """Take another level of the dither while the arm moves; the other parameters need a new start."""
+        """Take another level of the dither while the arm moves; the other parameters need a restart."""
         self._set_dither(own)
         self._own = own
 

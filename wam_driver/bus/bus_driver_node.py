@@ -64,7 +64,7 @@ class BusDriver(ArmDriver):
         self.health.counts["late periods"] += due - 1
         age = max((self.stamp - self._command_stamp) * 1e-9, time.perf_counter() - self._came)
         if self.safety.mode is Mode.ENABLED and age > self._watchdog:
-            cure = f"{due - 1} periods missed, check that velocity_loop runs"
+            cure = f"{due - 1} periods missed; check that velocity_loop runs"
             self.trip(fault("command_stale", age_ms=age * 1e3, allowed_ms=self._watchdog * 1e3, cure=cure))
         hardware.exchange(due)
         if hardware.is_running:
@@ -106,7 +106,11 @@ class BusDriver(ArmDriver):
 
     def obstacle(self) -> str:
         """Whether no commands come."""
-        return "" if time.perf_counter() - self._came < self._watchdog else "no motor_current_command comes in"
+        return (
+            ""
+            if time.perf_counter() - self._came < self._watchdog
+            else "no motor_current_command arrives; start velocity_loop, then enable"
+        )
 
     def release(self, obstacle: str) -> Answer:
         """Release the motors, unless an obstacle is named."""
@@ -140,7 +144,10 @@ class BusDriver(ArmDriver):
     def _confirm_home(self, _: Any) -> Answer:
         is_taken = self.hardware.confirm_home()
         return Answer(
-            is_taken, "the zero is set" if is_taken else "refused: the driver does not wait for the home pose"
+            is_taken,
+            "the zero is set"
+            if is_taken
+            else "refused: the driver is not waiting for the home pose; its status shows what it waits for",
         )
 
     def destroy_node(self) -> None:

@@ -12,11 +12,11 @@ class BusFault(Enum):
     )
     MISSING = "motor controller {node} does not answer; check its cable"
     UNKNOWN_NODE = "node {node} does not belong to this arm; take the configuration of your arm"
-    NOT_MOTOR = "node {node} has the role {detail}, which is not that of a motor controller"
+    NOT_MOTOR = "node {node} has the role {detail}, which is not the role of a motor controller"
     FIRMWARE = "node {node}: {detail}"
     MIXED_FIRMWARE = "motor controller {node} has another firmware than controller 1: the number of {detail} differs"
     NOT_AWAKE = "motor controller {node} does not wake up; its status is {detail}"
-    WRIST = "motor 7 has {detail} poles, the wrist has 6; a gimbal has other ratios"
+    WRIST = "motor 7 has {detail} poles, allowed 6, those of a wrist; a gimbal has other transmission ratios"
     COUNTS = "motor controller {node} has {detail} counts per turn, allowed 4096 and 40960"
     GAIN = "motor controller {node} has {detail} counts per N m, far from the maker's value"
     LIMIT = "motor controller {node} has the largest torque (MT) {detail}; it must be above 0"
@@ -25,18 +25,18 @@ class BusFault(Enum):
         "motor controller {node} did not take its zero: it is at {detail} counts, not at those of the home pose"
     )
     # later
-    NO_REPLY = "motor controller {node} sends no position"
+    NO_REPLY = "motor controller {node} sends no position; check its cable"
     JUMP = "the position of motor {node} jumps"
     RESET = "motor controller {node} was reset; its zero is lost"
     ALL_SILENT = "the safety module answers, but no motor controller does; check the cable of the bus"
     NO_POWER = "nothing answers on the bus; check power, cable and adapter"
     ESTOP = "E-stop; release it and press Shift-Idle{detail}"
     SAFETY_IDLE = "the safety module went to idle{detail}; press Shift-Activate when the arm may move"
-    SAFETY_SILENT = "the safety module does not answer"
+    SAFETY_SILENT = "the safety module does not answer; check the cable to the pendant"
     CONTROLLER_IDLE = "motor controller {node} left the torque mode: {detail}"
     FOREIGN = "another computer sends on this bus; end its program"
-    DOUBLED = "two nodes have the number {node}"
-    NOT_SENT = "the adapter does not take frames: {detail} were refused"
+    DOUBLED = "two nodes have the number {node}; give each its own"
+    NOT_SENT = "the adapter refused {detail} frames; check adapter, cable and power of the arm"
 
     @property
     def loses_controllers(self) -> bool:

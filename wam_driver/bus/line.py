@@ -81,7 +81,10 @@ def line_of(shared: Shared, own: BusParameters, clock: Any) -> Line:
         where python-can is not installed, or cannot open the bus.
     """
     if own.interface == SIMULATED:
-        require(own.channel.isdigit(), f"channel of a simulated bus is '{own.channel}'; give its firmware, as '200'")
+        require(
+            own.channel.isdigit(),
+            f"channel of a simulated bus is '{own.channel}'; give the firmware of its controllers, for example '200'",
+        )
         return SimulatedBus(shared, own, int(own.channel))
     try:
         import can
