@@ -166,7 +166,7 @@ def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channe
     kind = type_of(mcap, channel)
     collector = collectors.setdefault(channel.topic, Collector(kind, *times))
     if collector.kind != kind:
-        raise Damage(f"topic {channel.topic} is of type {collector.kind.name} and of another one")
+        raise Damage(f"topic {channel.topic} has messages of two types, {collector.kind.name} and {kind.name}")
     return collector
 
 

@@ -514,7 +514,7 @@ def following(frame_at: float, measured_at: float, cycle: float = 0.0) -> list[S
 
 
 GOES_OVER = (
-    "/ft/command goes over to the frame tool at 12.0 s; that is not evaluated as a step, because what was commanded "
+    "/ft/command changes to the frame tool at 12.0 s; that is not evaluated as a step, because what was commanded "
     "before is in another frame."
 )
 NOT_COMPARED = "/ft/wrench (tool), in the frame tool, is not compared with the command /ft/command, in the frame base."

@@ -654,7 +654,7 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording = Played()
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
-    answer = "of the time without contact: NOT EVALUATED, 200 ms, as a contact that ends may take"
+    answer = "of the time without contact: NOT EVALUATED, only 200 ms, which the end of a contact may take"
     assert answer in verdict(recording.summary())
 
 

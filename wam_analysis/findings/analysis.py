@@ -107,9 +107,9 @@ def analyse(
             return analyse_bag(read(found, TOPICS_READ, may_lack=True), progress, namespace)
         if namespace:
             raise ValueError(
-                f"--namespace chooses an arm of this stack, but {found} is analysed as a recording of another robot"
+                f"--namespace chooses an arm of this stack, but {found} is a recording of another robot; leave it out"
             )
-        progress("it is of another robot")
+        progress("it is a recording of another robot")
     else:
         found = source.reset_index() if hasattr(source, "reset_index") else source
     bag, given = foreign_bag(found, given)

@@ -66,8 +66,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
         return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
     assumed = (
-        "The whole effort is explained by friction, inertia and the joint's own weight. Drag, by the square of the "
-        "velocity, and delays are subtracted if they are found; otherwise they increase the errors:"
+        "The fit explains the whole effort by friction, inertia and the joint's own weight. It subtracts drag, by the "
+        "square of the velocity, and a delay if it finds them; otherwise they increase the errors:"
     )
     if alone:
         doubts.append(

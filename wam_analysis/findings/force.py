@@ -187,7 +187,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     refused = [one.hold.name for one in recording.held if one.hold.is_refused]
     held = [one for one in recording.held if not one.hold.is_refused]
     if refused:
-        sentences.append(f"Not controlled, so without a stability: {', '.join(refused)}.")
+        sentences.append(f"Not controlled, so their stability is not evaluated: {', '.join(refused)}.")
     for one in held:
         theory = recording.theories[one.hold.name]
         found = [_fate(one)[0], *([guard_sentence(theory.guarded)] if theory.guarded is not None else [])]

@@ -124,6 +124,6 @@ def _arrival(command: Source) -> str:
         return ""
     when = f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
     return (
-        f"{command.topic} goes over to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
+        f"{command.topic} changes to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
         "a step, because what was commanded before is in another frame."
     )

@@ -11,7 +11,7 @@ from wam_analysis.recording import AnalysedRecording
 from wam_description.arm import Arm
 
 UNITS = {"static": "N m", "dynamic": "N m", "viscous": "N m s/rad"}
-ONE_WAY = "of one direction, with any offset"
+ONE_WAY = "measured in one direction only, includes any offset"
 MORE = "record different motions, slow and fast, in both directions, over a turn or more of the motors"
 
 
@@ -37,7 +37,9 @@ def friction_section(recording: AnalysedRecording) -> Section:
     if unsure:
         sentences.append(f"Not determined by this recording: {', '.join(unsure)}; {MORE}.")
     if still := [name for name, one in every.items() if math.isnan(one.dynamic.value)]:
-        sentences.append(f"No friction of {', '.join(still)}: too little motion, or the torque has more than friction.")
+        sentences.append(
+            f"Friction not found of {', '.join(still)}: too little motion, or not all of the torque is friction."
+        )
     lacking = recording.run.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(findings)
     stated = (*[drowned][: bool(drowned)], *signals.caveats, *sentences, *flagged)

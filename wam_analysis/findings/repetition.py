@@ -73,8 +73,8 @@ def _sentence(label: str, unit: str, found: FoundCycle) -> str:
         return f"{label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
     ends = {
         COMMANDED_CYCLE: ", as it was commanded",
-        HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion that is not "
-        "followed linearly",
+        HARMONIC: ", near a multiple of the commanded frequency: a limit cycle, or the commanded motion, "
+        "which is not followed linearly",
         UNKNOWN: "; its command is not known, name it with --command",
     }
     return f"{label} repeats at {frequency}, {size}, {where}{ends[found.origin]}."

@@ -144,7 +144,7 @@ def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     question = f"false detections for at most {TOUCH.false_tolerance:g} % of the time without contact"
     part, seconds = 100.0 * false / free, false * traces.period
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
-        brief = f"{1e3 * seconds:.0f} ms, as a contact that ends may take"
+        brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]
     is_right = part <= TOUCH.false_tolerance
     return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]

@@ -35,7 +35,7 @@ def stick_section(recording: AnalysedRecording) -> Section:
         ]
         sentence = f"{one.label}: {rest_words(found.stuck, found.slips)}"
         if found.commanded > SHAFT.disobeyed and found.slips > 2 and 100.0 * found.stuck > SHAFT.turning:
-            sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
+            sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its time at rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
     stated = sentences or ["No velocity was recorded."]

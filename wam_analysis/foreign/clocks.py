@@ -15,7 +15,7 @@ from wam_bag.arrays import Times
 from wam_bag.bag import JointColumns, WrenchColumns
 
 BILLION = 1_000_000_000
-CLOCK_SET = "stamps of a clock that was set or never set; reception times are used"
+CLOCK_SET = "the clock of its stamps was changed, or never set; reception times are used"
 
 
 class Clock(NamedTuple):

@@ -36,7 +36,7 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
         raise BagError(f"{path} has no row below the names of its columns")
     if wide := next((row for row in rows if any(map(str.strip, row[len(head) :]))), None):
         raise BagError(
-            f"{path} has a row of {len(wide)} cells below {len(head)} titles; divide its cells by ';' or tabs"
+            f"{path} has a row of {len(wide)} cells below {len(head)} titles; separate its cells by ';' or tabs"
         )
     return dict(zip(head, zip_longest(*rows, fillvalue=""), strict=False))
 

@@ -118,7 +118,7 @@ def evenly(stamps: Numbers, theta: Numbers, effort: Numbers) -> MotorRecord:
     good = np.isfinite(theta).all(1) & np.isfinite(effort).all(1)
     stamps, theta, effort = stamps[good], theta[good], effort[good]
     if (np.diff(stamps) < 0.0).any():
-        raise ValueError("the stamps of motor_states go back; give a bag with one session")
+        raise ValueError("the stamps of motor_states go back: the bag has several sessions; give a bag with one")
     _, first = np.unique(stamps, return_index=True)
     if len(first) < 3 or stamps[first[-1]] - stamps[first[0]] < IDENTIFY.shortest:
         span = stamps.max() - stamps.min() if len(stamps) else 0.0

@@ -95,8 +95,8 @@ def impossibility(configuration: Configuration, values: Mapping[str, Any], sourc
         reason = str(error).removeprefix(f"{configuration.path}, section '{SHARED}': ")
         return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
-            "touched the arm, or it moved too little: identify from a recording without contact, as of wam identify "
-            "--excite"
+            "touched the arm, or it moved too little: identify from a recording without contact, such as "
+            "that of wam identify --excite"
         )
     return ""
 

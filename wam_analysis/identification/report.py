@@ -14,17 +14,17 @@ UNITS = {
     "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
     "moment": "kg m", "torque": "",
 }  # fmt: skip
-NOTES = """{rank} combinations of {count} parameters are identified, condition {condition:.3g}.
-'In combination': only together with others.
-'{by_shape}': static friction is where the fitted curve of friction ends at rest, with the error of that curve. Stiction
-that acts below {slowest:g} rad/s of a motor only is not in it: see `wam analyse` for the torques of breakaway.
+NOTES = """{rank} combinations of {count} parameters are identified; condition number {condition:.3g}.
+'In combination': identified only together with other parameters.
+'{by_shape}': static friction is where the fitted friction curve ends at rest, with the error of that curve. Stiction
+that acts only below {slowest:g} rad/s of a motor is not in it: see `wam analyse` for the torques of breakaway.
 The inertia of a rotor may err by a quarter, up to twice its standard error, in either direction: see docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
-A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
-difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
-the sum of both, in coulomb_positive and coulomb_negative.
-'not in the covariance': standard deviation of each motor's torque by those errors of the parameters that the covariance
-for the contact estimator cannot express."""
+A torque offset is not identifiable from this recording: it gives the same torques as friction that differs between the
+directions, in motion, at rest and with a dither. The table shows the offset that would explain the whole difference.
+The model has the sum of friction and offset, in coulomb_positive and coulomb_negative.
+'not in the covariance': standard deviation of each motor's torque that follows from errors of parameters that the
+covariance for the contact estimator cannot express."""
 
 
 STATIC = "motors.static_"
@@ -93,8 +93,8 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
             )
         if found.held_out[i] > IDENTIFY.unexplained * found.residual[i] + 1e-4:
             yield (
-                f"{name}: motion that was held out is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
-                f"{1e3 * found.residual[i]:.3g}: too little motion for all parameters"
+                f"{name}: motion held out of the fit is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
+                f"{1e3 * found.residual[i]:.3g} mN m: too little motion for all parameters"
             )
         share = found.residual[i] / max(level[:, i].mean(), 1e-9)
         if share > IDENTIFY.remaining:
