@@ -116,7 +116,7 @@ class StackClient(Closing):
         attempt = CALL_LIMITS.set_attempt if isinstance(request, SetParameters) else CALL_LIMITS.attempt
         answer = self.answer(client, message, seconds, attempt)
         if answer is None:
-            return Reply(False, f"no answer from {name} within {seconds:g} s")
+            return Reply(False, f"no answer from {name} within {seconds:g} s; its node is busy or has ended")
         return Reply.of(request, answer)
 
     def answer(self, client: Any, message: Any, seconds: float, attempt: float = CALL_LIMITS.attempt) -> Any:

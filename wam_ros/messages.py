@@ -78,9 +78,9 @@ def _joint_state(message: JointState, names: Sequence[str]) -> State:
 def _order(found: Sequence[str], names: Sequence[str]) -> list[int]:
     for name in found:
         if name not in names:
-            raise Refused(f"unknown name '{name}'; allowed are {', '.join(names)}")
+            raise Refused(f"unknown name '{name}'; allowed: {', '.join(names)}")
         if found.count(name) > 1:
-            raise Refused(f"name '{name}' is there twice; send each of {', '.join(names)} once")
+            raise Refused(f"name '{name}' is given twice; send each of {', '.join(names)} once")
     for name in names:
         if name not in found:
             raise Refused(f"name '{name}' is missing; send all of {', '.join(names)}")

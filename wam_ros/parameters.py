@@ -105,7 +105,7 @@ def follow_together(
                 if present[i] is not before[i] or not is_refused:
                     take(before[i])
             present[:] = before
-            reason = str(error) if is_refused else f"the node failed on it: {raised(error)}"
+            reason = str(error) if is_refused else f"the node failed while it set the parameters: {raised(error)}"
             return SetParametersResult(successful=False, reason=reason)
         if present != before:
             report(given)

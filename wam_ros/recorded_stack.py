@@ -62,7 +62,8 @@ class RecordedStack:
         mode, listed = given.get("timing.mode", self._mode), frozenset(given.get("nodes", self._listed))
         others = listed.symmetric_difference(self._listed) - {RecorderInterface.name}
         found = [f"node {node} runs in {mode}, and this recorder in {self._mode}"] * (mode != self._mode)
-        found += [f"node {node} and this recorder do not both have {', '.join(sorted(others))}"] * bool(others)
+        only = ", ".join(sorted(others))
+        found += [f"only one of node {node} and this recorder has {only} in 'nodes'"] * bool(others)
         advice = "start the recorder with 'wam bag record', which takes both from the running stack"
         return "; ".join([*found, advice]) if found else ""
 

@@ -156,7 +156,7 @@ class RecorderNode(TolerantNode):
             self._status.publish(self._state(self.recorder.failure, self.recorder.failure if self._required else ""))
         if self.recorder.dropped():
             self.get_logger().warning(
-                "the recorder is too slow: messages are lost; at its end it counts them", once=True
+                "the recorder is too slow and loses messages; it counts them when it ends", once=True
             )
 
     def _report(self) -> None:

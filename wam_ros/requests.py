@@ -41,7 +41,7 @@ def refusal_of(request: Request, answer: Any) -> str:
     """Why a request was refused, '' where it was not."""
     if isinstance(request, SetParameters):
         if len(answer.results) != len(request.values):
-            return f"{request.node} failed on it and may use a part of it; its log has the reason"
+            return f"{request.node} failed while it set the parameters and may use some of them; its log has the reason"
         return "; ".join(result.reason for result in answer.results if not result.successful)
     return "" if answer.success else str(answer.message)
 

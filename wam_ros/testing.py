@@ -47,7 +47,7 @@ class ArmFault(AssertionError):
 
 @contextmanager
 def locked_domain() -> Iterator[int]:
-    """A ROS domain that nobody is in, locked against other test processes.
+    """A ROS domain that no node is in, locked against other test processes.
 
     Raises
     ------
@@ -123,15 +123,15 @@ class RunningArm:
         own : further nodes: classes, or 'module:Class'.
         configuration : name, path or object.
         nodes : names of the nodes; by default those of the configuration.
-        values : by keyword: of a group of shared parameters or of a node, a mapping of values, as
-            ``timing={"outer_delay": 1}``; a node's class in place of the node of that name.
+        values : by keyword.  The name of a group of shared parameters or of a node, with a mapping of values, as
+            ``timing={"outer_delay": 1}``; the name of a node, with a class that takes its place.
 
         Raises
         ------
         ParameterError
             where a value is refused, or there is no such node.
         """
-        assert self._composition is None, "the stack of this test already runs; call start first, and once"
+        assert self._composition is None, "the stack of this test already runs; call start once, before all else"
         self.configuration = configured(*own, configuration=configuration, nodes=nodes, **values)
         self.interface = Interface(self.configuration.shared)
         self._composition = Composition(self.configuration, domain_id=self._domain_id)
@@ -201,14 +201,14 @@ class RunningArm:
     # what the test does
 
     def add(self, node: Any) -> Any:
-        """Spin a plain rclpy node too; it was made with ``context=arm.context``, and ends with the test."""
+        """Spin a plain rclpy node, too.  Make it with ``context=arm.context``; it ends with the test."""
         self._require_start()
         assert self._composition is not None
         self._composition.add(node)
         return node
 
     def run_until(self, condition: Callable[[], Any], seconds: float = TEST_LIMITS.arm_time) -> None:
-        """Spin until a condition holds, which is looked at once in an outer period of the arm.
+        """Spin until a condition holds; it is checked once per outer period of the arm.
 
         Raises
         ------
@@ -233,8 +233,10 @@ class RunningArm:
                 if condition():
                     return
                 look()
-                assert stamp <= limit, f"not within {seconds} s of the arm's time: {condition}"
-                assert now < end, f"not within {TEST_LIMITS.patience} s: {condition}; the arm is at {stamp} ns"
+                assert stamp <= limit, f"condition not met within {seconds} s of the arm's time: {condition}"
+                assert now < end, (
+                    f"condition not met within {TEST_LIMITS.patience} s: {condition}; the arm is at {stamp} ns"
+                )
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
 
     def run(self, seconds: float) -> None:
@@ -285,8 +287,8 @@ class RunningArm:
         ----------
         topic : name in the table of topics.
         value : State, Wrench, Point, Table or PosturePath.
-        seconds : time of the arm in which it is sent again with each joint state, as a command is valid for a short
-            time only; 0 sends it once.
+        seconds : arm's time in which it is sent again with each joint state, as a command is valid for a short time
+            only; 0 sends it once.
         fields : instead of a value, its fields, as ``velocity=[...]`` or ``frame="link", force=(0.0, -5.0, 0.0)``.
         """
         self.publisher(topic)
@@ -300,7 +302,7 @@ class RunningArm:
         return _EMPTY[self.interface.topics[topic].type]._replace(**fields)
 
     def publisher(self, topic: str) -> Publisher:
-        """A publisher of the test, which all nodes of the stack that take the topic have found."""
+        """A publisher of the test; every node of the stack that takes the topic has found it."""
         self._require_start()
         publisher, takers = self._client.publisher(topic), len(self.interface.subscribers(topic))
         self.run_until(lambda: publisher.get_subscription_count() >= takers)
@@ -333,7 +335,7 @@ class RunningArm:
         if self._composition is None:
             self.start(configuration=playing(steps, self._folder, **start))
         elif steps or start or "scenario" not in self.configuration.shared.nodes:
-            raise ValueError("the arm has been started already; call play in its place, with what start takes")
+            raise ValueError("the arm has been started already; call play instead of start, with its arguments")
         assert self._composition is not None
         failure = self._composition.play()
         self.close()

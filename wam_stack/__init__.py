@@ -1,4 +1,4 @@
-"""What people use of the stack from Python, in one place; each package below it can be imported as well.
+"""The Python API of the stack in one place; the packages below it can be imported as well.
 
 ========  ===================================================
 load      a configuration, with values of your own
@@ -43,8 +43,8 @@ def load(name: str | Path = "wam", values: Mapping[str, Any] | None = None) -> C
 
     Parameters
     ----------
-    name : of one that comes with the package, or a YAML file.
-    values : in place of its own, as ``{"timing.mode": "realtime", "force_loop:force_gain": [0.01]}``.
+    name : of a packaged configuration, or a YAML file.
+    values : that replace its own, as ``{"timing.mode": "realtime", "force_loop:force_gain": [0.01]}``.
 
     Raises
     ------
@@ -65,8 +65,8 @@ def simulate(
 
     Parameters
     ----------
-    configuration : or its name or file.
-    scenario : name or file, or its steps.
+    configuration : an object, a name or a file.
+    scenario : a name, a file, or the steps.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def simulate(
     Raises
     ------
     RuntimeError
-        where the scenario could not be played to its end; the text has the reason.
+        where the scenario could not be played to its end; the text gives the reason.
     """
     found = _loaded(configuration)
     steps = load_for(found, str(scenario)) if isinstance(scenario, str | Path) else scenario
@@ -87,7 +87,7 @@ def simulate(
 
 
 def analyse(recording: str | Path | Mapping[str, Any]) -> Analysis:
-    """What a recording shows: of this stack or of another robot, as a bag, a CSV file or a table such as a DataFrame.
+    """Analyse a recording of this stack or of another robot: a bag, a CSV file, or a table such as a DataFrame.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def analyse(recording: str | Path | Mapping[str, Any]) -> Analysis:
 
 
 def guard(configuration: Named = "wam") -> Report:
-    """The stability of the force loop at its configured posture: one line, whether it is a warning, and numbers.
+    """Stability of the force loop at its configured posture: a line of text, whether it is a warning, and numbers.
 
-    It assesses the gains as they are given, also where ``guard.mode`` is ``limit`` and a stack would lower them.
+    It assesses the gains as configured, also where ``guard.mode`` is ``limit`` and a running stack would lower them.
 
     Raises
     ------
@@ -120,8 +120,8 @@ class IdentifiedModel(NamedTuple):
     Attributes
     ----------
     values : of the parameters, for `load`.
-    contradictions : why it cannot be true of the configured arm, none where it can.
-    text : the same with standard deviations, for people.
+    contradictions : why it cannot be a model of the configured arm; empty where it can.
+    text : the values with standard deviations, for people.
     """
 
     values: dict[str, Any]
@@ -137,7 +137,7 @@ def identify(bag: str | Path, configuration: Named = "wam") -> IdentifiedModel:
     BagError
         where the bag cannot be read.
     ValueError
-        where the motion shows nothing of them.
+        where the motion does not determine them.
     """
     shared = _loaded(configuration).shared
     motion = recorded_motion(recorded_run(read(bag, may_lack=True)), shared.arm)

@@ -333,7 +333,7 @@ def by_hand(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
     ("mode", "nodes", "difference"),
     [
         ("realtime", ["driver", "gravity"], "node driver runs in realtime, and this recorder in lockstep"),
-        ("lockstep", ["driver", "my:Own"], "node driver and this recorder do not both have gravity, my:Own"),
+        ("lockstep", ["driver", "my:Own"], "only one of node driver and this recorder has gravity, my:Own in 'nodes'"),
         ("lockstep", ["gravity", "driver", "recorder"], ""),
     ],
 )

@@ -190,9 +190,9 @@ REFUSED = [
     ("motor_states", spoilt(effort=[0.0] * 5), "effort has 5 values; send 4"),
     ("motor_states", spoilt(effort=[]), "effort has 0 values; send 4"),
     ("motor_states", spoilt(name=NAMES[::-1], effort=[]), "effort has 0 values; send 4"),
-    ("motor_states", spoilt(name=[*NAMES[:3], "elbow"]), "unknown name 'elbow'; allowed are motor1, motor2"),
-    ("motor_states", spoilt(name=[*NAMES[:3], "motor3"]), "name 'motor3' is there twice; send each of"),
-    ("motor_states", spoilt(name=[*NAMES, "motor1"]), "name 'motor1' is there twice"),
+    ("motor_states", spoilt(name=[*NAMES[:3], "elbow"]), "unknown name 'elbow'; allowed: motor1, motor2"),
+    ("motor_states", spoilt(name=[*NAMES[:3], "motor3"]), "name 'motor3' is given twice; send each of"),
+    ("motor_states", spoilt(name=[*NAMES, "motor1"]), "name 'motor1' is given twice"),
     ("motor_states", spoilt(name=NAMES[:3]), "name 'motor4' is missing; send all of motor1, motor2, motor3, motor4"),
     ("motor_states", spoilt(name=[]), "name 'motor1' is missing"),
     ("motor_states", spoilt(name=NAMES[::-1], effort=[NAN, 0, 0, 0]), "effort of motor4 is nan"),
@@ -204,11 +204,8 @@ REFUSED = [
     ),
     ("force_command", wrench(torque=NAN), "send finite numbers"),
     ("force_command", wrench(force=(1e10, 0.0, 0.0)), "force has 1e.10 N; no arm reaches that, send at most"),
-    *(
-        ("force_command", wrench(frame), f"frame_id is '{frame}'; allowed are base, ")
-        for frame in ("", "Base", "/base")
-    ),
-    ("contact/point", point(0.1, "hand"), "frame_id is 'hand'; allowed are base, "),
+    *(("force_command", wrench(frame), f"frame_id is '{frame}'; allowed: base, ") for frame in ("", "Base", "/base")),
+    ("contact/point", point(0.1, "hand"), "frame_id is 'hand'; allowed: base, "),
     ("contact/point", point(INF), r"position is .*inf.* m; send finite numbers, or NaN where it is not known"),
     ("contact/point", point(1e200), "no arm reaches that, send at most"),
     ("sim/objects", table(fields=[]), f"fields are none; send little-endian float64 fields {TASK.columns[0]}, "),
@@ -217,7 +214,7 @@ REFUSED = [
     ("sim/objects", table(point_step=8), "bytes of data"),
     ("sim/objects", table(data=numbers(0.0, INF)), f"{TASK.columns[1]} is inf; send a finite number"),
     ("sim/objects", table(data=numbers(0.0, 1e200)), "no arm reaches that, send at most"),
-    ("sim/objects", table(header=header(STAMP, "hand")), "frame_id is 'hand'; allowed are base"),
+    ("sim/objects", table(header=header(STAMP, "hand")), "frame_id is 'hand'; allowed: base"),
 ]
 
 
