@@ -78,8 +78,8 @@ SENTENCES: Final = {  # by cause
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
-    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:ms} s; {cure}",
-    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed_ms:ms} s; {step}: make its "
+    "driver_late": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {cure}",
+    "held_up": "the driver itself did not run for {time:.2f} s, allowed {allowed:g} s; {step}: make its "
     "steps faster, or run it in its own process",
     "unanswered": "lockstep: no {topics} for the state at {stamp} ns within {allowed:.1f} s; {cure}, then reset_fault",
     "simulation": "the simulation of the arm failed: {trouble}; the arm is where it was before; {cure}, or lower "
@@ -98,11 +98,9 @@ SINCE: Final = ("without a contact", "since the force was last right or rising")
 
 
 class _Sentence(string.Formatter):
-    """Format as str.format does; `b` writes a number briefly, `ms` one in ms as s."""
+    """Format as str.format does; `b` writes a number briefly."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        if format_spec == "ms":
-            value, format_spec = 1e-3 * value, "g"
         return brief(value) if format_spec == "b" else str(super().format_field(value, format_spec))
 
 

@@ -90,7 +90,7 @@ class Realtime:
         age = now - self._progress
         most = max(1, round(self._watchdog / self._timing.period))
         if due > most and self._driver.safety.mode is Mode.ENABLED:
-            late = {"time": due * self._timing.period, "allowed_ms": self._watchdog * 1e3}
+            late = {"time": due * self._timing.period, "allowed": self._watchdog}
             step = self._held_up()
             cure = "give it a processor of its own, or use lockstep"
             self._driver.fault(fault("held_up", step=step, **late) if step else fault("driver_late", cure=cure, **late))
