@@ -11,12 +11,13 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
 from wam_ros.health import Health, problem_of
 from wam_ros.inlets import Inlets
+from wam_ros.limits import PROCESS_LIMITS
 from wam_ros.long_steps import STEPS
 from wam_ros.messages import Refused
 from wam_ros.network import Place, require_name
 from wam_ros.outlets import Outlets
 from wam_ros.parameters import declare
-from wam_ros.priority import PRIORITY, set_priority
+from wam_ros.priority import OWN, PRIORITY
 from wam_ros.tolerance import TolerantNode
 from wam_ros.topics import DIAGNOSTICS
 from wam_ros.wire import status_of
@@ -104,10 +105,19 @@ class StackNode(TolerantNode):
         """In realtime: ask the system to prefer this process, and report what was granted."""
         timing = self.shared.timing
         if timing.mode == "realtime":
-            granted = set_priority(max(timing.fifo_priority - (not self.is_first), 0), timing.niceness)
-            self.health.facts[PRIORITY] = granted
+            OWN.ask(max(timing.fifo_priority - (not self.is_first), 0), timing.niceness)
+            self.health.facts[PRIORITY] = OWN.granted
             if self.is_first:
-                self.get_logger().info(f"{PRIORITY}: {granted}")
+                self.get_logger().info(f"{PRIORITY}: {OWN.granted}")
+            self._share_timer = self.create_timer(PROCESS_LIMITS.share_look, self._look_at_share)
+
+    def _look_at_share(self) -> None:
+        if OWN.look():
+            self.get_logger().warning(
+                f"this process needs more than {PROCESS_LIMITS.share:.0%} of a processor and gave its realtime "
+                "priority back, so that other programs can run; use lockstep, a faster computer or fewer nodes"
+            )
+        self.health.facts[PRIORITY] = OWN.granted
 
     def take_status(self, status: NodeStatus) -> None:
         """Take the status of another node of the stack."""

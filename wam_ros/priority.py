@@ -10,13 +10,69 @@ thread go on.
 """
 
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from wam_ros.limits import PROCESS_LIMITS
+
 SESSION: Final = Path("/proc/self/autogroup")
 SENDS_LATER: Final = "dds.asyn"  # how the name of that thread begins
 PRIORITY: Final = "priority"  # key of what was granted, in the diagnostics
+USUAL: Final = "usual"
+
+
+class Priority:
+    """That of this process: it has one only as long as it leaves the processor to other programs now and then.
+
+    A process that is too slow for realtime would never do so, and no program of the operator could begin, not even one
+    that calls the e-stop.
+
+    Parameters
+    ----------
+    clock, used : s; time, and processor time of this process.
+
+    Attributes
+    ----------
+    granted : for people.
+    """
+
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, used: Callable[[], float] = time.process_time
+    ) -> None:
+        self._clock, self._used = clock, used
+        self.granted = USUAL
+        self._then = clock(), used()
+
+    def ask(self, fifo: int, niceness: int) -> None:
+        """As `set_priority`."""
+        self.granted = set_priority(fifo, niceness)
+        self._then = self._clock(), self._used()
+
+    def look(self) -> bool:
+        """Give the priority back, where the process took too much of a processor; whether this happened now."""
+        (then, used), now = self._then, (self._clock(), self._used())
+        if self.granted == USUAL or now[0] - then < PROCESS_LIMITS.share_look:
+            return False
+        self._then, share = now, (now[1] - used) / (now[0] - then)
+        if share <= PROCESS_LIMITS.share:
+            return False
+        for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0)))
+        for_all_threads(
+            lambda thread: os.setpriority(os.PRIO_PROCESS, thread, max(0, os.getpriority(os.PRIO_PROCESS, thread)))
+        )
+        _session_granted(0)
+        self.granted = USUAL
+        return True
+
+
+OWN: Final = Priority()
+
+
+def _as_usual(thread: int) -> None:
+    os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+    os.setpriority(os.PRIO_PROCESS, thread, max(0, os.getpriority(os.PRIO_PROCESS, thread)))
 
 
 def set_priority(fifo: int, niceness: int) -> str:
@@ -36,7 +92,7 @@ def set_priority(fifo: int, niceness: int) -> str:
         return f"SCHED_FIFO {fifo}"
     if niceness and for_all_threads(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
         return f"nice {niceness}{' with its session' if _session_granted(niceness) else ''}"
-    return "usual"
+    return USUAL
 
 
 def fifo_is_granted(fifo: int) -> bool:

@@ -36,6 +36,18 @@ print({os.getpriority(os.PRIO_PROCESS, thread) for thread in threads})
 print(SESSION.read_text().split()[-1] if SESSION.exists() else 0)
 """
 
+GIVEN_BACK = """
+import os, sys
+from wam_ros.priority import Priority
+ticks = iter((0.0, 0.0, 0.0, 0.0, 1.0, 1.9, 2.1, float(sys.argv[1])))
+own = Priority(lambda: next(ticks), lambda: next(ticks))
+before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
+own.ask(10, -15)
+print(own.granted)
+print(own.look(), own.look(), own.granted)
+print((os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == (before[0], max(0, before[1])))
+"""
+
 
 def told(fifo: int, niceness: int, permitted: bool = True) -> tuple[str, ...]:
     """What a process reports; whether its threads have FIFO, their niceness, that of its session."""
@@ -67,3 +79,19 @@ def test_what_is_reported_is_what_every_thread_has(asked: tuple[int, int]) -> No
 
 def test_without_permission_everything_is_as_usual() -> None:
     assert told(10, -15, permitted=False) == ("usual", "{False}", OWN, "0")
+
+
+@pytest.mark.parametrize("used", [1.6, 1.8])
+def test_a_process_that_takes_a_whole_processor_gives_its_priority_back(used: float) -> None:
+    """It used 1.6 or 1.8 s of 2.1 s; the look after 1.0 s was too early.  A program of the operator has to run, too."""
+    done = subprocess.run(
+        [sys.executable, "-c", GIVEN_BACK, str(used)],
+        capture_output=True,
+        text=True,
+        check=True,
+        start_new_session=True,
+    )
+    granted, looks, is_usual = done.stdout.splitlines()
+    gives_back = granted != "usual" and used > 1.7
+    assert looks == f"False {gives_back} {'usual' if gives_back or granted == 'usual' else granted}"
+    assert is_usual == str(gives_back or granted == "usual")
