@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from bag_samples import Sample, messages_of
 
+from wam_bag.bag import read
 from wam_bag.cdr import CDR, MessageType
-from wam_bag.contents import contents
 from wam_bag.definitions import schema
 from wam_bag.message_text import definitions
 from wam_description.status import WALL_CLOCK
@@ -47,7 +47,7 @@ def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tupl
 
 def _series(path: Path, without: tuple[str, ...]) -> dict[str, list[Sample]]:
     """Messages by topic, those of several publishers by topic and node."""
-    found: dict[str, list[Sample]] = {topic: [] for topic in contents(path).topics if topic not in without}
+    found: dict[str, list[Sample]] = {topic: [] for topic in read(path, ()).types if topic not in without}
     for one in messages_of(path):
         if one.topic not in without:
             found.setdefault(one.topic + _node(one), []).append(one)

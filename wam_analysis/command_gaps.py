@@ -8,7 +8,6 @@ import numpy as np
 from wam_analysis.held_messages import held_for, rows_before_gaps
 from wam_bag.arrays import Mask, Times
 from wam_bag.bag import TableColumns, WrenchColumns
-from wam_bag.losses import Losses
 from wam_sim.recording import RecordedRun, RecordedStep
 
 COMMANDS = ("force_command", "task_command", "sim/disturbance")
@@ -31,9 +30,7 @@ class CommandGap(NamedTuple):
         return (stamps > self.begin) & (stamps < self.end + after)
 
 
-def command_gaps(
-    run: RecordedRun, recorded: Times, losses: Losses, steps: Sequence[RecordedStep]
-) -> tuple[CommandGap, ...]:
+def command_gaps(run: RecordedRun, recorded: Times, steps: Sequence[RecordedStep]) -> tuple[CommandGap, ...]:
     """The gaps of commands, by topic.
 
     Commands are streamed.  Where a stream pauses because a program ended it, nothing is commanded; that is so where
@@ -43,14 +40,13 @@ def command_gaps(
     ----------
     run : the run.
     recorded : stamps of what else was recorded, ns; a gap in all topics is none of a command.
-    losses : of the bag.
     steps : of the scenario.
     """
-    found: list[CommandGap] = []
+    found, complete = list[CommandGap](), run.bag.losses.complete
     for topic in COMMANDS:
         name = f"{run.namespace}/{topic}"
         columns = run.bag.topics.get(name)
-        if not isinstance(columns, (WrenchColumns, TableColumns)) or name in losses.complete:
+        if not isinstance(columns, (WrenchColumns, TableColumns)) or name in complete:
             continue
         stamps, commands = columns.stamp_ns, _commands(columns)
         gaps = [(stamps[row], stamps[row + 1], commands[row]) for row in rows_before_gaps(stamps)]

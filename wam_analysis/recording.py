@@ -17,7 +17,7 @@ from wam_analysis.traces import Traces, traces_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.arrays import Mask
 from wam_bag.bag import Bag, BagError, JointColumns, PointColumns, WrenchColumns
-from wam_bag.losses import CUT, Losses, losses
+from wam_bag.losses import CUT
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code
 from wam_description.status import ENABLED, diagnosed_name
@@ -155,20 +155,15 @@ class AnalysedRecording:
         return "realtime" if self.run.mode == "unknown" and is_timed else self.run.mode
 
     @cached_property
-    def losses(self) -> Losses:
-        """What the bag lacks of what was published."""
-        return losses(self.bag.path, self.bag.metadata, self.bag.attachments, self.bag.counts)
-
-    @cached_property
     def gaps(self) -> tuple[CommandGap, ...]:
         """Gaps of commands."""
-        return command_gaps(self.run, self.traces.stamp, self.losses, self.steps)
+        return command_gaps(self.run, self.traces.stamp, self.steps)
 
     @property
     def lost(self) -> tuple[str, ...]:
         """Sentences about what the bag lacks, none if no loss is known."""
         gaps = (gap.sentence(self.traces.zero) for gap in self.gaps)
-        return (*self.losses.sentences(self.bag.first_ns), *gaps)
+        return (*self.bag.losses.sentences(self.bag.first), *gaps)
 
     # forces
 

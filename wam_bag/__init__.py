@@ -2,9 +2,8 @@
 
 For users:
 
-- `bag`: `read` makes numpy columns of a bag; `Bag`, `BagError`.
-- `contents`: `contents` lists topics, times and attachments without reading messages; `mode_of`.
-- `losses`: `losses` is what a bag lacks, from the records of the recorder and of repairs.
+- `bag`: `read` makes numpy columns of a bag, or lists what is in it; `Bag`, `BagError`.
+- `losses`: what a bag lacks, from the records of the recorder and of repairs.
 - `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.
 - `repair`: `repair` writes files that are broken or were not closed again from what can be read.
 - `errors`: `BagError`, `RecordingError`, and what is raised within the package.
@@ -21,5 +20,6 @@ Files:
 - `bag_file`: the files of a bag found and opened, messages selected by topic and time.
 - `mcap_file`: an MCAP file opened for reading. `message_search`: messages found in a chunk.
 - `mcap_writer`: an MCAP file written. `mcap_records`: records by the `mcap` library, with bounds and limits.
+- `rosbags_file`: a bag of ROS 1 or of SQLite, read by rosbags. `recorder_parameters`: attached parameters of nodes.
 - `limits`: of what is read. `metadata`: metadata.yaml. `safe_yaml`: YAML with bounded effort.
 """

@@ -1,21 +1,24 @@
 """Bags as named numpy columns, without ROS.
 
 Reads what `wam_bag.bag_writer` and rosbag2 write, whole or in parts: MCAP with messages in CDR, of ROS 1 or in
-JSON, a directory of one or several files or a single file, in chunks or not, with indexes or without.
+JSON, a directory of one or several files or a single file, in chunks or not, with indexes or without; and, by rosbags,
+SQLite and bags of ROS 1.
 
 Guaranteed: a value that differs from what was written is returned only if no checksum in the file covers it.
 The checksums of chunks, attachments and the summary are checked in what is read, the one over all data if
 everything is read.
 """
 
+from collections import Counter
 from collections.abc import Collection, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from mcap.records import Channel
 
-from wam_bag.bag_file import is_selected, opened, parts, type_of
+from wam_bag.bag_file import files, is_selected, opened, parts, type_of
 from wam_bag.columns import (
     BoolColumns,
     ClockColumns,
@@ -29,10 +32,12 @@ from wam_bag.columns import (
     WrenchColumns,
     series,
 )
-from wam_bag.contents import contents
 from wam_bag.errors import BagError, Damage
-from wam_bag.mcap_file import McapFile
+from wam_bag.losses import PARAMETERS, Losses, losses
+from wam_bag.mcap_file import BagFile
 from wam_bag.message_search import NEVER
+from wam_bag.message_text import full_name
+from wam_bag.recorder_parameters import mode_of, with_nodes_of
 
 __all__ = [
     "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns",
@@ -48,10 +53,12 @@ class _Topics(dict[str, Columns]):
 
 
 class Bag(NamedTuple):
-    """A bag in memory: columns and type by topic, attachments and metadata records by name.
+    """A bag in memory: columns by topic, attachments and metadata records by name.
 
-    `counts` are the messages of every topic in its files, also of topics that were not selected; empty
-    in a bag that did not come from files.
+    `types`, `counts`, the messages, and `first` and `last`, log times, ns, are of all that is in its files, also of
+    topics that were not selected; the counts are empty in a bag that did not come from files.  Of attachments of one
+    name it has the last one, and of parameters those of all nodes; the metadata 'recording' is the recorder's, see
+    docs/bags.md.
     """
 
     path: Path
@@ -60,6 +67,8 @@ class Bag(NamedTuple):
     attachments: dict[str, bytes]
     metadata: dict[str, dict[str, str]]
     counts: Mapping[str, int] = MappingProxyType({})
+    first: int = 0
+    last: int = 0
 
     def __repr__(self) -> str:
         """Path and counts, not every array."""
@@ -102,10 +111,14 @@ class Bag(NamedTuple):
         return pandas.DataFrame(self.series(topic)).set_index("time")
 
     @property
-    def first_ns(self) -> int:
-        """Log time of the first message that was read, 0 if none was."""
-        found = (columns.log_time_ns for columns in self.topics.values())
-        return min((int(times.min()) for times in found if len(times)), default=0)
+    def losses(self) -> Losses:
+        """What it lacks of what was published."""
+        return losses(self.path, self.metadata, self.attachments, self.counts)
+
+    @property
+    def mode(self) -> str:
+        """'realtime', 'lockstep' or 'unknown', see `mode_of`."""
+        return mode_of(self.metadata, self.attachments.get(PARAMETERS))
 
 
 def read(
@@ -115,10 +128,12 @@ def read(
     end_ns: int = NEVER,
     *,
     may_lack: bool = False,
+    as_messages: bool = False,
 ) -> Bag:
     """Read a bag: all of it, or some topics, or some time.
 
-    Chunks of the file without any selected message are not read.
+    Chunks of the file without any selected message are not read; without topics, messages only where a file has no
+    summary that counts them.
 
     Parameters
     ----------
@@ -126,6 +141,7 @@ def read(
     topics : names of the topics to read, one without a leading '/' in every namespace; None reads all.
     begin_ns, end_ns : log times to read, begin_ns <= t < end_ns.
     may_lack : whether selected topics may be missing in the bag.
+    as_messages : whether messages of every type are read as objects, and none as columns.
 
     Raises
     ------
@@ -139,32 +155,46 @@ def read(
             f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the start"
         )
     collectors: dict[str, Collector] = {}
-    found = contents(path)
-    if not may_lack:
-        _require(path, topics, found.topics)
-    for file in found.files:
-        with opened(file) as mcap:
+    counts, types, times = Counter[str](), dict[str, str](), list[int]()
+    attachments, metadata = dict[str, bytes](), dict[str, dict[str, str]]()
+    for one in files(Path(path)):
+        with opened(one) as file:
+            take = partial(_collector, collectors, file, (begin_ns, end_ns, as_messages))
             if topics is None and begin_ns <= 0 and end_ns >= NEVER:
-                mcap.check_all()
-            for part in parts(mcap, topics, begin_ns, end_ns):
-                collector = _collector(collectors, mcap, part.channel, (begin_ns, end_ns))
+                file.check_all()
+            for part in parts(file, topics, begin_ns, end_ns):
+                collector = take(part.channel)
                 try:
                     collector.add(part.buffer, part.found)
                 except Damage as error:
                     raise Damage(f"topic {part.channel.topic}: {error}") from None
-            for channel in mcap.channels.values():
+            listed = file.counts or file.loaded
+            times += [listed.first, listed.last][: 2 * any(listed.by_channel.values())]
+            for number, channel in file.channels.items():
+                counts[channel.topic] += listed.by_channel.get(number, 0)
+                schema = file.schemas.get(channel.schema_id)
+                types.setdefault(channel.topic, full_name(schema.name) if schema else "?")
                 if is_selected(channel.topic, topics):
-                    _collector(collectors, mcap, channel, (begin_ns, end_ns))
+                    take(channel)
+            for item in file.attachments():
+                before = attachments.get(item.name) if item.name == PARAMETERS else None
+                attachments[item.name] = item.data if before is None else with_nodes_of(before, item.data)
+            for name, values in file.metadata().items():
+                metadata.setdefault(name, {}).update(values)
+    if not may_lack:
+        _require(path, topics, types)
     columns = _Topics({t: one.columns(f"{path}, topic {t}") for t, one in sorted(collectors.items())})
-    types = {topic: one.kind.name for topic, one in collectors.items()}
-    counts = {topic: one.messages for topic, one in found.topics.items()}
-    return Bag(Path(path), columns, types, found.attachments, found.metadata, counts)
+    types |= {topic: one.kind.name for topic, one in collectors.items()}
+    ends = min(times, default=0), max(times, default=0)
+    return Bag(Path(path), columns, dict(sorted(types.items())), attachments, metadata, counts, *ends)
 
 
-def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channel, times: tuple[int, int]) -> Collector:
+def _collector(
+    collectors: dict[str, Collector], file: BagFile, how: tuple[int, int, bool], channel: Channel
+) -> Collector:
     """The collector of a topic, made for its first channel."""
-    kind = type_of(mcap, channel)
-    collector = collectors.setdefault(channel.topic, Collector(kind, *times))
+    kind = type_of(file, channel)
+    collector = collectors.setdefault(channel.topic, Collector(kind, *how))
     if collector.kind != kind:
         raise Damage(f"topic {channel.topic} has messages of two types, {collector.kind.name} and {kind.name}")
     return collector

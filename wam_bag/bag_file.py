@@ -1,7 +1,6 @@
 """Bags on disk: their files found and opened, their messages selected, and errors in the user's words."""
 
 import re
-from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,16 +12,16 @@ from mcap.records import Channel
 
 from wam_bag import safe_yaml
 from wam_bag.arrays import Bytes
-from wam_bag.cdr import CDR, JSON, ROS1, MessageType
+from wam_bag.cdr import JSON, SCHEMAS, MessageType
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError, command
 from wam_bag.limits import READING_LIMITS
-from wam_bag.mcap_file import McapFile
+from wam_bag.mcap_file import BagFile, McapFile
 from wam_bag.mcap_records import MAGIC
-from wam_bag.message_search import NEVER, Found, MessageBatch, together
+from wam_bag.message_search import NEVER, Found
 from wam_bag.message_text import definitions, full_name
+from wam_bag.rosbags_file import RosbagsFile, needs_rosbags
 
 COMPRESSED = ".mcap.zstd"
-SCHEMAS = {CDR: "ros2msg", ROS1: "ros1msg"}  # encoding of the definitions by that of the messages
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
@@ -30,7 +29,7 @@ def files(path: Path) -> list[Path]:
     """The MCAP files of a bag directory in the order of recording, or the one file."""
     if path.name.endswith(COMPRESSED):
         raise _compressed(path)
-    if path.is_file():
+    if path.is_file() or needs_rosbags(path):
         return [path]
     if not path.exists():
         raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
@@ -104,10 +103,10 @@ def _compressed(path: Path) -> BagError:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[McapFile]:
+def opened(path: Path) -> Iterator[BagFile]:
     """An open file of a bag; errors of it in the context become a BagError."""
     try:
-        with McapFile(path) as file:
+        with RosbagsFile(path) if needs_rosbags(path) else McapFile(path) as file:
             file.open()
             yield file
     except BagError:
@@ -155,7 +154,7 @@ class TopicPart(NamedTuple):
 
 
 def parts(
-    mcap: McapFile, topics: Collection[str] | None = None, begin: int = 0, end: int = NEVER
+    file: BagFile, topics: Collection[str] | None = None, begin: int = 0, end: int = NEVER
 ) -> Iterator[TopicPart]:
     """Messages of each selected topic, some megabytes at a time; at the end the file's own counts are checked.
 
@@ -165,47 +164,29 @@ def parts(
     begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
     """
     numbers, times = None, (0, NEVER)
-    if mcap.has_all_definitions():  # else any chunk may contain one that is needed
+    if file.has_all_definitions():  # else any chunk may contain one that is needed
         times = begin, end
         if topics is not None:
-            numbers = frozenset(n for n, channel in mcap.channels.items() if is_selected(channel.topic, topics))
-    counts: Counter[int] = Counter()
-    for batch in _bounded(mcap, mcap.batches(numbers, *times)):
+            numbers = frozenset(n for n, channel in file.channels.items() if is_selected(channel.topic, topics))
+    for buffer, found in file.batches(numbers, *times):
         by_topic: dict[str, list[int]] = {}
-        for number, found in batch.found.items():
-            if number not in mcap.channels:
+        for number in np.unique(found.channels).tolist():
+            if number not in file.channels:
                 raise Damage(f"a message is on channel {number}, which is not defined")
-            counts[number] += len(found.offsets)
-            by_topic.setdefault(mcap.channels[number].topic, []).append(number)
+            by_topic.setdefault(file.channels[number].topic, []).append(number)
         for topic, members in by_topic.items():
-            if not is_selected(topic, topics):
-                continue
-            found = together([batch.found[number] for number in members])
-            if len(members) > 1:
-                order = np.argsort(found.offsets)
-                found = Found(found.offsets[order], found.sizes[order])
-            yield TopicPart(mcap.channels[members[0]], batch.buffer, found)
-    if mcap.counts is None or begin > 0 or end < NEVER:
+            if is_selected(topic, topics):
+                yield TopicPart(file.channels[members[0]], buffer, found.of(np.isin(found.channels, members)))
+    if file.counts is None or begin > 0 or end < NEVER:
         return
-    for number, channel in mcap.channels.items():
-        expected = mcap.counts.by_channel.get(number, 0)
-        if is_selected(channel.topic, topics) and counts[number] != expected:
-            raise Damage(f"topic {channel.topic} has {counts[number]} messages instead of {expected}")
+    for number, channel in file.channels.items():
+        expected = file.counts.by_channel.get(number, 0)
+        found_in = file.loaded.by_channel.get(number, 0)
+        if is_selected(channel.topic, topics) and found_in != expected:
+            raise Damage(f"topic {channel.topic} has {found_in} messages instead of {expected}")
 
 
-def _bounded(mcap: McapFile, batches: Iterator[MessageBatch]) -> Iterator[MessageBatch]:
-    """The batches, as long as they are no more than a recording can have been compressed from."""
-    size = 0
-    for batch in batches:
-        size += len(batch.buffer)
-        if size > READING_LIMITS.expanded and size > READING_LIMITS.expansion * mcap.size:
-            raise TooLargeError(
-                f"its {mcap.size} bytes decompress to more than {READING_LIMITS.expansion} times as many"
-            )
-        yield batch
-
-
-def type_of(file: McapFile, channel: Channel) -> MessageType:
+def type_of(file: BagFile, channel: Channel) -> MessageType:
     """Type of the messages of a channel.
 
     Raises

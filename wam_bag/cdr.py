@@ -29,6 +29,7 @@ _STAMPS = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 _AFTER_STAMP: Final = ENCAPSULATION + 8
 
 CDR, ROS1, JSON = "cdr", "ros1", "json"  # encodings of messages
+SCHEMAS: Final = {CDR: "ros2msg", ROS1: "ros1msg"}  # encoding of the definitions by that of the messages
 Definitions = Mapping[str, Fields]
 
 

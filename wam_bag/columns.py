@@ -19,7 +19,7 @@ from wam_bag.cdr import CDR, MessageType
 from wam_bag.definitions import schema
 from wam_bag.errors import BagError, Damage
 from wam_bag.message_groups import Decoded, Group, Grouping
-from wam_bag.message_search import DATA, Found, log_times, messages
+from wam_bag.message_search import DATA, Found, messages, packed
 from wam_bag.message_text import definitions
 from wam_bag.point_clouds import table_columns, tables
 
@@ -166,11 +166,12 @@ class Collector:
     ----------
     kind : type of the messages.
     begin, end : log times that are taken, ns, begin <= t < end.
+    as_messages : whether no columns of the fields are made.
     """
 
-    def __init__(self, kind: MessageType, begin: int, end: int) -> None:
+    def __init__(self, kind: MessageType, begin: int, end: int, as_messages: bool = False) -> None:
         self.kind = kind
-        self._columned = _TYPES.get(kind.name) if kind.encoding == CDR else None
+        self._columned = _TYPES.get(kind.name) if kind.encoding == CDR and not as_messages else None
         self._begin, self._end = begin, end
         self._times: list[Times] = []
         self._groups_of = Grouping(kind.name, kind.definitions)
@@ -180,18 +181,17 @@ class Collector:
 
     def add(self, buffer: Bytes, found: Found) -> None:
         """Take these messages of a buffer."""
-        times = log_times(buffer, found)
-        taken = (times >= self._begin) & (times < self._end)
+        taken = (found.times >= self._begin) & (found.times < self._end)
         if not taken.all():
-            found, times = Found(found.offsets[taken], found.sizes[taken]), times[taken]
-        self._times.append(times)
+            found = found.of(taken)
+        self._times.append(found.times)
         if self._columned is not None:
             extract, _ = self._columned
             for group in self._groups_of(buffer, found.offsets + DATA, found.sizes):
                 self._groups.append((group.rows + self._number, extract(group)))
         else:
             self._data += messages(buffer, found)
-        self._number += len(times)
+        self._number += len(found.times)
 
     def columns(self, label: str) -> Columns:
         """All messages in the order of log times; the label names bag and topic in later errors."""
@@ -338,10 +338,5 @@ _TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
 def columns_of(kind: str, data: Sequence[bytes]) -> Columns:
     """Serialized messages of one installed type, ``package/msg/Type``, as columns; the log times are 0."""
     collector = Collector(MessageType(kind, CDR, definitions(kind, schema(kind))), 0, 1)
-    sizes = np.array([len(one) for one in data], np.int64)
-    starts = np.cumsum(sizes + DATA) - sizes - DATA
-    head = bytes(DATA)
-    # messages are compared by whole words, which may end behind the last one
-    buffer = np.frombuffer(b"".join([*(part for one in data for part in (head, one)), head]), np.uint8)
-    collector.add(buffer, Found(starts, sizes))
+    collector.add(*packed([(0, 0, one) for one in data]))
     return collector.columns("recorded")

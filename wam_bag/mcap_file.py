@@ -19,6 +19,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Message, Schema, Statistics
 
 from wam_bag.errors import Damage, NotClosedError, TooLargeError
+from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import (
     FIRST_PRIVATE,
     FOOTER,
@@ -35,10 +36,9 @@ from wam_bag.mcap_records import (
     parsed,
     walk,
 )
-from wam_bag.message_search import DATA, NEVER, Found, MessageBatch, find, log_times, together
+from wam_bag.message_search import DATA, NEVER, TAIL, Found, MessageBatch, find
 
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
-TAIL: Final = 16  # bytes behind the records of a batch, so that a wide read of the last one stays inside
 _DATA_END: Final = HEAD.pack(Opcode.DATA_END, 4)  # head of the record that ends the data
 _OF_DATA: Final = {
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT,
@@ -59,8 +59,8 @@ class MessageCounts(NamedTuple):
     by_channel: dict[int, int]
 
 
-class McapFile:
-    """An open file; a context manager.
+class BagFile:
+    """An open file of a bag, or a bag that is no MCAP; a context manager.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class McapFile:
     ----------
     schemas, channels : by id; those within chunks are known only when these were read.
     counts : messages as the file itself counts them, None if it does not.
-    size : bytes of the file.
+    loaded : the same of the latest `batches`.
 
     Raises
     ------
@@ -83,15 +83,8 @@ class McapFile:
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: MessageCounts | None = None
-        with path.open("rb") as stream:
-            self._data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        self.size = len(self._data)
-        self._blocks: list[ChunkPlace] = []
-        self._others: list[RecordExtent] = []  # attachments and metadata
-        self._memory = np.empty(0, np.uint8)
-        self._zstd = zstandard.ZstdDecompressor()
-        self._data_crc = 0
-        self._data_end = 0
+        self.loaded = MessageCounts(0, 0, {})
+        self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
         return self
@@ -99,7 +92,76 @@ class McapFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._data.close()
+        self._stack.close()
+
+    def open(self) -> None:
+        """Find the parts of a closed file."""
+
+    def check_all(self) -> None:
+        """Compare the checksum of all data with the one at their end, if there is one."""
+
+    def attachments(self) -> list[Attachment]:
+        """The attachments in the order of the file."""
+        return []
+
+    def metadata(self) -> dict[str, dict[str, str]]:
+        """Metadata records by name; the entries of several of one name are put together, as those of merged bags."""
+        return {}
+
+    def batches(
+        self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
+    ) -> Iterator[MessageBatch]:
+        """Records in memory, some megabytes at a time.
+
+        Parameters
+        ----------
+        channels : ids of the channels that are needed, None for all.  Others may come as well.
+        begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
+        """
+        raise NotImplementedError
+
+    def count(self) -> MessageCounts:
+        """Messages counted by reading them all."""
+        for _ in self.batches():
+            pass
+        return self.loaded
+
+    def has_all_definitions(self) -> bool:
+        """Whether every channel that the file counts, and its schema, is known without reading chunks."""
+        if self.counts is None or not self.counts.by_channel.keys() <= self.channels.keys():
+            return False
+        return {channel.schema_id for channel in self.channels.values()} <= self.schemas.keys()
+
+    def _taken(self, batch: MessageBatch) -> MessageBatch:
+        """The batch, whose messages are counted."""
+        before, times = self.loaded, batch.found.times
+        numbers, messages = (each.tolist() for each in np.unique(batch.found.channels, return_counts=True))
+        if numbers:
+            first = min([int(times.min()), *([before.first] if before.by_channel else [])])
+            counts = Counter(before.by_channel) + Counter(dict(zip(numbers, messages, strict=True)))
+            self.loaded = MessageCounts(first, max(before.last, int(times.max())), counts)
+        return batch
+
+
+class McapFile(BagFile):
+    """A file of MCAP.
+
+    Attributes
+    ----------
+    size : bytes of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        with path.open("rb") as stream:
+            self._data = self._stack.enter_context(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
+        self.size = len(self._data)
+        self._blocks: list[ChunkPlace] = []
+        self._others: list[RecordExtent] = []  # attachments and metadata
+        self._memory = np.empty(0, np.uint8)
+        self._zstd = zstandard.ZstdDecompressor()
+        self._data_crc = 0
+        self._data_end = 0
 
     def open(self) -> None:
         """Find the parts of a closed file.
@@ -120,17 +182,6 @@ class McapFile:
             self._blocks.append(chunk)
             position = chunk.indexes_end
         self._take(position, self._data_end)
-
-    def count(self) -> MessageCounts:
-        """Messages counted by reading them all."""
-        counts: Counter[int] = Counter()
-        first, last = NEVER, 0
-        for batch in self.batches():
-            for channel, found in batch.found.items():
-                times = log_times(batch.buffer, found)
-                counts[channel] += len(times)
-                first, last = min(first, int(times.min())), max(last, int(times.max()))
-        return MessageCounts(first if counts else 0, last, dict(counts))
 
     def salvage(self) -> Iterator[RecordExtent]:
         """Records of the data that can be found in a broken file.
@@ -179,13 +230,9 @@ class McapFile:
     def messages(self, record: RecordExtent) -> list[Message]:
         """The messages of a chunk record, checked, in their order; its indexes are not needed."""
         place = self._chunk_at(record)
-        buffer, by_channel = self._load([place], place.size)
-        found = [
-            each
-            for some in by_channel.values()
-            for each in zip(some.offsets.tolist(), some.sizes.tolist(), strict=True)
-        ]
-        return [message(buffer[start + HEAD.size : start + DATA + size].tobytes()) for start, size in sorted(found)]
+        buffer, (_, offsets, sizes, _) = self._load([place], place.size)
+        found = zip(offsets.tolist(), sizes.tolist(), strict=True)
+        return [message(buffer[start + HEAD.size : start + DATA + size].tobytes()) for start, size in found]
 
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, if there is one."""
@@ -215,36 +262,32 @@ class McapFile:
                 found.setdefault(one.name, {}).update(one.metadata)
         return found
 
-    def has_all_definitions(self) -> bool:
-        """Whether every channel that the file counts, and its schema, is known without reading chunks."""
-        if self.counts is None or not self.counts.by_channel.keys() <= self.channels.keys():
-            return False
-        return {channel.schema_id for channel in self.channels.values()} <= self.schemas.keys()
-
     def batches(
         self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
     ) -> Iterator[MessageBatch]:
-        """Records in memory, some megabytes at a time.
-
-        Parameters
-        ----------
-        channels : ids of the channels that are needed, None for all.  Others may come as well.
-        begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
-        """
+        """See `BagFile.batches`."""
+        self.loaded = MessageCounts(0, 0, {})
         pending: list[ChunkPlace] = []
-        size = 0
-        for block in self._blocks:
-            if block.last < begin or block.first >= end:
-                continue
-            if channels is not None and block.channels and not block.channels & channels:
-                continue
+        size = whole = 0
+        wanted = [
+            block
+            for block in self._blocks
+            if block.last >= begin
+            and block.first < end
+            and (channels is None or (channels and not block.channels) or block.channels & channels)
+        ]
+        for block in wanted:
             pending.append(block)
             size += block.size
-            if size >= BATCH:
-                yield self._load(pending, size)
-                pending, size = [], 0
-        if pending:
-            yield self._load(pending, size)
+            if size < BATCH and block is not wanted[-1]:
+                continue
+            whole += size
+            if whole > READING_LIMITS.expanded and whole > READING_LIMITS.expansion * self.size:
+                raise TooLargeError(
+                    f"its {self.size} bytes decompress to more than {READING_LIMITS.expansion} times as many"
+                )
+            yield self._taken(self._load(pending, size))
+            pending, size = [], 0
 
     def define(self, opcode: int, content: bytes) -> None:
         """Take a schema or channel record; the same id must not mean two things."""
@@ -319,7 +362,7 @@ class McapFile:
             self._memory = np.empty(max(size, BATCH) + TAIL, np.uint8)
         buffer = self._memory[: size + TAIL]
         buffer[size:] = 0
-        parts: dict[int, list[Found]] = {}
+        parts = [Found(*np.empty((4, 0), np.int64))]
         position = 0
         for block in blocks:
             part = buffer[position : position + block.size]
@@ -329,7 +372,6 @@ class McapFile:
             else:
                 decompress(block, self._data[block.start : block.end], part, self._zstd)
                 index = self._data[block.end : block.indexes_end]
-            for channel, found in find(part, index, self.define, position).items():
-                parts.setdefault(channel, []).append(found)
+            parts.append(find(part, index, self.define, position))
             position += len(part)
-        return MessageBatch(buffer, {channel: together(found) for channel, found in parts.items()})
+        return MessageBatch(buffer, Found(*map(np.concatenate, zip(*parts, strict=True))))

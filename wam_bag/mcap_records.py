@@ -24,6 +24,7 @@ from wam_bag.errors import Damage, TooLargeError
 
 MAGIC: Final[bytes] = MCAP0_MAGIC
 HEAD: Final = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE: Final = struct.Struct("<BQHIQQ")  # start of a message: opcode, length, channel, sequence, log, publish time
 FIRST_PRIVATE: Final = 0x80  # opcodes from here on belong to applications and are skipped
 FOOTER: Final = struct.Struct("<QQI")  # content: start of the summary, of its offsets, checksum
 FOOTER_SIZE: Final = HEAD.size + FOOTER.size

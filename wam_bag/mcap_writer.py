@@ -19,12 +19,11 @@ import zstandard
 from mcap import records
 from mcap.opcode import Opcode
 
-from wam_bag.mcap_records import FOOTER_SIZE, HEAD, MAGIC, serialized
+from wam_bag.mcap_records import FOOTER_SIZE, HEAD, MAGIC, MESSAGE, serialized
 
 FAST: Final = 3
-_MESSAGE = struct.Struct("<BQHIQQ")  # start of a message record: opcode, length, channel, sequence, log, publish time
 _OPCODE: Final = int(Opcode.MESSAGE)  # packed faster than the enumeration
-_WITHOUT_DATA: Final = _MESSAGE.size - HEAD.size
+_WITHOUT_DATA: Final = MESSAGE.size - HEAD.size
 _INDEX = struct.Struct("<BQHI")  # start of a message index record: opcode, length, channel, bytes of the entries
 _GROUPS: Final = (
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX,
@@ -87,7 +86,7 @@ class McapWriter:
     def add(self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
         """Add a message to the chunk; the chunk goes to disk when it is full."""
         buffer = self._buffer
-        head = _MESSAGE.pack(_OPCODE, _WITHOUT_DATA + len(data), channel, sequence & 0xFFFFFFFF, log_time, publish_time)
+        head = MESSAGE.pack(_OPCODE, _WITHOUT_DATA + len(data), channel, sequence & 0xFFFFFFFF, log_time, publish_time)
         index = self._index.get(channel)
         if index is None:
             index = self._index[channel] = []

@@ -1,20 +1,22 @@
 """Where the messages are in the records of a chunk, found in bulk."""
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from wam_bag.arrays import Bytes, Rows, Times
+from wam_bag.arrays import Bytes, Mask, Rows, Times
 from wam_bag.errors import Damage
-from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, walk
+from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, MESSAGE, walk
 
 NEVER: Final = 2**63  # ns; later than every log time
-DATA: Final = HEAD.size + 22  # bytes of a message record before its data: head, channel, sequence, two times
-_HEADS: Final = np.dtype([("opcode", "u1"), ("length", "<i8"), ("channel", "<u2")])  # first bytes of a message record
+DATA: Final = MESSAGE.size  # bytes of a message record before its data
+TAIL: Final = 16  # bytes behind the records of a batch, so that a wide read of the last one stays inside
+_HEADS: Final = np.dtype(  # first bytes of a message record
+    [("opcode", "u1"), ("length", "<i8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")]
+)
 _INDEX_HEAD: Final = HEAD.size + 6  # bytes of a message index record before its entries
 
 Define = Callable[[int, bytes], None]
@@ -22,21 +24,34 @@ Define = Callable[[int, bytes], None]
 
 
 class Found(NamedTuple):
-    """Messages in a buffer in the order of the file: where their records start, and the bytes of each message."""
+    """Messages in a buffer in the order of the file, (n,).
 
+    Attributes
+    ----------
+    channels : ids.
+    offsets, sizes : where the record of each starts, and bytes of the message.
+    times : of the log, ns.
+    """
+
+    channels: Rows
     offsets: Rows
     sizes: Rows
+    times: Times
+
+    def of(self, rows: Mask) -> "Found":
+        """Some of them."""
+        return Found(*(column[rows] for column in self))
 
 
 class MessageBatch(NamedTuple):
-    """Some records in memory, valid until the next batch is taken, and the messages in them by channel id."""
+    """Some records in memory, valid until the next batch is taken, and the messages in them."""
 
     buffer: Bytes
-    found: dict[int, Found]
+    found: Found
 
 
-def find(part: Bytes, index: bytes, define: Define, begin: int) -> dict[int, Found]:
-    """The messages among the records of a chunk, by channel id.
+def find(part: Bytes, index: bytes, define: Define, begin: int) -> Found:
+    """The messages among the records of a chunk.
 
     Parameters
     ----------
@@ -46,71 +61,53 @@ def find(part: Bytes, index: bytes, define: Define, begin: int) -> dict[int, Fou
     define : is called with each definition.
     begin : of the records in the buffer.
     """
-    found = _by_index(part, index, define, begin) if index else None
-    return _by_walking(part.tobytes(), define, begin) if found is None else found
-
-
-def _by_index(part: Bytes, index: bytes, define: Define, begin: int) -> dict[int, Found] | None:
-    """Messages that the index names, if they are distinct and fill all bytes behind the definitions, else None."""
-    start, size = 0, len(part)
-    while start + HEAD.size <= size and part[start] in (Opcode.SCHEMA, Opcode.CHANNEL):
-        opcode, length = HEAD.unpack_from(part.data, start)
-        content = start + HEAD.size
-        if (end := content + length) > size:
-            return None
-        define(opcode, part[content:end].tobytes())
-        start = end
-    entries: dict[int, Rows] = {}
-    try:
-        for opcode, record, end in walk(index, 0, len(index)):
-            first = record + _INDEX_HEAD
-            if opcode != Opcode.MESSAGE_INDEX or end < first or (end - first) % 16:
-                return None
-            channel = int.from_bytes(index[first - 6 : first - 4], "little")
-            if channel in entries:
-                return None
-            if end > first:
-                entries[channel] = np.frombuffer(index[first:end], "<i8")[1::2]
-    except Damage:
-        return None
-    if not entries:
-        return None
-    offsets = np.concatenate(list(entries.values()))
-    counts = [len(some) for some in entries.values()]
-    ends = np.cumsum(counts)
-    is_rising = np.diff(offsets) > 0
-    is_rising[ends[:-1] - 1] = True
-    if not is_rising.all() or offsets.min() < start or offsets.max() > size - DATA:
-        return None
-    heads = at(part, offsets, f"V{_HEADS.itemsize}").view(_HEADS)
-    sizes = heads["length"] - (DATA - HEAD.size)
-    is_whole = (
-        (heads["opcode"] == Opcode.MESSAGE).all()
-        and (heads["channel"] == np.repeat([*entries], counts)).all()
-        and sizes.min() >= 0
-        and sizes.max() <= size
-        and int(sizes.sum()) + DATA * len(offsets) == size - start
-    )
-    if not is_whole:
-        return None
-    rows = zip(entries, pairwise([0, *ends.tolist()]), strict=True)
-    offsets = offsets + begin
-    return {channel: Found(offsets[first:end], sizes[first:end]) for channel, (first, end) in rows}
-
-
-def _by_walking(data: bytes, define: Define, begin: int) -> dict[int, Found]:
-    places: dict[int, list[tuple[int, int]]] = {}
+    indexed = _indexed(part, index)
+    data, walked = part[: indexed[0] if len(indexed) else len(part)].tobytes(), []
     for opcode, start, end in walk(data, 0, len(data)):
         if opcode == Opcode.MESSAGE:
             if end - start < DATA:
                 raise Damage("a message record ends early")
-            channel = int.from_bytes(data[start + HEAD.size : start + HEAD.size + 2], "little")
-            places.setdefault(channel, []).append((begin + start, end - start - DATA))
+            walked.append(start)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             define(opcode, data[start + HEAD.size : end])
         elif opcode < FIRST_PRIVATE:
             raise Damage(f"a record among messages has opcode {opcode}, which does not belong there")
-    return {channel: Found(*np.array(found, np.int64).T) for channel, found in places.items()}
+    offsets = np.concatenate([np.array(walked, np.int64), indexed])
+    heads = at(part, offsets, f"V{DATA}").view(_HEADS)
+    channels, lengths, times = (heads[name].astype(np.int64) for name in ("channel", "length", "log"))
+    if (times < 0).any():
+        raise Damage(f"a message has the log time {times.min() % 2**64} ns")
+    return Found(channels, offsets + begin, lengths - (DATA - HEAD.size), times)
+
+
+def _indexed(part: Bytes, index: bytes) -> Rows:
+    """Where the records start that an index names; none unless these are messages that fill all bytes to the end."""
+    none = np.empty(0, np.int64)
+    try:
+        records = walk(index, 0, len(index))
+        entries = [np.frombuffer(index[start + _INDEX_HEAD : end], "<i8")[1::2] for _, start, end in records]
+    except (Damage, ValueError):
+        return none
+    offsets = np.sort(np.concatenate([none, *entries]))
+    if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(part) - DATA:
+        return none
+    heads = at(part, offsets, f"V{DATA}").view(_HEADS)
+    are_messages = (heads["opcode"] == Opcode.MESSAGE).all() and (heads["length"] >= DATA - HEAD.size).all()
+    follow = offsets + HEAD.size + heads["length"] == np.append(offsets[1:], len(part))
+    return offsets if are_messages and follow.all() else none
+
+
+def packed(messages: Sequence[tuple[int, int, bytes]]) -> MessageBatch:
+    """A batch of messages: channel id, log time, ns, and data of each."""
+    parts = [
+        part
+        for channel, time, data in messages
+        for part in (MESSAGE.pack(Opcode.MESSAGE, DATA - HEAD.size + len(data), channel, 0, time, time), data)
+    ]
+    sizes = np.array([len(data) for *_, data in messages], np.int64)
+    channels, times = np.array([one[:2] for one in messages], np.int64).reshape(-1, 2).T
+    buffer = np.frombuffer(b"".join([*parts, bytes(TAIL)]), np.uint8)
+    return MessageBatch(buffer, Found(channels, np.cumsum(sizes + DATA) - sizes - DATA, sizes, times))
 
 
 def at(buffer: Bytes, offsets: Rows, dtype: str) -> NDArray[Any]:
@@ -118,21 +115,6 @@ def at(buffer: Bytes, offsets: Rows, dtype: str) -> NDArray[Any]:
     kind = np.dtype(dtype)
     view: NDArray[Any] = np.ndarray((max(len(buffer) - kind.itemsize + 1, 0),), kind, buffer, strides=(1,))
     return view[offsets]
-
-
-def log_times(buffer: Bytes, found: Found) -> Times:
-    """Log times of messages, ns."""
-    times = at(buffer, found.offsets + 15, "<u8")
-    if (times >= NEVER).any():
-        raise Damage(f"a message has the log time {times.max()} ns")
-    return times.astype(np.int64)
-
-
-def together(found: Sequence[Found]) -> Found:
-    """Several one after the other."""
-    if len(found) == 1:
-        return found[0]
-    return Found(np.concatenate([part.offsets for part in found]), np.concatenate([part.sizes for part in found]))
 
 
 def messages(buffer: Bytes, found: Found) -> list[bytes]:

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns
-from wam_bag.contents import mode_of
-from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_control.task.scenario import FORCE_LOOP
 from wam_description.event import Code, Event, Level
 from wam_description.signals import NodeStatus
@@ -224,7 +222,7 @@ def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
         unfinished,
         outcome,
         tuple(faults),
-        mode_of(bag.metadata, bag.attachments.get(ATTACHMENT)),
+        bag.mode,
         refused,
     )
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
-from wam_bag.losses import losses
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import owners
@@ -170,7 +169,7 @@ def replay(
             "there is nothing to compare; give a bag with all topics, from the recorder of the stack"
         )
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
-    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
+    lost = bag.losses.sentences(bag.first)
     changed = _changed_values(run, declaration, shared, own) if configuration else ()
     return Replay(declaration.name, mode, tuple(compared), tuple(lost), changed, run.others)
 

@@ -23,7 +23,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
 from wam_analysis.findings.analysis import analyse
-from wam_bag import bag_file, safe_yaml
+from wam_bag import mcap_file, safe_yaml
 from wam_bag.bag import (
     Bag,
     BagError,
@@ -36,9 +36,9 @@ from wam_bag.bag import (
     WrenchColumns,
     read,
 )
-from wam_bag.contents import contents, mode_of
 from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
+from wam_bag.recorder_parameters import mode_of
 from wam_bag.repair import repair
 from wam_studies.faults.bag_faults import MEMORY, limits
 
@@ -455,7 +455,7 @@ def test_a_file_that_decompresses_to_a_thousand_times_its_size_is_refused(
     path = hostile(tmp_path / "bag.mcap", "uint8[] z", *[message] * 4)
     assert path.stat().st_size < 10_000
     assert len(read(path).topics["/a"].log_time_ns) == 4, "so little may be that small"
-    monkeypatch.setattr(bag_file, "READING_LIMITS", replace(READING_LIMITS, expanded=2**24))
+    monkeypatch.setattr(mcap_file, "READING_LIMITS", replace(READING_LIMITS, expanded=2**24))
     with pytest.raises(BagError, match="bytes decompress to more than 1000 times as many"):
         read(path)
 
@@ -506,7 +506,7 @@ def test_files_that_were_compressed_as_a_whole_are_refused_and_read_once_they_ar
     described = bag / "metadata.yaml"
     described.write_text(described.read_text().replace(".mcap", ".mcap.zstd"))
     commands = rf"decompress it with 'zstd -d --rm {bag}/\*.mcap.zstd', then 'wam bag repair {bag}'"
-    for use in (read, contents, lambda path: analyse(path, lambda doing: None)):
+    for use in (read, lambda path: read(path, ()), lambda path: analyse(path, lambda doing: None)):
         with pytest.raises(BagError, match=commands):
             use(bag)
     with pytest.raises(BagError, match=r"compressed as a whole"):

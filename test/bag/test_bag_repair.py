@@ -23,7 +23,6 @@ from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import BagError, read
 from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
-from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_bag.metadata import INFINITE
 from wam_bag.repair import repair
@@ -204,7 +203,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     lines = stated(repair(tmp_path / "bag")[0]).splitlines()
     assert "lost are 10 messages (5 of /jointstate, 5 of /wrenchstamped)" in lines[1]
     assert lines[2] == f"A gap from {first / 1e9:.3f} s to {last / 1e9:.3f} s."
-    info = described(contents(tmp_path / "bag"))
+    info = described(read(tmp_path / "bag", ()))
     assert info[:2] == [f"INCOMPLETE: {line}" for line in lines[1:]]
     assert "recorded in lockstep mode, lost: 10 of those that were recorded" in info
     assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
@@ -227,11 +226,10 @@ def test_the_losses_of_two_repairs_stand_side_by_side(tmp_path: Path) -> None:
     data[data.index(chunks[7].data) + 30] ^= 255
     file.write_bytes(data)
     repair(tmp_path / "bag")
-    found = contents(tmp_path / "bag")
-    counts = {name: topic.messages for name, topic in found.topics.items()}
-    lost = losses(found.path, found.metadata, found.attachments, counts)
+    found = read(tmp_path / "bag", ())
+    lost = found.losses
     assert list(lost.repaired) == ["bag_0.mcap", "bag_0.mcap (2)"]
-    assert lost.by_topic == {topic: 50 - count for topic, count in counts.items()}
+    assert lost.by_topic == {topic: 50 - count for topic, count in found.counts.items()}
     assert lost.gone == 20
 
 
@@ -241,7 +239,7 @@ def test_what_the_recorder_counted_is_compared_with_what_is_there(tmp_path: Path
         "recording", {"mode": "lockstep", "/jointstate driver received": "57", "/jointstate driver dropped": "0"}
     )
     bag.close()
-    first = described(contents(tmp_path / "bag"))[0]
+    first = described(read(tmp_path / "bag", ()))[0]
     assert first == "INCOMPLETE: The recorder received 7 messages (7 of /jointstate) that are not in the bag."
 
 
@@ -254,8 +252,8 @@ def test_one_file_of_several_and_a_cut_are_not_held_against_the_counts_of_the_wh
     files = sorted((tmp_path / "bag").glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     assert len(files) > 2
     for path in (files[-1], tmp_path / "bag"):
-        assert not any("INCOMPLETE" in line for line in described(contents(path)))
-    found = contents(tmp_path / "bag")
+        assert not any("INCOMPLETE" in line for line in described(read(path, ())))
+    found = read(tmp_path / "bag", ())
     cut = {**found.metadata, "cut": {"begin_ns": "0"}}
     assert losses(found.path, cut, found.attachments, {"/jointstate": 1}).gone == 0
     assert losses(found.path, found.metadata, found.attachments, {"/jointstate": 1}).gone == 99
@@ -270,7 +268,7 @@ def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     repair(tmp_path / "bag")
-    lines = described(contents(tmp_path / "bag"))
+    lines = described(read(tmp_path / "bag", ()))
     assert lines[0].startswith("INCOMPLETE: bag_0.mcap had not been closed")
     assert lines[1].startswith("INCOMPLETE: The recorder wrote no counts")
     assert "recorded in realtime mode, lost: unknown, see above" in lines
@@ -291,7 +289,7 @@ def test_info_says_what_is_in_a_bag(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", samples, Split(4000, 0.0))
     bag.metadata("recording", {"mode": "lockstep", "/jointstate driver dropped": "3", "/clock driver dropped": "0"})
     bag.close()
-    lines = described(contents(tmp_path / "bag"))
+    lines = described(read(tmp_path / "bag", ()))
     assert any(line.startswith(f"{tmp_path}/bag/bag_1.mcap") for line in lines)
     assert "100 messages" in "\n".join(lines)
     assert lines[0] == "INCOMPLETE: Lost on the way to the recorder: 3 of /jointstate from driver."

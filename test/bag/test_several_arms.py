@@ -11,8 +11,6 @@ from sample_messages import STORE, joint_state, status
 
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
-from wam_bag.contents import contents
-from wam_bag.losses import losses
 from wam_cli.main import main
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.topics import BY_NAME
@@ -132,6 +130,6 @@ def test_bags_of_two_arms_that_another_tool_merged_keep_what_each_had(tmp_path: 
     assert of_third.problem == (
         "parameters.yaml in the bag has no parameters of the arm /third; it has those of /left, /right"
     )
-    lost = losses(both, bag_of_both.metadata, bag_of_both.attachments, bag_of_both.counts)
+    lost = bag_of_both.losses
     assert sorted(lost.dropped) == [f"/{arm}/contact/in_contact from driver" for arm in ("left", "right")]
-    assert contents(both).attachments == bag_of_both.attachments
+    assert read(both, ()).attachments == bag_of_both.attachments

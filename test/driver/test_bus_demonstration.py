@@ -15,7 +15,6 @@ from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import recorded_motion
 from wam_analysis.recording import AnalysedRecording
 from wam_bag.bag import read
-from wam_bag.losses import losses
 from wam_control.task.scenario import load_for
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration, packaged
@@ -137,7 +136,7 @@ def test_exciting_moves_over_the_bus_identify_the_arm(tmp_path: Path, monkeypatc
     monkeypatch.setattr(wam_sim.simulation, "Driver", DriverOnBus)
     assert record(configuration, steps, tmp_path / "bag") == ""
     bag = read(tmp_path / "bag")
-    assert losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(0) == []
+    assert bag.losses.sentences(0) == []
     shared = configuration.shared
     motion = recorded_motion(recorded_run(bag), shared.arm)
     found = identify(shared, motion)

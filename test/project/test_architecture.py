@@ -34,8 +34,8 @@ ARROWS = {
 # package -> all that it may import of others; the rest take what they need
 DEPENDENCIES = {
     "wam_theory": {"numpy"},
-    # ament_index_python where there is ROS, pandas where somebody asks for a DataFrame
-    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python", "pandas"},
+    # ament_index_python where there is ROS, pandas where somebody asks for a DataFrame, rosbags for ROS 1 and SQLite
+    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python", "pandas", "rosbags"},
 }
 KNOW_ROS = ("wam_ros", "wam_cli", "wam_live", "wam_studies")
 WITHOUT_CLOCK = ("wam_theory", "wam_description", "wam_driver", "wam_control")

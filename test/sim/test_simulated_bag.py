@@ -9,7 +9,6 @@ import pytest
 
 from wam_bag import definitions
 from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
-from wam_bag.contents import contents
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_control.task.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
@@ -83,7 +82,7 @@ def test_a_force_that_is_refused_ends_the_demonstration_with_an_exit_code_and_th
 @pytest.mark.slow
 def test_its_bag_is_that_of_a_recorder(played: tuple[Path, str]) -> None:
     path = played[0] / "bags" / "touch"
-    found = contents(path)
+    found = read(path, ())
     assert found.mode == "lockstep"
     run = recorded_run(read(path))
     assert (run.outcome, [step.name for step in run.steps]) == (

@@ -17,13 +17,13 @@ from wam_analysis.findings.steps import VerdictResult, steps_section, verdict
 from wam_analysis.findings.stick_slip import stick_section
 from wam_analysis.findings.timing import provenance, timing_section
 from wam_analysis.findings.topics import topics_section
-from wam_analysis.foreign.reading import foreign_bag, needs_rosbags, require_messages
+from wam_analysis.foreign.reading import foreign_bag
+from wam_analysis.foreign.tables import series_of_csv, table_bag
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import LAYOUT
 from wam_analysis.traces import OF_STEPS
 from wam_bag.bag import Bag, BagError, JointColumns, WrenchColumns, read
-from wam_bag.contents import contents
 from wam_bag.errors import command
 from wam_bag.losses import PARAMETERS, RECORDING
 from wam_description.event import Code
@@ -99,20 +99,25 @@ def analyse(
     ValueError
         if it has not what is given.
     """
-    found: Path | Mapping[str, Any]
-    if isinstance(source, (str, Path)):
-        found = Path(source)
-        progress(f"reading {found}")
-        if not given.is_given and _is_own(found):
-            return analyse_bag(read(found, TOPICS_READ, may_lack=True), progress, namespace)
-        if namespace:
-            raise ValueError(
-                f"--namespace chooses an arm of this stack, but {found} is a recording of another robot; leave it out"
-            )
-        progress("it is a recording of another robot")
-    else:
-        found = source.reset_index() if hasattr(source, "reset_index") else source
-    bag, given = foreign_bag(found, given)
+    if not isinstance(source, (str, Path)):
+        series = source.reset_index() if hasattr(source, "reset_index") else source
+        bag, given = table_bag(Path("table"), series, given)
+        return analyse_bag(bag, progress, given=given)
+    path = Path(source)
+    progress(f"reading {path}")
+    found = None if path.suffix == ".csv" else read(path, ())
+    if found is not None and not any(found.counts.values()):
+        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
+    if found is not None and not given.is_given and _is_own(found):
+        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
+    if namespace:
+        raise ValueError(
+            f"--namespace chooses an arm of this stack, but {path} is a recording of another robot; leave it out"
+        )
+    progress("it is a recording of another robot")
+    if found is not None:
+        return analyse_bag(foreign_bag(found, given), progress, given=given)
+    bag, given = table_bag(path, series_of_csv(path), given)
     return analyse_bag(bag, progress, given=given)
 
 
@@ -134,16 +139,12 @@ def analyse_steps(path: str | Path, namespace: str = "") -> Analysis:
     return found
 
 
-def _is_own(path: Path) -> bool:
-    """Whether a bag, which must not be empty, is of this stack: by what its recorder left in it, or by its topics."""
-    if path.suffix == ".csv" or needs_rosbags(path):
-        return False
-    found = contents(path)
-    require_messages(path, (topic.messages for topic in found.topics.values()))
+def _is_own(found: Bag) -> bool:
+    """Whether a bag is of this stack: by what its recorder left in it, or by its topics."""
     if PARAMETERS in found.attachments or RECORDING in found.metadata:
         return True
-    spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN_TOPICS.items()
-              if name.endswith(f"/{own}") and one.type == kind]  # fmt: skip
+    spaces = [name[: -len(own)] for name, one in found.types.items() for own, kind in OWN_TOPICS.items()
+              if name.endswith(f"/{own}") and one == kind]  # fmt: skip
     return any(spaces.count(space) > 1 for space in spaces)
 
 

@@ -1,83 +1,46 @@
-"""Bags of other robots as columns of joints and wrenches: by `wam_bag`, or by rosbags where the format is another."""
+"""Bags of other robots as columns of joints and wrenches."""
 
-import importlib
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wam_analysis.foreign.clocks import BILLION, nanoseconds
-from wam_analysis.foreign.tables import series_of_csv, table_bag
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_bag.arrays import Numbers, Texts, Times
-from wam_bag.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
+from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns, read
 from wam_bag.columns import JOINT_FIELDS as IN_JOINTS
 from wam_bag.columns import UNNAMED, joint_columns
-from wam_bag.contents import contents
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
-JOINT_FIELDS = {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"}
-WRENCH_FIELDS = {"force": "wrench.force", "torque": "wrench.torque"}
+FIELDS = {  # of the types that are known, by quantity
+    JOINTS: {"name": "name", "position": "position", "velocity": "velocity", "effort": "effort"},
+    WRENCH: {"force": "wrench.force", "torque": "wrench.torque"},
+}
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 CONTROLLER_PARTS = {"": ("feedback", "actual"), " command": ("reference", "desired")}  # suffix of the topic: names
 COMMAND = "command"
 PARTS_OF_TIME = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a stamp, in ROS 2, 1 and rosbridge
 TIME_OF_ROS = "{} has stamps of ROS, in s and ns; --unit stamp is for numbers"
-ROSBAGS = (".bag", ".db3")
 
 
-def needs_rosbags(path: Path) -> bool:
-    """Whether a bag is of ROS 1 or of SQLite, which rosbags reads."""
-    if path.is_file():
-        return path.suffix in ROSBAGS
-    return any(path.glob("*.db3*"))
-
-
-def foreign_bag(source: Path | Mapping[str, Any], given: TopicMap) -> tuple[Bag, TopicMap]:
+def foreign_bag(source: Bag, given: TopicMap) -> Bag:
     """The joints and wrenches of a recording, in the units of the map; the type of a command is `COMMAND`.
 
     Parameters
     ----------
-    source : bag, CSV file, or table, see `table_bag`.
-
-    Returns
-    -------
-    tuple
-        the recording, and the map with the units that a table names.
+    source : what it holds, without messages.
 
     Raises
     ------
     BagError
-        if it cannot be read, is empty, or needs rosbags, which is not installed.
+        if it cannot be read.
     ValueError
         if a topic, joint or field of the map is not there.
     """
-    if not isinstance(source, Path):
-        return table_bag(Path("table"), source, given)
-    if source.suffix == ".csv":
-        return table_bag(source, series_of_csv(source), given)
-    if needs_rosbags(source):
-        bag = _by_rosbags(source, given)
-    else:
-        listed = contents(source).topics
-        chosen = [name for name, topic in listed.items() if _is_wanted(name, topic.type, given)]
-        bag = read(source, chosen)
-        bag = bag._replace(types={name: topic.type for name, topic in listed.items()})
-    require_messages(source, bag.counts.values())
-    return _analysed(bag, given), given
-
-
-def require_messages(path: Path, counts: Iterable[int]) -> None:
-    """Refuse an empty recording.
-
-    Raises
-    ------
-    BagError
-        if no topic has a message.
-    """
-    if not any(counts):
-        raise BagError(f"{path} is empty: it has no message; record again while the nodes publish")
+    chosen = [name for name, kind in source.types.items() if _is_wanted(name, kind, given)]
+    is_mapped = bool(given.fields) or "stamp" in given.units
+    return _analysed(read(source.path, chosen, as_messages=is_mapped), given)
 
 
 def _analysed(bag: Bag, given: TopicMap) -> Bag:
@@ -105,45 +68,17 @@ def _is_wanted(topic: str, kind: str, given: TopicMap) -> bool:
     return kind in (JOINTS, WRENCH, CONTROLLER) or topic in given.commands
 
 
-def _by_rosbags(path: Path, given: TopicMap) -> Bag:
-    try:
-        highlevel: Any = importlib.import_module("rosbags.highlevel")
-        typesys: Any = importlib.import_module("rosbags.typesys")
-    except ImportError:
-        raise BagError(f"{path} is not an MCAP file; rosbags reads it: pip install 'wam_stack[rosbags]'") from None
-    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)  # where the bag defines no types
-    times: dict[str, list[int]] = {}
-    found: dict[str, list[Any]] = {}
-    try:
-        with highlevel.AnyReader([path], default_typestore=store) as reader:
-            kinds = {one.topic: one.msgtype for one in reader.connections}
-            counts = {topic: found.msgcount for topic, found in reader.topics.items()}
-            some = [one for one in reader.connections if _is_wanted(one.topic, one.msgtype, given)]
-            for one, time, data in reader.messages(some) if some else ():
-                times.setdefault(one.topic, []).append(time)
-                found.setdefault(one.topic, []).append(reader.deserialize(data, one.msgtype))
-    except highlevel.AnyReaderError as error:
-        raise BagError(f"{path} cannot be read by rosbags: {error}") from None
-    topics: dict[str, Any] = {name: Messages(np.array(times[name], np.int64), found[name]) for name in found}
-    return Bag(path, topics, kinds, {}, {}, counts)
-
-
 # to columns
 
 
 def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tuple[str, JointColumns | WrenchColumns]]:
     """The columns of a topic by name, scaled; those of a controller's state are two: feedback and reference."""
-    if isinstance(columns, (JointColumns, WrenchColumns)):
-        _refuse_other_fields(topic, kind, given)
     if isinstance(columns, JointColumns):
-        named = [given.fields.get(q, q) for q in IN_JOINTS]
-        if bad := next((field for field in named if field not in IN_JOINTS), ""):
-            raise ValueError(f"{topic} has no field '{bad}'; it has {', '.join(IN_JOINTS)}")
-        p, v, e = (given.scaled(q)[0] * getattr(columns, field) for q, field in zip(IN_JOINTS, named, strict=True))
-        names = columns.names
-        if UNNAMED in columns.irregular and len(given.joints) == len(names):
+        names, irregular = columns.names, dict(columns.irregular)
+        if len(given.joints) == len(names) and irregular.pop(UNNAMED, 0):
             names = given.joints
-        yield topic, columns._replace(names=names, position=p, velocity=v, effort=e)
+        scaled = {q: given.scaled(q)[0] * getattr(columns, q) for q in IN_JOINTS}
+        yield topic, columns._replace(names=names, irregular=irregular, **scaled)
     elif isinstance(columns, WrenchColumns):
         force, torque = (given.scaled(q)[0] for q in ("force", "torque"))
         yield topic, columns._replace(force=force * columns.force, torque=torque * columns.torque)
@@ -153,7 +88,9 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
             parts = {"name": "joint_names", "position": f"{part}.positions", "velocity": f"{part}.velocities"}
             yield topic + suffix, _joints(topic, columns, parts, given)
     elif len(columns.log_time_ns):
-        known = {JOINTS: JOINT_FIELDS, WRENCH: WRENCH_FIELDS}.get(kind, {}) | dict(given.fields)
+        own = FIELDS.get(kind, {})
+        every = own | dict(given.fields)
+        known = {q: path for q, path in every.items() if not own or q in own or q == "stamp"}
         if not known:
             raise ValueError(f"{topic} is of type {kind}; name its fields, for example --map position=FIELD")
         has_joints, has_wrench = any(q in known for q in IN_JOINTS), "force" in known or "torque" in known
@@ -163,16 +100,6 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
             yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, known, given)
 
 
-def _refuse_other_fields(topic: str, kind: str, given: TopicMap) -> None:
-    """Refuse a map of what a known type has in one place only; position, velocity and effort may be exchanged."""
-    if "stamp" in given.units:
-        raise ValueError(TIME_OF_ROS.format(topic))
-    fields = {"stamp": "header.stamp"} | (JOINT_FIELDS if kind == JOINTS else WRENCH_FIELDS)
-    for quantity, field in fields.items():
-        if quantity not in IN_JOINTS and given.fields.get(quantity, field) != field:
-            raise ValueError(f"{topic} is of type {kind}; its {quantity} is '{field}', not '{given.fields[quantity]}'")
-
-
 def _at(topic: str, message: Any, path: str) -> Any:
     """What a path names in a message; of a list the path goes into each of its elements."""
     value = message
@@ -180,7 +107,7 @@ def _at(topic: str, message: Any, path: str) -> Any:
         try:
             value = [getattr(one, part) for one in value] if isinstance(value, list) else getattr(value, part)
         except AttributeError:
-            fields = ", ".join(name for name in getattr(message, "__dict__", {}) or getattr(message, "__slots__", ()))
+            fields = ", ".join(getattr(message, "_fields", ()) or vars(message))
             raise ValueError(f"{topic} has no field '{path}'; its messages have {fields}") from None
     return value
 

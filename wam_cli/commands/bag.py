@@ -4,8 +4,9 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from wam_bag.contents import Contents, contents
-from wam_bag.losses import PARAMETERS, RECORDING, Losses, losses
+from wam_bag.bag import Bag, read
+from wam_bag.bag_file import files
+from wam_bag.losses import PARAMETERS, RECORDING, Losses
 from wam_bag.repair import Repaired, repair
 from wam_cli.options import configuration_of, recording_folder, take_configuration, take_stack, writable_directory
 from wam_description.arm import Shared
@@ -44,7 +45,7 @@ def run(given: argparse.Namespace) -> int:
     if given.request == "record":
         _record(given)
     elif given.request == "info":
-        print("\n".join(described(contents(given.bag))))
+        print("\n".join(described(read(given.bag, ()))))
     else:
         print("\n".join(stated(result) for result in repair(given.bag)))
     return 0
@@ -82,27 +83,26 @@ def _of_stack(configuration: Configuration, shared: Shared) -> Configuration:
     return configuration.with_values({**values(shared), "nodes": nodes})
 
 
-def described(found: Contents) -> list[str]:
+def described(found: Bag) -> list[str]:
     """Lines about a bag: files, time, what the recorder reports, topics."""
     seconds = (found.last - found.first) / 1e9
-    count = sum(topic.messages for topic in found.topics.values())
-    counts = {name: topic.messages for name, topic in found.topics.items()}
-    lost = losses(found.path, found.metadata, found.attachments, counts)
+    lost = found.losses
     lines = [f"INCOMPLETE: {line}" for line in lost.sentences(found.first)]
-    lines += [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in found.files]
-    lines.append(f"from {_time(found.first)}, {seconds:.3f} s, {count} messages")
+    lines += [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in files(found.path)]
+    lines.append(f"from {_time(found.first)}, {seconds:.3f} s, {sum(found.counts.values())} messages")
     if RECORDING in found.metadata or PARAMETERS in found.attachments:
         lines.append(f"recorded in {found.mode} mode, lost: {_lost(found, lost)}")
     lines += [f"attachment {name}, {len(data)} bytes" for name, data in found.attachments.items()]
-    width = max(map(len, found.topics), default=0)
-    for name, topic in found.topics.items():
-        rate = f"{(topic.messages - 1) / seconds:9.1f} Hz" if topic.messages > 1 and seconds else " " * 12
+    width = max(map(len, found.types), default=0)
+    for name, kind in found.types.items():
+        count = found.counts[name]
+        rate = f"{(count - 1) / seconds:9.1f} Hz" if count > 1 and seconds else " " * 12
         gone = f"  {lost.by_topic[name]} are gone" if name in lost.by_topic else ""
-        lines.append(f"{name:{width}}  {topic.messages:8d} {rate}  {topic.type}{gone}")
+        lines.append(f"{name:{width}}  {count:8d} {rate}  {kind}{gone}")
     return lines
 
 
-def _lost(found: Contents, lost: Losses) -> str:
+def _lost(found: Bag, lost: Losses) -> str:
     printed = [f"{count} of {where}" for where, count in lost.dropped.items()]
     printed += [f"{lost.gone} of those that were recorded"] if lost.gone else []
     if lost.uncounted:

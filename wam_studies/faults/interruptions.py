@@ -12,8 +12,7 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from wam_bag.bag import BagError
-from wam_bag.contents import contents
+from wam_bag.bag import BagError, read
 from wam_studies.faults.soak import lost_in
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 
@@ -71,7 +70,7 @@ def _bag(bag: Path) -> Iterator[str]:
     if not list(bag.glob("*.mcap")):
         return
     try:
-        found = contents(bag)
+        found = read(bag, ())
     except BagError as error:
         yield f"bag: {error}"
         return

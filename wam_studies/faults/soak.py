@@ -12,8 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import yaml
 
-from wam_bag.contents import Contents, contents
-from wam_bag.losses import losses
+from wam_bag.bag import Bag, read
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
@@ -66,10 +65,10 @@ def soak(case: SoakCase) -> SoakRecord:
         with Composition(configuration.with_values(own)) as composition:
             samples: list[_MemorySample] = []
             failure = composition.play(partial(_sample, samples))
-        found = contents(Path(folder, "soak"))
+        found = read(Path(folder, "soak"), ())
     first, last, early = samples[0], samples[-1], samples[len(samples) // 10].memory
     factor = (last.seconds - first.seconds) / max(last.wall - first.wall, 1e-9)
-    count = sum(topic.messages for topic in found.topics.values())
+    count = sum(found.counts.values())
     return SoakRecord(last.seconds, factor, early, last.memory, count, tuple(lost_in(found)), failure)
 
 
@@ -110,10 +109,9 @@ class SoakStudy(Study[SoakCase, SoakRecord]):
         return Scores([Row(name, exact(v, len(records)), required=bound) for name, (v, bound) in counts.items()])
 
 
-def lost_in(found: Contents) -> list[str]:
+def lost_in(found: Bag) -> list[str]:
     """What a bag lacks, in words."""
-    counts = {name: topic.messages for name, topic in found.topics.items()}
-    return losses(found.path, found.metadata, found.attachments, counts).sentences(found.first)
+    return found.losses.sentences(found.first)
 
 
 def _steps(arm: Arm, case: SoakCase) -> list[dict[str, Any]]:

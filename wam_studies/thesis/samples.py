@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import yaml
 
 from wam_analysis.table import markdown
-from wam_bag.contents import contents
+from wam_bag.bag import read
 from wam_description.parameters import ParameterError, require
 from wam_studies.page import with_section
 from wam_studies.thesis.cutting import Cut, cut
@@ -83,7 +83,7 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
         sample.shows,
         f"wam experiment {experiment.name} --samples make",
         list(sample.seconds),
-        sum(topic.messages for topic in contents(bag).topics.values()),
+        sum(read(bag, ()).counts.values()),
         sum(file.stat().st_size for file in files_of(bag)),
         _hashes(bag),
         [row | {"is_whole": _is_same(row, of_whole.get(name))} for name, row in _rows(experiment, bag).items()],

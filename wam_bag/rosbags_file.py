@@ -1,0 +1,71 @@
+"""Bags of ROS 1 and of SQLite, opened for reading by rosbags: without checksums, their messages as those of MCAP."""
+
+import importlib
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+from mcap.records import Channel, Schema
+
+from wam_bag.cdr import CDR, ROS1, SCHEMAS
+from wam_bag.errors import BagError
+from wam_bag.mcap_file import BATCH, BagFile, MessageCounts
+from wam_bag.message_search import NEVER, MessageBatch, packed
+
+SUFFIXES: Final = (".bag", ".db3")
+
+
+def needs_rosbags(path: Path) -> bool:
+    """Whether a bag is of ROS 1 or of SQLite, which rosbags reads."""
+    return path.suffix in SUFFIXES if path.is_file() else any(path.glob("*.db3*"))
+
+
+class RosbagsFile(BagFile):
+    """A bag that rosbags reads, see `BagFile`; its errors are BagErrors."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        super().__exit__(kind, value, trace)
+        if isinstance(value, Exception) and not isinstance(value, (BagError, OSError)):
+            raise BagError(f"{self.path} cannot be read by rosbags: {value}") from value
+
+    def open(self) -> None:
+        """List the topics."""
+        try:
+            rosbags: Any = importlib.import_module("rosbags.highlevel.anyreader")
+        except ImportError:
+            raise BagError(
+                f"{self.path} is not an MCAP file; rosbags reads it: pip install 'wam_stack[rosbags]'"
+            ) from None
+        store = rosbags.get_typestore(importlib.import_module("rosbags.typesys").Stores.ROS2_HUMBLE)
+        # where the bag defines no types
+        reader = self._stack.enter_context(rosbags.AnyReader([self.path], default_typestore=store))
+        self._reader, encoding = reader, CDR if reader.is2 else ROS1
+        for number, one in enumerate(reader.connections):
+            is_known = one.msgtype in reader.typestore.fielddefs
+            text = reader.typestore.generate_msgdef(one.msgtype, ros_version=1 + reader.is2)[0] if is_known else ""
+            self.schemas[number] = Schema(number, text.encode(), SCHEMAS[encoding] if is_known else "", one.msgtype)
+            self.channels[number] = Channel(number, one.topic, encoding, {}, number)
+        counts = {number: one.msgcount for number, one in enumerate(reader.connections)}
+        first, last = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
+        self.counts = MessageCounts(first, last, counts)
+
+    def batches(
+        self, channels: frozenset[int] | None = None, begin: int = 0, end: int = NEVER
+    ) -> Iterator[MessageBatch]:
+        """Messages as `BagFile.batches`, of all times."""
+        self.loaded = MessageCounts(0, 0, {})
+        reader, size = self._reader, 0
+        found: list[tuple[int, int, bytes]] = []
+        every = {id(one): number for number, one in enumerate(reader.connections)}
+        wanted = [one for one in reader.connections if channels is None or every[id(one)] in channels]
+        for one, time, data in reader.messages(wanted) if wanted else ():
+            found.append((every[id(one)], time, data))
+            size += len(data)
+            if size >= BATCH:
+                yield self._taken(packed(found))
+                found, size = [], 0
+        if found:
+            yield self._taken(packed(found))
