@@ -167,7 +167,7 @@ def analyse_bag(
     for make in sections or (FOREIGN_SECTIONS if recording.is_foreign else SECTIONS):
         if (section := make(recording)) is not None:
             progress(section.title)
-            made.append(_marked(section, changed) if changed and section.key in ("force", "stability") else section)
+            made.append(_marked(section, changed) if changed and section.by_gains else section)
     return Analysis(recording, (_verdict(recording, made), *made))
 
 

@@ -43,7 +43,7 @@ def force_section(recording: AnalysedRecording) -> Section:
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
     findings += _dynamic_range(recording)
     wrong = _reaction_verdict(reactions, zero)
-    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong)
+    return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong, by_gains=True)
 
 
 def _other_reactions(recording: AnalysedRecording) -> dict[str, tuple[RecordedReaction, ...]]:
@@ -201,7 +201,7 @@ def cycle_section(recording: AnalysedRecording) -> Section:
     margin = f", guard margin {shown(min(margins))}" if margins else ""
     if settled and not verdict:
         verdict.append(f"Stability: {'all' if settled == len(held) else f'{settled} of {len(held)}'} settled{margin}.")
-    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict)
+    return Section("stability", "Stability and limit cycles", sentences, findings, (), verdict, by_gains=True)
 
 
 def _fate(one: HeldForce) -> tuple[str, str]:
