@@ -9,7 +9,7 @@ class NodeLimits:
 
     long_step: float = 0.02  # s, from which a step holds up the other nodes of its process; a driver waits 0.025 s
     long_step_look: float = 0.01  # s between two looks for one
-    long_step_recent: float = 1.0  # s, in which what the others lack is the consequence of one
+    long_step_recent: float = 0.1  # s, in which what the others lack is the consequence of one: twice a watchdog
     service_wait: float = 2.0  # s, after which a request reports that it still waits for its service
     newest_kept: int = 2  # messages; one alone would be lost when the next comes just as it is taken
     claim_period: float = 0.1  # s, between looks for second publishers of topics on which nothing comes

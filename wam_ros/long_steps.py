@@ -60,14 +60,14 @@ class Steps:
     def end(self, node: str, began: float) -> bool:
         """A step has ended; whether it was reported meanwhile."""
         self._present = None
-        now = time.monotonic()
-        if now - began > NODE_LIMITS.long_step:
+        now, last = time.monotonic(), self.recent()
+        if now - began > max(NODE_LIMITS.long_step, last.seconds if last else 0.0):
             self._last = LongStep(node, now - began), now
         was_reported, self._reported = self._reported == node, ""
         return was_reported
 
     def recent(self) -> LongStep | None:
-        """The long step that has just ended, None where there was none."""
+        """The longest step that has just ended, None where none was long."""
         step, ended = self._last
         return step if step.node and time.monotonic() - ended < NODE_LIMITS.long_step_recent else None
 

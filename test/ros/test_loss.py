@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -18,7 +19,7 @@ from wam_description.synchroniser import Inputs
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Input, Outputs, reaction
 from wam_driver.safety import Mode
-from wam_ros.long_steps import LongStep
+from wam_ros.long_steps import LongStep, Steps
 from wam_ros.messages import diagnostic_status, joint_state, message_type
 from wam_ros.topics import qos, stamp_of
 from wam_studies.faults.answered_clock import AnsweredClock
@@ -230,9 +231,35 @@ def test_a_node_inside_a_long_step_is_named_and_not_one_that_it_holds_up(
     published = slow.outlets.published
     before = published["status"]
     monkeypatch.setattr(Slow, "may_end", lambda: published["status"] > before)
-    stack.ros.wait(lambda: published["status"] > before, what="a report from inside the step")
-    assert stack.nodes["velocity_loop"].peers.held_up(["transform"]).startswith("slow was in a step of ")
+    peers, reasons = stack.nodes["velocity_loop"].peers, set[str]()
+    hear = peers.hear
+    monkeypatch.setattr(peers, "hear", lambda status: [hear(status), reasons.add(peers.held_up(["transform"]))])
+    ros.wait(lambda: any(one.startswith("slow was in a step of ") for one in reasons), what="a report from the step")
     monkeypatch.setattr(Slow, "may_end", lambda: True)
+
+
+@pytest.mark.parametrize(
+    ("taken", "since", "named"),
+    [
+        ({"force_loop": 0.4, "transform": 0.05}, 0.02, "force_loop"),
+        ({"transform": 0.05, "force_loop": 0.4}, 0.02, "force_loop"),
+        ({"force_loop": 0.03}, 0.2, ""),
+        ({"force_loop": 0.01}, 0.0, ""),
+    ],
+)
+def test_the_longest_step_that_has_just_ended_holds_up_the_others(
+    taken: dict[str, float], since: float, named: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, steps = 100.0, Steps()
+    monkeypatch.setattr("wam_ros.long_steps.time", SimpleNamespace(monotonic=lambda: now))
+    for node, seconds in taken.items():
+        began = now
+        steps.begin(node, began)
+        now += seconds
+        steps.end(node, began)
+    now += since
+    step = steps.recent()
+    assert (step.node if step else "") == named
 
 
 def test_what_a_held_up_node_lacks_is_the_fault_of_the_long_step(ros: Network, tmp_path: Path) -> None:
