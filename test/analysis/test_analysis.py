@@ -21,11 +21,9 @@ from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.prediction import largest_force, node_at
-from wam_analysis.findings.tabulated import MARK, tabulated
 from wam_analysis.findings.text import SCHEMA, json_text, text
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.recorded import prediction_parameters
-from wam_analysis.table import bounded
 from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns
 from wam_cli.main import main
 from wam_control.force.force_loop import ForceLoop
@@ -153,23 +151,6 @@ def test_the_friction_of_motors_and_joints_is_identified_in_spite_of_noise(movin
         assert found.measured == pytest.approx(arm.joints.dynamic_friction[i], rel=0.02)
         assert found.predicted == arm.joints.dynamic_friction[i]
     assert moving.finding("motor4: viscous friction").measured == pytest.approx(1e-4, rel=0.1)
-
-
-@pytest.mark.parametrize("width", [60, 100])
-def test_every_number_of_a_section_stands_in_its_tables_within_the_width(moving: Recorded, width: int) -> None:
-    """Each table has the numbers of its subjects and quantities, and no line is too long or runs into the next."""
-    lines = text(moving.analysis, width).splitlines()
-    assert max(map(len, lines)) <= width
-    for section in moving.analysis.sections:
-        found = [cell for table in tabulated(section.findings) for row in table.rows for cell in row[1:]]
-        for finding in section.findings:
-            if math.isfinite(finding.measured):
-                number = bounded(shown(finding.measured), finding.is_lower_bound)
-                error = f" +- {shown(finding.error)}" if math.isfinite(finding.error) else ""
-                assert number + error + MARK * finding.deviates in found
-                assert any(number in line.split() for line in lines)
-            if math.isfinite(finding.predicted):
-                assert shown(finding.predicted) in found
 
 
 def test_what_was_changed_while_the_arm_ran_is_named(moving: Recorded) -> None:

@@ -350,21 +350,6 @@ def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: f
     assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
 
 
-@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (180.0 / math.pi, "57.3"), (-1.0, "-1"), (0.5, "0.5")])
-def test_a_velocity_that_is_not_the_rate_of_the_position_gives_no_friction(
-    factor: float, said: str, tmp_path: Path
-) -> None:
-    time = times(20.0)
-    q, v, a = swung(time, 41)
-    fields = {"position": q, "velocity": factor * v, "effort": loaded(q, v, a, 0.0, 42)}
-    sent = joints("/joint_states", time, ["a"], **{name: value[:, np.newaxis] for name, value in fields.items()})
-    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
-    (section,) = (one for one in analysis.sections if one.key == "friction")
-    assert ("a: dry friction" in numbers) is (not said)
-    doubt = f"a: the recorded velocity is {said} times the rate of the position"
-    assert any(one.startswith(doubt) for one in section.wrong) is bool(said)
-
-
 def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     time = times(8.0)
     position = at_rest(time, ["a", "b"], 43)
@@ -481,19 +466,6 @@ def test_a_frame_that_changes_with_the_force_neither_hides_its_steps_nor_makes_g
     assert section(found, "timing") == ("Every period has its message.",)
 
 
-def test_friction_comes_from_the_messages_that_have_an_effort(tmp_path: Path) -> None:
-    time = times(30.0)
-    q, v, a = swung(time, 2)
-    effort = loaded(q, v, a, 0.0, 3)
-    effort = np.column_stack([effort, np.where(np.arange(len(time)) % 2, math.nan, effort)])
-    position, velocity = np.column_stack([q, q]), np.column_stack([v, v])
-    sent = joints("/joint_states", time, ["whole", "half"], position=position, velocity=velocity, effort=effort)
-    analysis, numbers = found((by_rosbags(tmp_path / "bag", sent), TopicMap()))
-    assert numbers["whole: dry friction"] == pytest.approx(DRY, rel=CLOSE)
-    assert numbers["half: dry friction"] == pytest.approx(DRY, rel=CLOSE)
-    assert "half: effort in only 50 % of the messages." in section(analysis, "happened")
-
-
 def following(frame_at: float, measured_at: float, cycle: float = 0.0) -> list[Sent]:
     """A command of 10 N from 4 s and 5 N from 12 s on, and the force that follows it, with a cycle from 12 s on.
 
@@ -597,12 +569,9 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
     ("options", "message"),
     [
         (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
-        (([], [], [], ["effort"], []), "--map is 'effort'"),
         (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
         (([], [], [], [], ["name=s"]), "--unit is 'name=s'"),
-        (([], [], [], [], ["stamp=deg"]), "'deg' is no unit of stamp; it may be a factor or s, ms, us, ns"),
         (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; it may be a factor or N, "),
-        (([], [], [], [], ["position=deg", "position=rad"]), "--unit position is given twice"),
         (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
     ],
 )

@@ -161,15 +161,11 @@ def names() -> list[Case]:
     given = topic_map([], ["p", "q"], [], [], [])
     return [
         Case("none", by_mcap_ros2, called(), numbers("joint1", "joint2"), "without a name"),
-        Case("none, SQLite", sqlite, called(), numbers("joint1", "joint2"), "without a name"),
         Case("none, ROS 1, given", ros1, called(), numbers("p", "q"), "", given),
-        Case("none, MCAP, given", by_rosbags, called(), numbers("p", "q"), "", given),
         Case("empty", by_rosbags, called("", ""), numbers("joint1", "joint2"), "without a name"),
         Case("one of two", sqlite, called("x"), numbers("x", "joint2"), "without a name"),
         Case("twice", by_rosbags, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
-        Case("twice, SQLite", sqlite, called("x", "x"), numbers("x", "x (2)"), "a joint's name twice"),
         Case("short effort", by_rosbags, short, numbers("x", "y"), "effort of another length than the names"),
-        Case("short effort, ROS 1", ros1, short, numbers("x", "y"), "effort of another length than the names"),
     ]  # fmt: skip
 
 

@@ -223,19 +223,6 @@ def test_friction_of_a_recording_with_gaps_is_that_of_the_rest():
     assert found.dynamic.value == near(0.18)
 
 
-def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
-    """A spring of cables that settles after each start: alike in every sample of a motion, which is no noise."""
-    time = np.arange(6_000) / 1000.0
-    velocity = np.where((time > 1.0) & (time < 2.0), 1.5 * np.sin(math.pi * (time - 1.0)) ** 2, 0.0)
-    velocity -= np.where((time > 3.0) & (time < 4.0), 1.5 * np.sin(math.pi * (time - 3.0)) ** 2, 0.0)
-    since = np.where(time > 3.0, time - 3.0, time - 1.0)
-    torque = 0.18 * np.sign(velocity) + 0.012 * velocity
-    torque += np.where(velocity != 0.0, np.sign(velocity) * 0.02 * np.exp(-since / 0.3), 0.0)
-    found = identify_friction(time, velocity, torque, rest=0.05, window=0.02)
-    assert abs(found.viscous.value - 0.012) > 0.002
-    assert abs(found.viscous.value - 0.012) < 2.0 * found.viscous.error
-
-
 def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike_for_long():
     """A torque that wanders within some tenths of a second, as of creep or ripple; and two motions."""
     off = []

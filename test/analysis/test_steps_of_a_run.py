@@ -707,18 +707,6 @@ def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():
     np.testing.assert_allclose(pose.rotation.T @ force, [-2.0, 8.0, 0.0], atol=1e-12)
 
 
-def test_view_keeps_lengths_across_and_shows_everything():
-    shared = Configuration.load(packaged("wam")).shared
-    shown = arm_picture.scene(shared.arm, POSE, arm_of(Played().bag()).world)
-    view = arm_picture.side_view(shown, aspect=1.2)
-    np.testing.assert_allclose(view.axes @ view.axes.T, np.eye(3), atol=1e-12)
-    assert view.width / view.height == pytest.approx(1.2)
-    for tube in shown.tubes:
-        for end in view.project(np.array([tube.start, tube.end])):
-            assert abs(end[0]) + tube.radius < view.width / 2
-            assert abs(end[1]) + tube.radius < view.height / 2
-
-
 def with_outcome(folder, *statuses: tuple[str, str, int]):
     """A bag on disk with these statuses alone: node, message, level; one a second."""
     store = get_typestore(Stores.ROS2_JAZZY)

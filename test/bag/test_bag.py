@@ -1,7 +1,6 @@
 """Bags written without ROS and read by readers that are not ours, and the other way round."""
 
 import contextlib
-import itertools
 import os
 import shutil
 import struct
@@ -28,7 +27,7 @@ from sample_messages import QOS, STORE, joint_state, point, status, wrench
 import wam_bag
 from wam_bag.bag import BagError, JointColumns, read
 from wam_bag.bag_writer import BagWriter, RecordingError
-from wam_bag.cdr import ExactLength, stamp_reader
+from wam_bag.cdr import stamp_reader
 from wam_bag.definitions import DefinitionError, definition, schema, type_hash
 from wam_bag.mcap_writer import McapWriter
 from wam_description.topics import TOPICS
@@ -131,18 +130,6 @@ def test_an_unknown_type_is_refused_with_its_name() -> None:
         schema("sensor_msgs/msg/Nothing")
     with pytest.raises(DefinitionError, match="package/msg/Type"):
         schema("JointState")
-
-
-def test_bytes_left_behind_a_message_are_cut_and_nothing_else() -> None:
-    length = ExactLength("sensor_msgs/msg/JointState")
-    names = [["a"], ["motor1", "motor2"], ["x" * 5, "", "yy"]]
-    arrays = [[], [1.0], [1.0, 2.0]]
-    for name, position, velocity, effort in itertools.product(names, arrays, arrays, arrays):
-        data = joint_state(1_500_000_000, name, position, velocity, effort)
-        for tail in range(17):
-            assert length(data + bytes(range(1, 1 + tail))) == len(data)
-        assert ExactLength("sensor_msgs/msg/JointState")(data + b"\7" * 9) == len(data)
-    assert ExactLength("std_msgs/msg/Bool")(b"\0\1\0\0\1\7\7\7") == 5
 
 
 def test_stamps_are_read_from_either_byte_order() -> None:

@@ -119,8 +119,7 @@ def test_while_a_force_changes_its_standard_deviation_has_the_delay_of_the_obser
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [5.0, 10.0])
-@pytest.mark.parametrize("phi", [0.0, 60.0, 90.0, 180.0, -90.0])
+@pytest.mark.parametrize(("size", "phi"), [(5.0, 0.0), (10.0, 60.0), (5.0, 90.0), (10.0, 180.0), (5.0, -90.0)])
 def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> None:
     force = (0.0, size * math.cos(math.radians(phi)), size * math.sin(math.radians(phi)))
     estimate = at_rest("outer_link", 0.28, force)
@@ -253,8 +252,7 @@ def moving(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.8, 1.05])
-@pytest.mark.parametrize("fastest", [1.0, 2.5])
+@pytest.mark.parametrize(("friction", "fastest"), [(0.8, 2.5), (1.05, 1.0)])
 def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fastest: float) -> None:
     estimators = [ContactEstimator(ARM, TIMING, parameters) for parameters in (MOTORS, SENSORS)]
     for results in moving(estimators, Move(3, fastest), 5.0, friction):
@@ -262,7 +260,7 @@ def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fas
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) -> None:
     (results,) = moving([ContactEstimator(ARM, TIMING, MOTORS)], Move(seed, 1.0), 1.5, 1.0, push_at=600)
     assert not any(felt.estimate.in_contact for felt in results if felt.tick < 600)

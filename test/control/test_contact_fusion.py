@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 from contact_truth import torques
-from scipy.stats import multivariate_normal
 
 from wam_control.contact.contact_estimator import ContactEstimatorParameters
-from wam_control.contact.contact_fusion import ContactFusion, Torques, probability_of_slide
+from wam_control.contact.contact_fusion import ContactFusion, Torques
 from wam_control.contact.contact_inference import ContactInference, Hypothesis
 from wam_control.contact.thresholds import CONTACT
 from wam_description.rigid_body import RigidBody
@@ -103,25 +102,6 @@ def test_a_contact_that_slides_along_the_link_is_where_it_has_come_to(speed: flo
     assert max(ratio) < 1.6  # 2.4 and 4.0 of one that is taken to stay
 
 
-def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> None:
-    """Against the densities of both normal distributions."""
-    random = np.random.default_rng(7)
-    half = random.standard_normal((6, 6))
-    covariance, slide = half @ half.T + np.eye(6), random.standard_normal(6)
-    for size in (0.0, 1.0, 4.0):
-        torques = size * slide + random.standard_normal(6)
-        without, with_it = (
-            multivariate_normal(np.zeros(6), each).pdf(torques)
-            for each in (covariance, covariance + np.outer(slide, slide))
-        )
-        expected = (
-            CONTACT.slide_probability
-            * with_it
-            / (CONTACT.slide_probability * with_it + (1.0 - CONTACT.slide_probability) * without)
-        )
-        assert probability_of_slide(torques, covariance, slide) == pytest.approx(expected, rel=1e-9)
-
-
 @pytest.mark.slow
 def test_errors_that_stay_are_not_taken_for_new_knowledge() -> None:
     found = errors(0.9)
@@ -135,15 +115,6 @@ def test_an_arm_that_does_not_move_shows_nothing_new() -> None:
     found, fusion = played(np.random.default_rng(5), 0.5, moves=False)
     assert fusion.count == 1
     assert found[-1].position_sd == pytest.approx(found[0].position_sd, rel=0.5)
-
-
-def test_no_more_moments_than_allowed_count_and_none_without_time() -> None:
-    _, fusion = played(np.random.default_rng(5), 0.0, count=12)
-    assert fusion.count == 1 + CONTACT.moments
-    _, short = played(np.random.default_rng(5), 0.0, count=12, duration=3.5 * STEP)
-    assert short.count == 1 + 3
-    _, none = played(np.random.default_rng(5), 0.0, count=12, duration=0.0)
-    assert none.count == 1
 
 
 @pytest.mark.parametrize(("change", "least", "most"), [(-1.0, 1, 1), (2.0, CONTACT.moments + 1, 9)])

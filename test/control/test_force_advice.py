@@ -9,9 +9,7 @@ from numpy import eye
 from test_force_loop import ARM, BODY, DRIVEN, DT, STILL, force_loop
 from test_held_arm import OWN
 
-from wam_control.force.advice import Advice
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event
 from wam_description.signals import NO_CONTACT, ForceCommand, State
 
@@ -92,22 +90,3 @@ def test_no_more_force_is_advised_than_may_be_commanded() -> None:
     )
     assert "more_force" in free.values
     assert "more_force" not in limited.values
-
-
-def test_a_few_ways_are_tried_in_each_period() -> None:
-    tried: list[int] = []
-    advice = Advice()
-
-    def search():  # type: ignore[no-untyped-def]
-        for k in range(23):
-            tried.append(k)
-            yield {"pin": 0.1} if k == 17 else {}
-
-    counts = []
-    while not advice.is_complete:
-        before = len(tried)
-        advice.step(search)
-        counts.append(len(tried) - before)
-    assert max(counts) == FORCE.each
-    assert tried == list(range(23)), "each once"
-    assert advice.ways == {"pin": 0.1, "searched": 1.0}

@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION, WAM
-from numpy.typing import NDArray
 
 from wam_control.force.axes import CommandedAxis, TaskAxes
-from wam_control.force.belief import Belief, Errors, WorldTorques, belief, predicted, tolerance, yielding
+from wam_control.force.belief import Errors, WorldTorques, belief, predicted, tolerance, yielding
 from wam_control.force.contact_place import ForcePlace
 from wam_control.force.force_axis import ForceAxes, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 
-Array = NDArray[np.float64]
 OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
 FORCES, OUTER = ForceAxes(WAM, BODY, PLAIN.sensing), "outer_link"
@@ -77,13 +75,6 @@ def test_more_force_is_never_known_worse_per_newton(q: tuple[float, ...]) -> Non
 
 
 @pytest.mark.parametrize("q", POSES)
-def test_more_of_what_is_not_known_is_never_better(q: tuple[float, ...]) -> None:
-    base = errors(q, 10.0).size
-    worse = [{"sd": 0.03}, {"resting": 0.3}, {"shaking": 1.0}, {"is_too_slow": True}]
-    assert all(errors(q, 10.0, **more).size > base for more in worse)
-
-
-@pytest.mark.parametrize("q", POSES)
 def test_the_predicted_error_is_that_of_random_torques_friction_and_position(q: tuple[float, ...]) -> None:
     """The surface pushes back at a place that is off, with friction, and the sensors err."""
     random, n, axis = np.random.default_rng(2), 5000, axis_at(q, 10.0, 0.02)
@@ -107,19 +98,6 @@ def test_without_a_lever_nothing_is_known() -> None:
     tip = BODY.point(straight, OUTER, (0.3, 0.0, 0.0))
     axis = FORCES.axis(straight, PressedForce(OUTER, 0.3, 0.0, tip / np.linalg.norm(tip), 10.0))
     assert predicted(axis, SD, PLAIN).size == math.inf
-
-
-@pytest.mark.parametrize(
-    ("force", "share", "least", "expected"), [(10.0, 0.1, 0.0, 1.0), (-10.0, 0.1, 0.3, 1.0), (1.0, 0.1, 0.3, 0.3)]
-)
-def test_the_tolerance_is_a_share_of_the_force_and_no_less_than_the_least(
-    force: float, share: float, least: float, expected: float
-) -> None:
-    own = replace(OWN, limits=replace(OWN.limits, tolerance=share, least_tolerance=least))
-    assert tolerance(force, own) == pytest.approx(expected)
-    known = Belief(force, force, 0.0, 0.0, Errors(friction=0.3, place=0.4), expected)
-    assert known.doubt == pytest.approx(0.5 / expected)
-    assert known._replace(tolerance=0.0).doubt == math.inf
 
 
 @pytest.mark.parametrize("is_touching", [False, True])

@@ -11,7 +11,7 @@ from test_force_belief import OWN, POSES, axis_at
 
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import Belief, Errors
-from wam_control.force.force_watch import ForceWatch, Lasting, MotionWatch, Oscillation, Seen, TouchWatch, Turns
+from wam_control.force.force_watch import ForceWatch, MotionWatch, Seen
 from wam_control.task.motion import GoalMotion
 from wam_description.event import Code, Event
 
@@ -22,46 +22,6 @@ assert AXIS.place is not None
 PRESS = AXIS.sensed.press
 UNPINNED = AXIS._replace(place=AXIS.place._replace(is_pinned=False))
 SETTLING = OWN.limits.settling_time
-
-
-# ------------------------------------------------------------------------------------ conditions that last
-@pytest.mark.parametrize(("after", "back"), [(0.1, 0.3), (0.02, 0.01), (0.0, 0.0)])
-def test_a_condition_begins_after_its_time_and_ends_after_another(after: float, back: float) -> None:
-    lasting = Lasting()
-    found = [lasting.step(k < 100, after, back, DT) for k in range(200)]
-    begin, end = found.index(True), 100 + found[100:].index(False)
-    assert begin + 1 == pytest.approx(max(after / DT, 1), abs=1)
-    assert end - 99 == pytest.approx(max(back / DT, 1), abs=1)
-    assert found == [begin <= k < end for k in range(200)], "once"
-
-
-def test_a_condition_that_is_there_half_of_the_time_does_not_chatter() -> None:
-    lasting = Lasting()
-    assert not any(lasting.step(k % 2 == 0, 0.1, 0.1, DT) for k in range(400))
-    for _ in range(30):
-        lasting.step(True, 0.1, 0.1, DT)
-    assert all(lasting.step(k % 2 == 0, 0.1, 0.1, DT) for k in range(400))
-
-
-def test_turns_are_those_of_a_cycle_with_its_size_and_period_and_noise_and_a_drift_are_none() -> None:
-    noise = np.random.default_rng(1).normal(0.0, 0.05, 400)
-    turns, still = Turns(), Turns()
-    for k in range(400):
-        count = turns.step(FORCE + math.sin(2.0 * math.pi * k * DT / 0.25), 0.5, 1.0, DT)
-        assert still.step(FORCE + 0.01 * k + noise[k], 0.5, 1.0, DT) == 0
-    assert count == pytest.approx(8, abs=1)
-    assert turns.swing == (pytest.approx(2.0, rel=0.02), pytest.approx(0.25, rel=0.02))
-    assert [turns.step(FORCE, 0.5, 1.0, DT) for _ in range(220)][-1] <= 1, "it is forgotten"
-
-
-def test_a_touch_is_remembered() -> None:
-    touch, found = TouchWatch(), []
-    for force in (0.5, 1.5, 0.5):
-        touch.step(force, FORCE, 0.06)
-        found.append((touch.is_there, touch.has_been, touch.is_bouncing))
-    assert found == [(False, False, True), (True, True, True), (False, True, False)]
-    touch.step(9.0, 0.0, DT)
-    assert not touch.is_there, "nothing is commanded"
 
 
 # --------------------------------------------------------------------------------------------- a force
@@ -226,25 +186,6 @@ def test_an_oscillation_is_reported_with_its_size_and_ends_and_the_arm_is_slowed
     assert event.values["period"] == pytest.approx(0.2, rel=0.02)
     assert pressed.watch.oscillation.share == 0.25
     assert pressed.last(2.0 * SETTLING + 0.1) == []
-
-
-@pytest.mark.parametrize(
-    ("size", "sd", "share", "is_reported"),
-    [
-        (0.0, 0.0, 1.0, False),
-        (0.1, 0.0, 1.0, False),
-        (0.2, 0.0, 0.25, False),
-        (0.4, 0.1, 0.25, True),
-        (0.4, 0.3, 1.0, False),  # the sensors make such a swing, too
-    ],
-)
-def test_a_swing_below_the_reported_one_slows_the_arm_down(
-    size: float, sd: float, share: float, is_reported: bool
-) -> None:
-    oscillation = Oscillation()
-    found = [oscillation.step(swing(size)(k * DT), FORCE, sd, OWN, DT) for k in range(600)]
-    assert oscillation.share == share
-    assert any(found) is is_reported
 
 
 def test_a_force_that_follows_a_sine_of_its_set_point_is_no_oscillation() -> None:

@@ -105,23 +105,13 @@ def test_in_domain_ii_the_safe_error_creeps_to_its_end_in_a_direct_simulation_an
     found = loop_design(NODE, of_margin(1.2), RATE, DELAY)
     assert found.verdict.domain is Domain.II
     assert not found.is_safe
-    safe = loop_design(NODE, of_margin(1.2, limit=found.verdict.stable_error), RATE, DELAY)
+    advised = float(re.findall(r"saturate the error at ([\d.e-]+)", found.text())[0])
+    assert advised == pytest.approx(found.verdict.stable_error, rel=0.01)
+    safe = loop_design(NODE, of_margin(1.2, limit=advised), RATE, DELAY)
     assert safe.is_safe
     force = 3.0 * safe.loop.error_limit
     assert largest_late_motion(NODE, safe.loop, force, 2.0) < 0.005
     assert largest_late_motion(NODE, replace(safe.loop, error_limit=1e4), 100.0 * NODE.static_friction, 2.0) > 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("with_this_contact_alone")
-def test_in_domain_iii_no_error_is_safe_and_a_direct_simulation_never_rests() -> None:
-    found = loop_design(NODE, of_margin(20.0), RATE, DELAY)
-    assert found.verdict.domain is Domain.III
-    assert (found.verdict.stable_error, found.verdict.undecided_error) == (0.0, 0.0)
-    assert "limit cycle of stiction" not in found.text()
-    assert "undecided" not in found.text()
-    loop = replace(found.loop, error_limit=5.0)
-    assert largest_late_motion(NODE, loop, 5.0, 1.0) > 0.01
 
 
 @pytest.mark.slow
@@ -195,15 +185,6 @@ def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_
         advised = float(re.findall(r"lower the gain to ([\d.e-]+), 0.9 of the margin", text)[0])
         assert 0.89 * margin < advised <= 0.9 * margin
         assert "lower" not in loop_design(PLANT, IntegralLoop(advised), 500.0, 2e-3).text()
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("with_this_contact_alone")
-def test_the_saturation_that_is_advised_is_safe() -> None:
-    margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
-    found = loop_design(PLANT, IntegralLoop(1.3 * margin), 500.0, 2e-3)
-    error = float(re.findall(r"saturate the error at ([\d.e-]+)", found.text())[0])
-    assert found._replace(loop=replace(found.loop, error_limit=error)).is_safe
 
 
 @pytest.mark.slow

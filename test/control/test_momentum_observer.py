@@ -200,21 +200,6 @@ def test_declared_uncertainty_covers_a_nominal_model_that_is_wrong(sensors: bool
     assert np.median(ratios) < 1.5
 
 
-def test_uncertainty_of_joints_2_and_3_comes_from_both_motors() -> None:
-    """At rest: sd^2 = N2^2 (sd_2^2 + sd_3^2) and a quarter of it, sd of stiction plus the drive's own."""
-    only_stiction = dataclasses.replace(KNOWN, rest_uncertainty=0.5)
-    observer = MomentumObserver(WAM, only_stiction, use_joint_sensors=False)
-    state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0] * 4, [0.1] * 4)
-    for _ in range(3):
-        observer.observe(state, DT)
-    stiction, own = WAM.motors.static_friction, WAM.joints.static_friction
-    motor = (0.5 * stiction[1]) ** 2 / 2 + (0.5 * stiction[2]) ** 2 / 2 + 0.003**2
-    covariance = observer.torques()[1]
-    assert covariance[1, 1] == pytest.approx(30.4**2 * 2 * motor + (0.5 * own[1]) ** 2)
-    assert covariance[2, 2] == pytest.approx(15.2**2 * 2 * motor + (0.5 * own[2]) ** 2)
-    np.testing.assert_array_less(0.0, np.linalg.eigvalsh(covariance))
-
-
 def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
     """cov(2, 3) = N2^2/2 (sd_2^2 - sd_3^2): a diagonal covariance would lose it."""
     alone = dataclasses.replace(KNOWN, rest_uncertainty=1.0, shape_uncertainty=0.0)
@@ -224,30 +209,6 @@ def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
         observer.observe(state, DT)
     expected = 30.4**2 / 2 * WAM.motors.static_friction[1] ** 2
     assert observer.torques()[1][1, 2] == pytest.approx(expected)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")  # 1e308 is seen by what comes out
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e308])
-@pytest.mark.parametrize("sensors", [False, True])
-def test_bad_samples_are_refused_and_leave_no_trace(bad: float, sensors: bool) -> None:
-    plant = RigidArm(WAM, POSE, friction=0.0)
-    observer = MomentumObserver(WAM, FREE, use_joint_sensors=sensors)
-    swing(observer, plant, 0.2, sensors=sensors)
-    before = (list(observer.torques()[0]), observer.torques()[1].tolist())
-    good = plant.sensors() if sensors else plant.motors(np.full(4, 0.1))
-    for part in range(3):
-        values = [list(array) for array in good]
-        values[part][2] = bad
-        taken = observer.observe(State(*values), DT)
-        assert not taken or math.isfinite(bad)
-    assert not observer.observe(State(good[0][:3], good[1], good[2]), DT)
-    for dt in (0.0, -1e-3, math.nan, math.inf):
-        assert not observer.observe(State(*good), dt)
-    if not math.isfinite(bad):
-        assert (list(observer.torques()[0]), observer.torques()[1].tolist()) == before
-    assert np.all(np.isfinite(observer.torques()[0]))
-    assert np.all(np.isfinite(observer.torques()[1]))
 
 
 def test_lost_samples_are_bridged() -> None:
@@ -271,23 +232,6 @@ def test_nothing_is_taken_from_a_gap_longer_than_the_time_constant(sensors: bool
     assert observer.torques()[0] == before
     assert observer.observe(State(angle, speed, tau), 0.5 * FREE.time_constant)
     assert np.abs(np.subtract(observer.torques()[0], before)).max() > 1.0, "a short one is bridged"
-
-
-def test_the_torque_of_the_model_is_that_of_the_strain_gauges_of_a_free_arm_with_slow_sampling_too() -> None:
-    """Its size shows in the covariance; the gauges go through a low-pass filter of the test's own."""
-    own = dataclasses.replace(KNOWN, mass_uncertainty=1.0, joint_torque_sd=1e-9)
-    slow, observer = 5, MomentumObserver(WAM, own, use_joint_sensors=True)
-    plant = RigidArm(WAM, POSE, friction=0.0)
-    passed, differences = NONE, []
-    for k in range(120):
-        motor = np.linalg.solve(DRIVE, wave(k * slow * DT) + plant.gravity())
-        for _ in range(slow):
-            plant.step(motor, NONE)
-            passed = passed + (np.array(plant.sensors()[2]) - passed) * -math.expm1(-DT / own.time_constant)
-        assert observer.observe(State(*plant.sensors()), slow * DT)
-        sizes = np.sqrt(np.diag(observer.torques()[1]))
-        differences.append(np.abs(sizes - np.abs(passed)).max())
-    assert max(differences[40:]) < 0.1
 
 
 def test_a_shaft_that_has_just_stopped_is_held_as_it_was_slowed_down_and_that_fades() -> None:

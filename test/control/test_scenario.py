@@ -155,18 +155,6 @@ def test_requests_are_made_once_when_their_step_begins() -> None:
     assert outs[-1].failure == ""
 
 
-def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
-    force, place = (1.0, -7.0, 4.0), 0.3
-    push = Push("outer_link", place, force, 0.05, 0.1)
-    outs = play(Scenario([ScenarioStep("pushed", 0.2, push=push), ScenarioStep("free", 0.1)]), 50)
-    pushed = [k for k, out in enumerate(outs) if any(out.push_force)]
-    assert pushed == list(range(10, 20)), "from begin until before end"
-    assert outs[10].push_force == force
-    assert outs[10].push_torque == pytest.approx(np.cross([place, 0.0, 0.0], force), abs=1e-15)
-    assert outs[0].push_cover == "outer_link"
-    assert outs[45].push_cover == ""
-
-
 def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_path: Path) -> None:
     """The inner tube is 1.6 in aside at the elbow: a push on the cover's axis would hardly touch it."""
     push = {"cover": "inner_link", "contact_position": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
@@ -256,34 +244,27 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         (without(WHOLE, "name"), "'name' is missing"),
         (without(WHOLE, "seconds"), "'seconds' is missing"),
         ({**WHOLE, "name": None}, "name is None; it must be a text"),
-        ({**WHOLE, "name": ""}, "name is ''; it must be a text"),
         ({**WHOLE, "seconds": 0}, "seconds is 0; it must be above 0"),
         ({**WHOLE, "seconds": "1 s"}, "seconds is '1 s'; it must be a finite number"),
-        ({**WHOLE, "seconds": True}, "seconds is True; it must be a finite number"),
         ({**WHOLE, "seconds": math.nan}, "seconds is nan; it must be a finite number"),
         ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
-        ({**WHOLE, "posture": 0.4}, "posture is 0.4; it must be a list of 4 numbers"),
         ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
         (
             {**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]},
             "posture: joint2 is to be at -9 rad; allowed: -2.356 to",
         ),
         ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
-        ({**WHOLE, "until_force": math.inf}, "until_force is inf; it must be a finite number"),
         ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable"),
-        ({**WHOLE, "request": ["enable"]}, r"request is \['enable'\]; allowed: enable, disable"),
         ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),
         ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
         ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
-        ({**WHOLE, "force": {"frame": "base", "newtons": [0, 0, math.nan]}}, "newtons is nan; it must be a finite"),
         (placed(0.28, "base"), "contact_position is given; it needs the frame of a link and a force across it"),
         (
             placed(0.28, newtons=[1, 0, 0]),
             "contact_position is given; it needs the frame of a link and a force across it",
         ),
         (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
-        (placed(0.9), "contact_position is 0.9 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
         ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),
         ({**WHOLE, "push": without(WHOLE["push"], "newtons")}, "push: 'newtons' is missing"),
         ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
@@ -640,7 +621,6 @@ def test_a_step_made_in_python_is_checked_as_one_of_a_file(step: ScenarioStep, t
     [
         (None, "steps is None; it must be a list of ScenarioStep"),
         ((one for one in [ScenarioStep("go", 1.0)]), "steps is <generator .*; it must be a list of ScenarioStep"),
-        (ScenarioStep("go", 1.0), "step 1 is 'go'; give a ScenarioStep"),
         ([ScenarioStep("go", 1.0), None], "step 2 is None; give a ScenarioStep"),
         ([{"name": "go", "seconds": 1.0}], "step 1 is {'name': 'go', .*; give a ScenarioStep"),
     ],
@@ -659,8 +639,6 @@ IN_PYTHON: list[tuple[dict[str, Any], dict[str, Any]]] = [
         {"set": {"driver": {"effects": {"added_coulomb_friction": [1, 0, 0, 0]}}}},
     ),
     ({"seconds": Fraction(2), "posture": [0, 0, 0, 1]}, {"seconds": 2.0, "posture": [0.0, 0.0, 0.0, 1.0]}),
-    ({"posture": tuple(np.array([0, 0, 0, 1]))}, {"posture": [0.0, 0.0, 0.0, 1.0]}),
-    ({"until_force": np.int64(2)}, {"until_force": 2.0}),
     ({"tip": [Fraction(1, 2), 0, np.float32(0.25)]}, {"tip": [0.5, 0.0, 0.25]}),
     (
         {"trajectory": PosturePath(cast(Any, [PathPoint(cast(Any, GOAL), cast(Any, []))]))},

@@ -9,14 +9,13 @@ import pytest
 
 from wam_control.velocity.servo_guard import ServoGuard, ServoGuardParameters
 from wam_control.velocity.velocity_loop import VelocityLoop, VelocityLoopParameters
-from wam_control.velocity.velocity_loop_node import VelocityLoopNode
 from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
-from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
+from wam_theory.velocity_servo import is_stable, largest_scale, locked_rotors, servo_period
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
 GUARD = ServoGuardParameters("refuse", 1.0, 1, False)
@@ -130,9 +129,11 @@ def guard_of(configuration: Configuration) -> ServoGuard:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["realtime", "lockstep"])
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
-@pytest.mark.parametrize(("proportional", "integral"), [(8.0, 1.0), (1.0, 500.0), (1e6, 1e8)])
+@pytest.mark.parametrize(
+    ("mode", "proportional", "integral"),
+    [("realtime", 8.0, 1.0), ("lockstep", 8.0, 1.0), ("lockstep", 1.0, 500.0), ("realtime", 1e6, 1e8)],
+)
 def test_a_refusal_names_gains_that_are_accepted(
     configuration: Configuration, mode: str, proportional: float, integral: float
 ) -> None:
@@ -157,19 +158,6 @@ def test_a_refusal_names_gains_that_are_accepted(
 
 
 GAINS = re.compile(r"servo\.(\w+) up to \[([^]]*)\]")
-
-
-def test_the_velocity_loop_takes_no_gain_that_would_oscillate() -> None:
-    shared = WAM.shared
-    node = VelocityLoopNode(shared, WAM.node("velocity_loop", VelocityLoopParameters))
-    before = node._loop._kp
-    with pytest.raises(ParameterError, match=r"allowed: servo.proportional_gain up to \["):
-        node.retune(replace(shared.servo, proportional_gain=(0.3,) * 4))
-    assert node._loop._kp == before
-    with pytest.raises(ParameterError, match="is not stable"):
-        VelocityLoopNode(
-            replace(shared, servo=scaled(shared.servo, 8.0)), WAM.node("velocity_loop", VelocityLoopParameters)
-        )
 
 
 @pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
@@ -202,13 +190,3 @@ def test_a_large_integral_gain_on_gains_that_hardly_brake_is_refused(proportiona
 def test_gains_are_taken_where_the_guard_is_off() -> None:
     off = WAM.with_values({"velocity_loop:guard.mode": "off"})
     guard_of(off).require_stable(scaled(off.shared.servo, 100.0))
-
-
-def test_what_is_constant_is_no_slow_oscillation_however_it_is_rounded() -> None:
-    """The angles of free links are constant: their eigenvalues are 1, with an imaginary part of rounding."""
-    slow = 0.1 * np.array([[-0.3, -1.0], [1.0, -0.3]])  # damping ratio 0.287
-    for error in (1e-16, 1e-15, 1e-12):
-        period_map = np.eye(4)
-        period_map[:2, :2] += error * np.array([[1.0, -1.0], [1.0, 1.0]])
-        period_map[2:, 2:] += slow
-        assert least_damping(period_map, 0.6) == pytest.approx(0.238, abs=0.01)

@@ -178,18 +178,6 @@ def test_live_parameters_leave_the_equilibrium_of_an_impedance_where_it_was() ->
     assert world.point(Y)[1] == pytest.approx(start, abs=4e-3)
 
 
-@pytest.mark.slow
-def test_live_parameters_do_not_begin_the_way_in_free_air_anew() -> None:
-    world, task = Springs(), base(force(8.0))
-    world.step(task, 600)
-    assert world.loop.event.code is Code.AT_LIMIT
-    there = world.point(DOWN)
-    world.loop.tune(replace(OWN, posture_gain=1.1 * OWN.posture_gain))
-    world.step(task, 300)
-    assert world.loop.event.code is Code.AT_LIMIT
-    assert world.point(DOWN) == pytest.approx(there, abs=2e-3)
-
-
 def test_a_refused_task_is_tried_again_with_new_parameters() -> None:
     world, task = Springs(springs={DOWN: 4000.0, Y: 4000.0}), base(force(10.0), force(5.0, Y))
     low = replace(OWN, force_limit=8.0)

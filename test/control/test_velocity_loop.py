@@ -9,7 +9,6 @@ from wam_control.velocity.servo_guard import ServoGuardParameters
 from wam_control.velocity.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Servo
 from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError
 from wam_description.parts import Motors
 
 INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
@@ -173,26 +172,6 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
     rotor.loop.tune(Servo((0.1,), (8.0,)), OWN)  # type: ignore[union-attr]
     assert rotor.step([0.0]) == before
     assert rotor.step([1.0]) == pytest.approx(before + 0.1 + 8.0 * DT)
-
-
-@pytest.mark.parametrize(
-    ("proportional", "integral", "text"),
-    [
-        ((0.01,), (0.1, 0.1), "'servo.integral_gain' has 2 values; 1 name needs 1"),
-        ((0.01, 0.01), (0.1, 0.1), "'servo.proportional_gain' has 2 values; 1 name needs 1"),
-    ],
-)
-def test_gains_of_a_wrong_number_are_refused(
-    proportional: tuple[float, ...], integral: tuple[float, ...], text: str
-) -> None:
-    with pytest.raises(ParameterError, match=text):
-        VelocityLoop(ONE, Servo(proportional, integral), OWN)
-    loop = VelocityLoop(ONE, SERVO, OWN)
-    with pytest.raises(ParameterError, match=text):
-        loop.tune(Servo(proportional, integral), OWN)
-    assert loop.step([0.0], [0.0], [1.0], [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
-        [0.0], [0.0], [1.0], [0.0], DT
-    ), "the gains in use stay"
 
 
 def test_commanded_velocity_and_feedforward_change_no_faster_than_their_limits() -> None:

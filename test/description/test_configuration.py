@@ -1,9 +1,5 @@
 """Configurations read from parameter files without ROS."""
 
-import os
-import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,15 +32,6 @@ def file(tmp_path: Path) -> Path:
     path = tmp_path / "mine.yaml"
     path.write_text(LOOP + packaged("wam").read_text())
     return path
-
-
-def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
-    configuration = Configuration.load(file)
-    assert configuration.shared.arm.name == "wam"
-    assert configuration.shared.timing.period_ns == 1_000_000
-    assert configuration.node("loop", Loop) == Loop(2.5, ("a", "b"))
-    assert configuration.text == file.read_text()
-    assert len(configuration.sha256) == 64
 
 
 def test_lists_of_whole_and_other_numbers_become_what_ros_reads(file: Path, tmp_path: Path) -> None:
@@ -117,7 +104,6 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
     ("text", "message"),
     [
         ("a: [1,", "is not YAML"),
-        ("? [a]\n: 1", "is not YAML"),
         ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
         ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
         ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
@@ -130,7 +116,6 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
         ("bsae: wam", r"has the key 'bsae'; did you mean 'base'\?"),
-        ("bsae: wam\n/**: {ros__parameters: {}}", r"has the key 'bsae'; did you mean 'base'\?"),
         ("steps: []", r"is a scenario, no configuration; play it with 'wam up --scenario /.*/odd\.yaml'"),
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
         ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
@@ -184,31 +169,6 @@ def test_a_file_that_would_win_over_the_command_line_is_refused(tmp_path: Path) 
         Configuration.load(path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("way", ["own prefix", "ament prefix"])
-def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str) -> None:
-    source = Path(__file__).resolve().parents[2]
-    prefix = tmp_path / "prefix"
-    packages = prefix / "lib" / "site-packages" if way == "own prefix" else tmp_path / "elsewhere"
-    for package in ("wam_description", "wam_theory"):
-        shutil.copytree(source / package, packages / package)
-    share = prefix / "share" / "wam_stack" / "config"
-    share.mkdir(parents=True)
-    shutil.copy(source / "config" / "wam.yaml", share)
-    environment = {**os.environ, "PYTHONPATH": str(packages)}
-    environment["AMENT_PREFIX_PATH"] = f"/nowhere{os.pathsep}{prefix}" if way == "ament prefix" else ""
-    code = "from wam_description.configuration import packaged; print(packaged('wam'))"
-    found = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert Path(found.stdout.strip()) == share / "wam.yaml"
-
-
 def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     overlay = tmp_path / "mine.yaml"
     overlay.write_text(
@@ -230,7 +190,6 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
-        ("base: nothing\n", "no configuration 'nothing' comes with wam_stack"),
         ("base: odd.yaml\n", "base is the file itself"),
         (
             "base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n",
@@ -238,7 +197,6 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
         ),
         ("base: wam\n/**: {ros__parameters: {timin: {}}}\n", r"section '/\*\*': 'timin' is empty; give it a value"),
         ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
-        ("base: wam\ndriver: {ros__parameters: {}}\n", "section 'driver' is not allowed"),
     ],
 )
 def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: str, message: str) -> None:
@@ -312,19 +270,13 @@ def test_values_at_their_bounds_a_longer_link_whose_numbers_meet_and_a_tool_beyo
     [
         ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
         ("[" * 3000, "nested more than 50 levels deep"),
-        ("[" * 60 + "]" * 60, "nested more than 50 levels deep"),
-        ("!!bool x", "one of its values does not fit its tag"),
-        ("!!timestamp x", "one of its values does not fit its tag"),
         ("2001-99-99", "no date: month must be in 1..12"),
         ("9" * 5000, "one of its values does not fit its tag"),
         ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
         ("\udcff", "character 1 is no UTF-8"),
         ("&a [*a]", r"\*a is inside of what it refers to"),
-        ("{1: 2}", "the key 1 is no text"),
-        ("*a", "undefined alias"),
         ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
         ("[1.0, 1:30]", "1:30 is 90 in YAML"),
-        ("1:30.5", "1:30.5 is 90.5 in YAML"),
     ],
 )
 def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: str, reason: str) -> None:
@@ -337,12 +289,9 @@ def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: 
     ("value", "hint"),
     [
         ("1e-3", "; YAML reads '1e-3' as a text: write 0.001"),
-        ("1e-7", "; YAML reads '1e-7' as a text: write 1.0e-07"),
         (".5e3", "; YAML reads '.5e3' as a text: write 500"),
-        ("1e22", "; YAML reads '1e22' as a text: write 1.0e+22"),
         ("'4'", "; YAML reads '4' as a text: write 4"),
         ("fast", ""),
-        ("1e400", ""),
         ("nan", ""),
     ],
 )
@@ -363,13 +312,6 @@ def test_a_text_that_looks_like_a_number_is_refused_with_what_to_write(value: st
 def test_what_is_no_list_is_none_for_a_parameter_either(value: Any) -> None:
     with pytest.raises(ParameterError, match=r"parameter 'names' is .*; it must be a list of str"):
         build(Loop, {"gain": 1.0, "names": value})
-
-
-def test_an_int_above_every_float_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"parameter 'gain' is 10000*; allowed"):
-        build(Loop, {"gain": 10**400, "names": ["a"]})
-    with pytest.raises(ParameterError, match=r"seconds is 10000*; it must be a finite number"):
-        number("step 1", "seconds", 10**400)
 
 
 @pytest.mark.parametrize(

@@ -191,9 +191,7 @@ def test_the_inertia_is_that_of_a_uniform_body() -> None:
     [
         ({"bodies": {"shapes": ("cone",)}}, "thing: world.bodies.shapes is 'cone'; allowed: box, cylinder, ball"),
         ({"bodies": {"sizes": (0.05, 0.0, 0.04)}}, "thing: world.bodies.sizes of a box begins with 0.05, 0, 0.04 m"),
-        ({"bodies": {"mass": (1.0, 2.0)}}, "'world.bodies.mass' has 2 values; 1 name needs 1"),
         ({"bodies": {"names": ("table",)}}, "obstacles, pushers, bodies and doors are named table"),
-        ({"bodies": {"names": ("outer_link",)}}, "'outer_link' has the name of a part of the arm"),
         ({"doors": {"upper": (-0.1,)}}, "door: world.doors.lower is -3 rad, upper -0.1 rad; 0, the angle at power-up"),
         ({"motions": {"obstacles": ("shelf",)}}, "motions.obstacles names 'shelf'; obstacles: table"),
         ({"bodies": {"mass": (0.002,)}}, "'table' and body 'thing'; allowed: up to"),

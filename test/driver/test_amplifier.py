@@ -59,12 +59,6 @@ def test_limit_falls_to_continuous_when_the_winding_is_hot(share: float) -> None
     assert seconds_to_limit(share * CONTINUOUS) == pytest.approx(expected, abs=2 * DT)
 
 
-def test_continuous_current_can_be_held_for_ever() -> None:
-    amp = amplifier()
-    for _ in range(20_000):
-        assert amp.step([CONTINUOUS, *REST], DT)[0] == CONTINUOUS
-
-
 def test_hot_winding_gets_the_continuous_current_and_no_more() -> None:
     amp = amplifier()
     for _ in range(round(1.5 * THERMAL_TIME / DT)):

@@ -213,11 +213,6 @@ def test_a_pause_is_no_missing_answer_and_a_step_is_one_period() -> None:
     assert lockstep.pacer.slips == 0
 
 
-def test_diagnostics_hold_nothing_of_the_wall_clock_where_there_is_no_pace() -> None:
-    assert Bench("lockstep", factor=0.0).lockstep().facts() == {}
-    assert set(Bench("lockstep").lockstep().facts()) == {"real-time factor", "behind [ms]", "slips"}
-
-
 @pytest.mark.slow
 def test_of_a_computer_that_is_too_slow_for_realtime_the_late_periods_are_named_until_they_are_rare() -> None:
     bench = Bench("realtime")
@@ -258,22 +253,6 @@ def test_periods_that_were_late_before_all_nodes_were_connected_keep_no_brakes_o
     on_time(bench, realtime, 2)
     assert not realtime.settles()
     assert realtime.obstacle() == ""
-
-
-@pytest.mark.slow
-def test_on_a_computer_too_slow_for_realtime_the_brakes_stay_on_unless_late_periods_allows_it() -> None:
-    bench = Bench("realtime")
-    realtime, bold = bench.realtime(), bench.realtime(late_periods=1.0)
-    assert not bold.settles()
-    waited = 0
-    while realtime.settles():
-        on_time(bench, realtime, 1, period=3e-3)
-        waited += 1
-    assert waited * 3e-3 == pytest.approx(10.0, abs=0.01)
-    assert realtime.obstacle().startswith("66.7 % of the newest periods were late, allowed 5 %: this computer is too")
-    assert not bench.driver.enable(realtime.obstacle()).success
-    bold.take_currents(bench.driver.stamp, HOLDING)
-    assert bold.obstacle() == ""
 
 
 @pytest.mark.parametrize("is_enabled", [True, False], ids=["enabled", "braked"])

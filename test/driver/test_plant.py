@@ -345,15 +345,6 @@ def test_a_tube_at_the_middle_of_a_thin_object_is_sunk(shape: str, part: float, 
     assert (" mm deep in block; allowed: " in plant.sunk()) is sunk
 
 
-def test_a_plane_has_no_middle() -> None:
-    q = (0.0, -1.8, 0.0, 1.0)
-    low = (cover_frame(q, "outer_link") @ [TIP, 0.0, 0.0, 1.0])[2] - RADIUS
-    plane = dataclasses.replace(box((0.0, 0.0, low + 0.2), (2.0, 2.0, 0.1), 100.0), shapes=("plane",))
-    plant = at(ideal_plant(WAM, plane, 5e-4), q)
-    assert plant.data.contact.dist.min() == pytest.approx(-0.2, abs=1e-6)
-    assert plant.sunk() == ""
-
-
 # pushes
 
 

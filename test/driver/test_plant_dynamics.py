@@ -311,16 +311,6 @@ def test_surface_at_rest_pushes_with_its_law(stiffness: float, hardening: float)
     assert math.hypot(*load.force) == pytest.approx(force, rel=1e-6)
 
 
-@pytest.mark.parametrize("bilateral", [False, True])
-@pytest.mark.parametrize("stiffness", [1751.27])
-def test_spring_at_rest_pushes_with_its_stiffness(stiffness: float, bilateral: bool) -> None:
-    arm = changed(one_joint(), joints={"viscous_friction": (20.0,)}, motors={"viscous_friction": (0.02,)})
-    torque = -0.002 * stiffness
-    plant = released(arm, spring(arm, 0, stiffness, LEVER, bilateral), STEP)
-    settled(plant, torque)
-    assert plant.q[0] * stiffness * LEVER**2 == pytest.approx(RATIO * torque, rel=1e-6)
-
-
 def test_unilateral_spring_does_not_pull() -> None:
     arm = one_joint()
     for bilateral, grows in ((False, False), (True, True)):

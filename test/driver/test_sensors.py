@@ -64,14 +64,6 @@ def test_velocity_of_a_real_encoder_is_the_difference_of_two_readings() -> None:
     np.testing.assert_allclose(read.motors(angles, [7.0] * 4, ZERO, 2 * DT).velocity, 0.0, atol=1e-9)
 
 
-def test_velocity_of_a_turning_shaft_is_right_on_average() -> None:
-    """One step over the whole time is all that it can be off."""
-    read = sensors(encoder_resolution=(1e-3,) * 4)
-    found = [read.motors([0.3 * k * DT] * 4, [0.3] * 4, ZERO, DT).velocity[0] for k in range(1001)]
-    assert sorted(set(np.round(found, 6))) == [0.0, 1.0]
-    assert np.mean(found[1:]) == pytest.approx(0.3, abs=1e-3)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["motors", "joints"])
 def test_noise_of_an_angle_has_its_standard_deviation_and_no_offset_and_no_memory(side: str) -> None:

@@ -180,10 +180,12 @@ def test_launcher_prefers_the_python_of_its_own_prefix(prefix, tmp_path):
 
 def test_each_build_runs_its_own_copy(prefix, workspace):
     # with another one on the path of the interpreter, as in `make test`
-    where = (sys.executable, "-P", "-c", "import wam_ros; print(wam_ros.__file__)")
-    assert run(*where, cwd=prefix, env=environment(prefix)).startswith(str(prefix))
+    code = "import wam_ros, wam_description.configuration as own; print(wam_ros.__file__, own.packaged('wam'))"
+    where = (sys.executable, "-P", "-c", code)
+    said = run(*where, cwd=prefix, env=environment(prefix))
+    assert all(line.startswith(str(prefix)) for line in said.split())
     said = run(*sourced(workspace), *where, cwd=workspace, env=clean_environment(workspace))
-    assert said.startswith(str(workspace))
+    assert all(line.startswith(str(workspace)) for line in said.split())
 
 
 def start_and_stop(command: list[str | Path], name: str, ros, cwd: Path, env: dict[str, str]) -> None:

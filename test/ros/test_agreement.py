@@ -197,17 +197,6 @@ def test_after_restarts_the_driver_names_the_reason_and_the_time_goes_on_when_it
     stack.enable()
 
 
-def test_enable_names_the_parameter_for_which_a_node_cannot_connect(ros: Network, tmp_path: Path) -> None:
-    sensorless = {
-        "arm.joint_sensors": False, "force_loop:feedback": "contact_estimate", "force_loop:force_gain": [0.01],
-    }  # fmt: skip
-    stack = Apart(ros, tmp_path, {"force_loop": sensorless})
-    driver = stack.nodes["driver"]
-    ros.wait(lambda: driver.health.problem, what="the status of the force loop")
-    answer = driver.enable()
-    assert "force_loop was started with another arm.joint_sensors than the driver" in answer.message
-
-
 def test_a_follower_that_does_not_accept_the_gains_of_the_velocity_loop_keeps_the_arm_braked(
     ros: Network, tmp_path: Path
 ) -> None:

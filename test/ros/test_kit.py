@@ -1,17 +1,13 @@
 """The test kit: what `arm` does for a test, also of a user's own node, and what it leaves behind."""
 
-import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 
-from wam_control.task.scenario import ScenarioStep
 from wam_description.arm import Shared
-from wam_description.configuration import Configuration, packaged
 from wam_description.event import Level
 from wam_description.parameters import Nothing, ParameterError, parameter
 from wam_description.signals import State
@@ -20,7 +16,6 @@ from wam_description.topics import BY_NAME, TASK_COLUMNS
 from wam_description.wiring import Input, Outputs, reaction
 from wam_ros.testing import ArmFault, RunningArm, configured
 from wam_ros.wire import encoder
-from wam_sim.simulation import Simulation
 
 OUTPUTS = ("joint_velocity_command", "joint_effort_command")
 TORQUE = State([], [], [])
@@ -184,17 +179,3 @@ def test_after_a_failed_test_the_next_one_runs_and_workers_do_not_meet(
     )
     arguments = ("-p", "wam_ros.pytest_plugin", "-p", "no:cacheprovider", "-n", "2")
     pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2, failed=2)
-
-
-@pytest.mark.slow
-def test_a_test_takes_no_more_than_a_few_times_its_simulation(arm: RunningArm, tmp_path: Path) -> None:
-    """In processor time, so that other programs do not count."""
-    steps = [ScenarioStep("wait", 2.0)]
-    run = Simulation(Configuration.load(packaged("wam")), steps)
-    begin = time.process_time()
-    run.play()
-    bare = time.process_time() - begin
-    arm.run(0.1)
-    begin = time.process_time()
-    arm.run(2.0)
-    assert time.process_time() - begin < 5.0 * bare

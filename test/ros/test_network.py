@@ -315,23 +315,6 @@ def test_a_link_that_is_cut_brakes_by_name_and_the_operator_alone_ends_the_fault
     assert operator.stdout.readline() == "enabled\n"
 
 
-def test_a_place_is_taken_once_and_free_again_when_it_is_closed() -> None:
-    place = Place(230, "/left", "driver")
-    assert occupant(230, "/left", "driver") == os.getpid()
-    assert not occupant(230, "/right", "driver")
-    assert not occupant(229, "/left", "driver")
-    for refuse in (lambda: Place(230, "/left", "driver"), lambda: Place(230, "/left", "driver").close()):
-        with pytest.raises(
-            ParameterError, match=rf"already runs in namespace /left of ROS domain 230 \(process {os.getpid()}"
-        ):
-            refuse()
-    place.close()
-    Place(230, "/left", "driver").close()
-    long = Place(230, "/left" * 100, "driver")
-    assert occupant(230, "/left" * 100, "driver")
-    long.close()
-
-
 def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], domain_id: int
 ) -> None:

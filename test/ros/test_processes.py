@@ -138,32 +138,6 @@ def enable(ros: Any, stack: Stack) -> None:
     ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
 
 
-ASK_THE_COLLECTOR = """
-import gc
-from rclpy.node import Node
-from wam_ros.run import run
-
-class Asker(Node):
-    def __init__(self, context, namespace):
-        super().__init__("asker", context=context, namespace=namespace)
-
-    @property
-    def done(self):  # asked while it spins
-        print(gc.get_freeze_count(), len(gc.get_objects()))
-        return True
-
-run({"asker": Asker})
-"""
-
-
-def test_the_collector_passes_over_what_is_there_when_a_node_begins_to_spin(started: Any, ros: Any) -> None:
-    # it would take 0.1 s, and the others would brake the arm for a node that is late
-    stack = started("-c", ASK_THE_COLLECTOR)
-    assert stack.process.wait(LONG) == 0, stack.said()
-    frozen, looked_at = map(int, stack.said().split())
-    assert looked_at < 0.02 * frozen
-
-
 @pytest.mark.parametrize(
     ("number", "options"),
     [

@@ -112,19 +112,6 @@ def test_in_realtime_the_driver_s_process_has_a_processor_and_all_others_the_res
     assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * count
 
 
-def test_in_lockstep_what_exchanges_most_messages_shares_the_driver_s_processor(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    entries = ["driver", "transform", "velocity_loop", "gravity", "force_loop", "recorder"]
-    configured = REALTIME.with_values({"timing.mode": "lockstep", "nodes": entries})
-    of = places(monkeypatch, {0, 1}, how=EACH, configured=configured)
-    assert len({of[name] for name in ("driver", "transform", "velocity_loop", "gravity")}) == 1
-    assert len({of["force_loop"], of["recorder"], of["driver"]}) == 2
-    inner, *others = places(monkeypatch, {0, 1}, how=GROUPED, configured=configured).values()
-    assert others == [others[0]] * 2
-    assert {inner, others[0]} == {"0 batch", "1 batch"}
-
-
 @pytest.mark.parametrize(("permitted", "granted"), [({0, 1, 2, 3}, False), ({0, 1}, True)])
 def test_without_priority_or_a_third_processor_they_may_be_anywhere(
     permitted: set[int], granted: bool, monkeypatch: pytest.MonkeyPatch

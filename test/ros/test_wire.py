@@ -187,17 +187,11 @@ REFUSED = [
     ("motor_states", spoilt(effort=[0.0, 0.0, 0.0, -INF]), "effort of motor4 is -inf; send finite numbers"),
     ("motor_states", spoilt(velocity=[2.0, -1e200, 0.0, 0.0]), r"velocity of motor2 is -1e\+200; no arm reaches that"),
     ("motor_states", spoilt(effort=[0.0] * 3), f"effort has 3 values; send 4, one for each of {', '.join(NAMES)}"),
-    ("motor_states", spoilt(effort=[0.0] * 5), "effort has 5 values; send 4"),
-    ("motor_states", spoilt(effort=[]), "effort has 0 values; send 4"),
     ("motor_states", spoilt(name=NAMES[::-1], effort=[]), "effort has 0 values; send 4"),
     ("motor_states", spoilt(name=[*NAMES[:3], "elbow"]), "unknown name 'elbow'; allowed: motor1, motor2"),
     ("motor_states", spoilt(name=[*NAMES[:3], "motor3"]), "name 'motor3' is given twice; send each of"),
-    ("motor_states", spoilt(name=[*NAMES, "motor1"]), "name 'motor1' is given twice"),
     ("motor_states", spoilt(name=NAMES[:3]), "name 'motor4' is missing; send all of motor1, motor2, motor3, motor4"),
-    ("motor_states", spoilt(name=[]), "name 'motor1' is missing"),
     ("motor_states", spoilt(name=NAMES[::-1], effort=[NAN, 0, 0, 0]), "effort of motor4 is nan"),
-    ("motor_states", spoilt(position=[NAN] * 4), "position of motor1 is nan"),
-    ("motor_states", spoilt(velocity=[1.0]), "velocity has 1 values; send 4"),
     *(
         ("force_command", wrench(force=(0.0, bad, 0.0)), f"{bad}.* N.*; send finite numbers")
         for bad in (NAN, INF, -INF)
@@ -207,13 +201,9 @@ REFUSED = [
     *(("force_command", wrench(frame), f"frame_id is '{frame}'; allowed: base, ") for frame in ("", "Base", "/base")),
     ("contact/point", point(0.1, "hand"), "frame_id is 'hand'; allowed: base, "),
     ("contact/point", point(INF), r"position is .*inf.* m; send finite numbers, or NaN where it is not known"),
-    ("contact/point", point(1e200), "no arm reaches that, send at most"),
     ("sim/objects", table(fields=[]), f"fields are none; send little-endian float64 fields {TASK.columns[0]}, "),
-    ("sim/objects", table(is_bigendian=True), "send little-endian float64 fields"),
     ("sim/objects", table(width=3), "bytes of data; 3 rows need "),
-    ("sim/objects", table(point_step=8), "bytes of data"),
     ("sim/objects", table(data=numbers(0.0, INF)), f"{TASK.columns[1]} is inf; send a finite number"),
-    ("sim/objects", table(data=numbers(0.0, 1e200)), "no arm reaches that, send at most"),
     ("sim/objects", table(header=header(STAMP, "hand")), "frame_id is 'hand'; allowed: base"),
 ]
 
@@ -223,10 +213,6 @@ def test_a_message_that_is_not_whole_is_refused_whole(topic: str, message: Any, 
     for arrays in ("effort", "position? effort velocity?"):
         with pytest.raises(Refused, match=text):
             decoded(topic, message, arrays)
-
-
-def test_a_position_may_be_unknown() -> None:
-    assert math.isnan(decoded("contact/point", point(NAN)).position[0])
 
 
 @pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 40])
@@ -250,11 +236,8 @@ def trajectory_of(points: int, **fields: Any) -> bytes:
 
 LARGE = [
     ("task_command", table_of("task_command", 5), "5 rows; send at most 4"),
-    ("task_command", table_of("task_command", 100_000), "send at most 262144"),
-    ("contact/hypotheses", table_of("contact/hypotheses", 257), "257 rows; send at most 256"),
     ("joint_trajectory", trajectory_of(501), "501 points; send 1 to 500"),
     ("joint_trajectory", trajectory_of(2, velocities=[NAN] * 4), "point 0: velocity of joint1 is nan"),
-    ("joint_trajectory", trajectory_of(100_000), "send at most 262144"),
     ("joint_states", bytes(serialize_message(JointState(name=["joint1"] * 100_000))), "send at most 262144"),
     ("force_command", bytes(serialize_message(WrenchStamped(header=Header(frame_id="x" * 300_000)))), "262144"),
     ("status", bytes(serialize_message(DiagnosticStatus(values=[KeyValue()] * 2000))), "send at most 16384"),

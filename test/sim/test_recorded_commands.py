@@ -11,7 +11,7 @@ from recordings import NAMESPACE, forces, joints, said, status
 from wam_analysis.findings.analysis import Analysis, analyse_bag
 from wam_bag.bag import Bag, BagError, TableColumns
 from wam_description.configuration import SHARED, Configuration, packaged
-from wam_sim.recorded_commands import COMMANDS, RefusedCommands
+from wam_sim.recorded_commands import COMMANDS
 from wam_sim.recording import RecordedRun, recorded_run
 
 SECONDS = 4.0
@@ -110,10 +110,6 @@ def test_without_states_or_parameters_every_command_is_taken() -> None:
     bag = bag_of(force_command=forces(STREAMED + WALL, FORCE, "outer"))
     topics = {name: columns for name, columns in bag.topics.items() if "states" not in name}
     assert recorded_run(bag._replace(topics=topics, attachments={})).refused == ()
-
-
-def test_one_message_is_named_as_one() -> None:
-    assert RefusedCommands("force_command", 1, "it").sentence.startswith("1 message of")
 
 
 # several runs

@@ -203,10 +203,7 @@ def test_the_options_of_a_study_are_those_of_the_harness_and_its_fields(
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ("--cases 0", "argument --cases: '0' is not allowed; give a whole number of at least 1"),
         ("--only -3", "argument --only: '-3' is not allowed"),
-        ("--seeds -1", "argument --seeds: '-1' is not allowed"),
-        ("--write no/page.md", "is no directory; give another file"),
         ("--set timing.mode=realtime", "--set timing.mode has no effect in runs without ROS"),
         ("--set force_loop:contact_source=pinned", "has no effect here: each case sets it"),
     ],

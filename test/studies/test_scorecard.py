@@ -8,7 +8,7 @@ import pytest
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
-from wam_studies.scorecard import measures, report, table
+from wam_studies.scorecard import measures, table
 from wam_theory.requisites import Measures, Requisite, scorecard
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
@@ -187,8 +187,3 @@ def test_bandwidth_is_the_lowest_eigenvalue_of_any_joint(arm: Measures) -> None:
     rotor_alone = math.sqrt(arm.transmission_stiffness[1] / arm.rotor_inertia[1]) / (2.0 * math.pi)
     share = row(scorecard(arm), "over its asymptote")
     assert share.value == pytest.approx(min(lowest) / rotor_alone, rel=1e-6)
-
-
-def test_another_arm_is_refused() -> None:
-    with pytest.raises(ValueError, match="arm 'testbed' has other joints or links"):
-        report(Configuration.load(packaged("testbed")))

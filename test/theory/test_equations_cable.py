@@ -69,14 +69,3 @@ def test_eccentric_pulley_makes_an_amplitude_of_one_inch_pound() -> None:
     """(6.23): 0.010 in under 50 lb; the 2 in lb of the text are from peak to peak."""
     torque = cable.eccentric_ripple(0.010 * INCH, 50 * LB, np.linspace(0.0, 2 * np.pi, 5)) / IN_LB
     np.testing.assert_allclose(torque, [0.0, 1.0, 0.0, -1.0, 0.0], atol=1e-12)
-
-
-def test_reducer_beyond_the_end_of_the_line_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"^distance is 2\.5 m; it must not be above length, 2\.0 m"):
-        cable.stiffness_with_reducer(1000, 2.0, 14, 2.5)
-
-
-@pytest.mark.parametrize("bad", [[-0.1], [0.5, 1.0], [float("nan")]])
-def test_loss_that_is_no_share_is_refused(bad: list[float]) -> None:
-    with pytest.raises(ValueError, match=r"losses are .*; each must be at least 0 and below 1"):
-        cable.efficiency(bad)

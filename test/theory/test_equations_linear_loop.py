@@ -7,7 +7,6 @@ import pytest
 
 from wam_theory import linear_loop
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
-from wam_theory.thresholds import SearchThresholds
 from wam_theory.zero_order_hold import zero_order_hold
 
 
@@ -60,36 +59,6 @@ def test_routh_gain_puts_two_roots_of_5_14_on_the_axis(proportional: float) -> N
         roots = np.roots([j, b, ktr + kc + proportional * ktr * kc, factor * gain * ktr * kc])
         assert bool(roots.real.max() < 0.0) is stable
         assert linear_loop.gain_ratio(factor * gain, j, b, ktr, kc, proportional) == pytest.approx(factor)
-
-
-@pytest.mark.parametrize("delay", [0, 50])
-@pytest.mark.parametrize("zeta", [1e-3, 1.0, 30.0])
-def test_sampled_margin_tends_to_the_continuous_one_at_every_rate(zeta: float, delay: int) -> None:
-    j, ktr, kc = 0.1, 1000.0, 1000.0
-    w = math.sqrt((ktr + kc) / j)
-    b = 2.0 * zeta * j * w
-    routh = float(linear_loop.routh_gain(j, b, ktr, kc))
-    margins = []
-    for rate in np.geomspace(10.0, 1e12, 45) * w:
-        lag = w * (delay + 0.5) / rate
-        if (1.0 + 2.0 * zeta) * lag < 0.1:
-            margins.append(linear_loop.sampled_margin(j, b, ktr, kc, 1.0 / rate, delay).gain)
-            assert margins[-1] == pytest.approx(routh, rel=(1.0 + 2.0 * zeta) * lag + 1e-12)
-    assert len(margins) > 30
-
-
-@pytest.mark.parametrize("delay", [0, 3])
-@pytest.mark.parametrize("zeta", [0.01, 1.0, 30.0])
-def test_sampled_margin_has_no_step_where_the_fast_form_begins(
-    zeta: float, delay: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    values = (1.0, 2.0 * zeta, 0.3, 0.7, 2e-3, delay)
-    monkeypatch.setattr(linear_loop, "SEARCH", SearchThresholds(fast=1.0))
-    fast = linear_loop.sampled_margin(*values)
-    monkeypatch.setattr(linear_loop, "SEARCH", SearchThresholds(fast=0.0))
-    sampled = linear_loop.sampled_margin(*values)
-    assert fast.gain == pytest.approx(sampled.gain, rel=1e-5)
-    assert fast.frequency == pytest.approx(sampled.frequency, rel=1e-6)
 
 
 @pytest.mark.parametrize("delay", [0, 5, 24, 40, 80])

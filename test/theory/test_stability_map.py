@@ -54,25 +54,3 @@ def test_boundary_ends_in_point_b() -> None:
         below = largest_stable_steps(gamma_3(zeta) * (1.0 - 1e-9), zeta, ratio)
         np.testing.assert_allclose(below, 1.0 / point_b(zeta, ratio, 1.0), rtol=CLOSE)
         assert not largest_stable_steps(gamma_3(zeta) * (1.0 + 1e-9), zeta, ratio).any()
-
-
-def test_the_map_takes_any_shape_and_each_point_stands_for_itself() -> None:
-    gamma, zeta, stiction = np.linspace(0.9, 2.2, 7)[:, None, None], np.array([0.1, 0.4]), np.array([[1.0], [1.3]])
-    whole = largest_stable_steps(gamma, zeta, 1.0, stiction)
-    assert whole.shape == (7, 2, 2)
-    assert whole[3, 1, 0] == largest_stable_steps(gamma[3, 0, 0], 0.1, 1.0, 1.3)
-
-
-@pytest.mark.parametrize(
-    ("values", "names"),
-    [
-        ((-1.0, 0.3), "gamma is -1.0"),
-        ((1.2, [0.3, math.nan]), "zeta is"),
-        ((1.2, 0.3, 0.0), "stiffness_ratio is 0.0"),
-        ((1.2, 0.3, 1.0, 0.9), "stiction is 0.9"),
-        ((1.2, 0.3, 1.0, 1.0, math.inf), "rtol is inf"),
-    ],
-)
-def test_a_refusal_names_the_value(values: tuple[float, ...], names: str) -> None:
-    with pytest.raises(ValueError, match=names):
-        largest_stable_steps(*values)
