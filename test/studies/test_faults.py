@@ -1,5 +1,6 @@
 """The evaluation of faults: broken inputs are broken as described, and what escapes is noticed."""
 
+import dataclasses
 import math
 import os
 import subprocess
@@ -15,10 +16,11 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
 from wam_ros.messages import joint_state
 from wam_studies.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken
+from wam_studies.faults.messages import play_flood
 from wam_studies.faults.parameter_sets import UNKNOWN_CODES, parameter_set
 from wam_studies.faults.soak import SoakStudy
 from wam_studies.faults.study import KINDS, FaultStudy, run_fault
-from wam_studies.faults.trials import KEPT, FaultCase, FaultTrial
+from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -171,6 +173,19 @@ def test_a_node_that_ends_is_an_escape_and_the_next_trial_has_all_nodes(
     assert "a node ended: ZeroDivisionError" in ended.escapes[0]
     assert watched_trial(case, "nothing", lambda stack: 1).escapes == ()
     KEPT.discard()
+
+
+@pytest.mark.parametrize(("allowed", "text"), [(FAULTS.stopped, ""), (0.0, "no answer to an emergency stop within")])
+def test_an_emergency_stop_that_is_answered_late_in_a_flood_is_an_escape(
+    allowed: float, text: str, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    monkeypatch.setattr("wam_studies.faults.messages.FAULTS", dataclasses.replace(FAULTS, stopped=allowed))
+    flooded = play_flood(FaultCase(in_lockstep(), "floods", 1, 0))
+    KEPT.discard()
+    assert flooded.delay > 0.0
+    assert bool(flooded.escapes) is bool(text)
+    assert text in "".join(flooded.escapes)
 
 
 @pytest.mark.slow

@@ -102,10 +102,20 @@ def _numbers(values: tuple[float, ...]) -> Change:
 
 def _length(leaf: MessageLeaf, chance: Random) -> Any:
     """An array of another length."""
+    return _resized(leaf, chance.choice([n for n in BROKEN.lengths if n != len(leaf.value)]))
+
+
+def _resized(leaf: MessageLeaf, length: int) -> Any:
     old = list(leaf.value)
-    length = chance.choice([n for n in BROKEN.lengths if n != len(old)])
     filler = old[:1] or (["joint1"] if "string" in leaf.kind else [0] if "int" in leaf.kind else [0.3])
     return (old + filler * length)[:length]
+
+
+def enlarge(message: Message) -> None:
+    """Make every array of a message as long as one can be here."""
+    for leaf in leaves(message):
+        if leaf.is_sequence:
+            leaf.put(_resized(leaf, max(BROKEN.lengths)))
 
 
 def _text(leaf: MessageLeaf, chance: Random) -> Any:

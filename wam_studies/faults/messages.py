@@ -1,4 +1,4 @@
-"""Broken messages on every topic that a node takes, from the topic's own publisher and from a second one; false ones.
+"""Broken messages on every topic that a node takes, from its own publisher and from a second one; false ones; floods.
 
 A second publisher of another type cannot be tried here: the middleware allows one type for a name in a process.
 """
@@ -9,17 +9,19 @@ from typing import Final, NamedTuple
 
 from rclpy.serialization import serialize_message
 
+from wam_description.wiring import Call
 from wam_studies.faults.message_faults import (
     EFFECTIVE,
     MESSAGE_FAULTS,
     SECOND,
     MessageFault,
     broken,
+    enlarge,
     made_effective,
     set_stamp,
 )
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
-from wam_studies.faults.watched_stack import WatchedStack, watched_trial
+from wam_studies.faults.watched_stack import WatchedStack, watched_trial, worked
 
 PUSH: Final = "sim/disturbance"
 GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != PUSH)  # a second publisher is a fault
@@ -103,3 +105,40 @@ def _stream(topic: str, stack: WatchedStack) -> int:
     finally:
         stack.node.destroy_publisher(publisher)
     return 1
+
+
+def play_flood(case: FaultCase) -> FaultTrial:
+    """A trial with many messages in each period, half of the trials with long arrays; topics in turn."""
+    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    topic, is_large = topics[case.number % len(topics)], case.number // len(topics) % 2 == 1
+    return watched_trial(case, f"{topic}, {'large ' * is_large}flood", partial(_flood, topic, is_large))
+
+
+def _flood(topic: str, is_large: bool, stack: WatchedStack) -> int:
+    """Ask for an emergency stop in a flood; the brakes must be on and the answer there soon, in the arm's time."""
+    own = stack.own_publisher(topic, Random(topic))
+    publisher = own or stack.foreign_publisher(topic)
+    client, request = stack.service(Call("driver", "estop"))
+    stack.allowed_motion = FAULTS.held_motion
+    sent, before, begin, future = 0, 0, stack.stamp(), None
+    end = worked() + FAULTS.patience
+    while (future is None or not future.done()) and worked() < end:
+        if (now := stack.stamp()) != before:
+            before, message = now, stack.newest(topic)
+            if is_large:
+                enlarge(message)
+            set_stamp(message, now)
+            data = serialize_message(message)
+            for _ in range(FAULTS.flood):
+                stack.inject(publisher, data)
+            sent += FAULTS.flood
+        if future is None and now - begin >= FAULTS.flooded * SECOND:
+            future, begin = client.call_async(request), now
+        stack.spin_once()
+    stack.delay = (stack.stamp() - begin) / SECOND
+    if future is None or not future.done() or stack.delay > FAULTS.stopped:
+        stack.escapes.append(f"no answer to an emergency stop within {1e3 * stack.delay:.0f} ms")
+    if not own:
+        stack.node.destroy_publisher(publisher)
+    stack.run(FAULTS.after)
+    return sent

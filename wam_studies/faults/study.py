@@ -36,6 +36,8 @@ class FaultKind(NamedTuple):
 KINDS: Final = {
     "messages": FaultKind("messages", 960, 2, messages.play, LOCKSTEP),
     "messages-realtime": FaultKind("messages", 960, 1, messages.play, REALTIME),
+    "floods": FaultKind("messages", 80, 1, messages.play_flood, LOCKSTEP),
+    "floods-realtime": FaultKind("messages", 80, 1, messages.play_flood, REALTIME),
     "parameters": FaultKind("sets", 2000, 5, parameter_sets.play, LOCKSTEP),
     "losses": FaultKind("losses", 108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
     "losses-realtime": FaultKind("losses", 108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
@@ -91,7 +93,7 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
             Row(f"escapes, {name}", exact(sum(bool(one.escapes) for one in own), len(own)), required=NONE_AT_ALL)
             for name, own in by_kind.items()
         ]
-        head = ("kind", "tried", "largest motion [rad]", "largest force [N]", "zero current after [ms]")
+        head = ("kind", "tried", "largest motion [rad]", "largest force [N]", "zero current or answer after [ms]")
         worst = [
             [
                 name,

@@ -29,6 +29,9 @@ class FaultLimits:
     messages: int = 20  # of one trial
     between: float = 0.001  # s of the arm's time between two of them
     after: float = 0.03  # s of the arm's time after the last
+    flood: int = 10  # messages in each period, which is 10 kHz
+    flooded: float = 0.03  # s of the arm's time before the emergency stop
+    stopped: float = 0.02  # s of the arm's time, from the request to the answer of an emergency stop
     streamed: float = 0.15  # s of the arm's time with two publishers
     after_publishers: float = 0.05  # s of the arm's time that is watched afterwards
 
@@ -80,7 +83,7 @@ class FaultTrial(NamedTuple):
     escapes : what went wrong.
     motion : rad, largest motion of a joint that nobody had commanded.
     force : N, largest true force on the world.
-    delay : s of the arm's time from the loss to zero current, NaN where it does not apply.
+    delay : s of the arm's time from a loss to zero current, or to the answer of an emergency stop; NaN for neither.
     """
 
     kind: str

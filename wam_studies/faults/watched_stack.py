@@ -55,6 +55,7 @@ class WatchedStack(StackClient):
     interface : of the nodes.
     escapes : what has gone wrong since `begin`.
     motion, force : largest of a joint, rad, and on the world, N, since `begin`.
+    delay : s of the arm's time until an emergency stop was answered, NaN where none was requested.
     allowed_motion, allowed_force : above which they are an escape.
     """
 
@@ -64,6 +65,7 @@ class WatchedStack(StackClient):
     escapes: list[str]
     motion: float
     force: float
+    delay: float
     allowed_motion: float
     allowed_force: float
 
@@ -200,6 +202,7 @@ class WatchedStack(StackClient):
         self._anchor = self._held = list(self.driver.plant.q)
         self.escapes = []
         self.motion = self.force = 0.0
+        self.delay = math.nan
         self.allowed_force, self.allowed_motion = FAULTS.force, FAULTS.motion
 
     def begin(self) -> str:
@@ -306,4 +309,4 @@ def watched_trial(case: FaultCase, name: str, work: Callable[[WatchedStack], int
     if reason:
         KEPT.discard()
         escapes.append(reason)
-    return FaultTrial(case.kind, name, size, tuple(escapes), stack.motion, stack.force)
+    return FaultTrial(case.kind, name, size, tuple(escapes), stack.motion, stack.force, stack.delay)
