@@ -12,10 +12,12 @@ from arms import BODY, CONFIGURATION, WAM
 
 from wam_control.force.axes import CommandedAxis, TaskAxes
 from wam_control.force.belief import Errors, WorldTorques, belief, predicted, tolerance, yielding
+from wam_control.force.command_run import Shaking
 from wam_control.force.contact_place import ForcePlace
-from wam_control.force.force_axis import ForceAxes, PressedForce
+from wam_control.force.force_axis import ForceAxes, Phasors, PressedForce
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, joint_axes
+from wam_description.transmission_map import TransmissionMap
 
 OWN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 PLAIN = replace(OWN, sensing=replace(OWN.sensing, torque_fraction=0.0))
@@ -138,3 +140,29 @@ def test_a_stiff_surface_yields_as_the_cables_do() -> None:
     stiff = replace(PLAIN, guard=replace(PLAIN.guard, contact_stiffness=1e12))
     assert yielding(sensed, stiff) == pytest.approx(sensed.compliance)
     assert yielding(sensed, PLAIN) == pytest.approx(sensed.compliance + 1.0 / 4000.0)
+
+
+@pytest.mark.parametrize("q", POSES)
+@pytest.mark.parametrize("stiffness", [400.0, 2e4, 6e4, 3e5])
+def test_what_shakes_the_free_arm_shakes_it_on_a_surface(q: tuple[float, ...], stiffness: float) -> None:
+    """Links on the cables, and motors on their velocity loops, as one system of both."""
+    shared, dt, frequency = CONFIGURATION.shared, 0.005, 2.0 * math.pi * 25.0
+    at_joints = TransmissionMap.of(WAM).at_joints
+    cables, servo = at_joints([circuit.stiffness for circuit in WAM.circuits]), shared.servo
+    loops = at_joints(servo.integral_gain) + 1j * frequency * at_joints(servo.proportional_gain)
+    motors = loops - frequency**2 * at_joints(WAM.motors.inertia)
+    links = np.array(-(frequency**2) * FORCES.inertia(q), complex)
+    axis = axis_at(q)
+    push = np.concatenate([np.zeros(4), [0.1, 0.2j, -0.3, 0.1]])  # N m, of the dither
+
+    def motion(surface: float) -> Phasors:
+        touched = links + cables + surface * np.outer(axis.along, axis.along)
+        return np.linalg.solve(np.block([[touched, -cables], [-cables, motors + cables]]), push)
+
+    free, shaking = motion(0.0), Shaking(replace(shared.timing, dither_cycle=40))
+    for k in range(50):
+        swing = np.real(free[4:] * np.exp(1j * frequency * k * dt))
+        shaking.is_watching((np.array(q) + swing + 1e-3 * k * dt).tolist(), FORCES, servo, dt)
+    pressed = motion(stiffness)
+    own = replace(OWN, guard=replace(OWN.guard, contact_stiffness=stiffness))
+    assert shaking.swing(axis, own) == pytest.approx(2.0 * stiffness * abs(axis.along @ pressed[:4]), rel=1e-3)

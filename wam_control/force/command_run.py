@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from wam_control.force.advice import Advice
 from wam_control.force.axes import CommandedAxis
-from wam_control.force.belief import Belief, WorldTorques, belief, yielding
+from wam_control.force.belief import Belief, WorldTorques, belief
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
-from wam_control.force.force_axis import ForceAxes
+from wam_control.force.force_axis import ForceAxes, Phasors
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
@@ -20,7 +20,7 @@ from wam_control.force.held_arm import HeldArm
 from wam_control.force.limits import is_too_slow
 from wam_control.force.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.force.thresholds import FORCE
-from wam_description.arm import Arm, Covers, Timing
+from wam_description.arm import Arm, Covers, Servo, Timing
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,10 @@ class AxisRun:
 class Shaking:
     """How a dithered arm vibrates before it moves along a force, and the force swing that follows from it.
 
+    What shakes the free arm also shakes it on a surface of stiffness k.  With the vibration x of the free links and
+    their receptance G, the swing of the force along a lever l is the sum of 2 |l.x| / |1/k + l.G l| over the harmonics
+    of the dither that friction makes.
+
     Parameters
     ----------
     timing : of the loops and the dither.
@@ -70,29 +74,42 @@ class Shaking:
 
     def __init__(self, timing: Timing) -> None:
         self._cycle, self._poses = timing.dither_cycle * timing.period, list[Array]()
+        self._free: list[tuple[Phasors, Phasors]] | None = None
 
-    def is_watching(self, q: Sequence[float], dt: float) -> bool:
+    def is_watching(self, q: Sequence[float], forces: ForceAxes, servo: Servo, dt: float) -> bool:
         """Take a pose (n,), rad, unless there are enough; whether one was taken."""
-        if not self._cycle or len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
+        if not self._cycle or self._free is not None:
             return False
         self._poses.append(np.array(q))
+        if len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
+            frequency = 2.0 * math.pi / self._cycle
+            motions = harmonics(np.array(self._poses), frequency * dt)
+            self._free = [forces.vibration(q, one, (i + 1) * frequency, servo) for i, one in enumerate(motions)]
         return True
 
     def swing(self, axis: CommandedAxis, own: ForceLoopParameters) -> float:
         """Swing of the force on the stiffest surface, N peak to peak."""
-        sensed = axis.sensed
-        if len(self._poses) < 2 or sensed is None or sensed.force_sd == math.inf:
+        if not self._free or axis.sensed is None or axis.sensed.force_sd == math.inf:
             return 0.0
-        way = np.array(self._poses) @ axis.along
-        way = way - np.linspace(way[0], way[-1], len(way))
-        motion = float(way.max() - way.min())
-        if not motion:
-            return 0.0
-        # the arm against its inertia, and against the surface; in resonance `resonance` times the lesser of the two
-        blocked = sensed.impact_mass * (2.0 * math.pi / self._cycle) ** 2 * motion
-        pressed = motion / yielding(sensed, own)
-        least = FORCE.resonance * min(blocked, pressed)
-        return 1.0 / math.hypot(1.0 / blocked - 1.0 / pressed, 1.0 / least)
+        lever, yielding = axis.along, 1.0 / own.guard.contact_stiffness
+        return math.fsum(
+            2.0 * abs(lever @ x) / abs(yielding + lever @ receptance @ lever) for x, receptance in self._free
+        )
+
+
+def harmonics(values: Array, turn: float) -> list[Phasors]:
+    """Complex amplitudes (n,) of values (m, n) that also drift, of each harmonic that one row in each period shows.
+
+    Parameters
+    ----------
+    values : one row in each period.
+    turn : of the first harmonic in a period, rad.
+    """
+    steps = np.arange(float(len(values)))
+    waves = [np.exp(1j * order * turn * steps) for order in range(1, math.ceil(math.pi / turn - FORCE.rounding))]
+    shapes = np.column_stack([np.ones_like(steps), steps, *(part for one in waves for part in (one.real, -one.imag))])
+    parts = np.linalg.lstsq(shapes, values)[0][2:]
+    return [real + 1j * imaginary for real, imaginary in zip(parts[::2], parts[1::2], strict=True)]
 
 
 class Resting:

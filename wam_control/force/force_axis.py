@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.force.thresholds import FORCE
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Servo
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
 from wam_description.small_matrices import inverse
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
+Phasors = NDArray[np.complex128]
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 
 
@@ -143,10 +144,10 @@ class ForceAxes:
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: SensingParameters) -> None:
         self._body, self.covers, self._parameters = body, arm.covers, parameters
-        through = TransmissionMap.of(arm)
+        self._map = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)
-        self._rotors = through.at_joints(arm.motors.inertia)
-        self._compliance = np.linalg.inv(through.at_joints([circuit.stiffness for circuit in arm.circuits]))
+        self._rotors = self._map.at_joints(arm.motors.inertia)
+        self._compliance = np.linalg.inv(self._map.at_joints([circuit.stiffness for circuit in arm.circuits]))
 
     def inertia(self, q: Sequence[float]) -> Array:
         """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
@@ -155,6 +156,26 @@ class ForceAxes:
     def moved_inertia(self, q: Sequence[float]) -> Array:
         """The same with rotors: what hits a surface."""
         return self.inertia(q) + self._rotors
+
+    def vibration(self, q: Sequence[float], motion: Phasors, frequency: float, servo: Servo) -> tuple[Phasors, Phasors]:
+        """Vibration of the free links (n,), rad, and their receptance, motion per torque on them (n, n), rad/(N m).
+
+        The links swing on the cables, and the motors on their velocity loops.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        motion : complex amplitude of the motors' vibration at the joints (n,), rad.
+        frequency : of it, rad/s.
+        servo : gains of the velocity loops.
+        """
+        links, square = self.inertia(q), frequency * frequency
+        damping, stiffness = (self._map.at_joints(gain) for gain in (servo.proportional_gain, servo.integral_gain))
+        motors = stiffness + 1j * frequency * damping - square * self._rotors
+        free = np.linalg.solve(np.eye(len(q)) - square * self._compliance @ links, motion)
+        through = np.linalg.inv(self._compliance + np.linalg.inv(motors))
+        receptance = np.linalg.inv(through - square * links)
+        return np.asarray(free, np.complex128), np.asarray(receptance, np.complex128)
 
     def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
         """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""

@@ -362,7 +362,7 @@ class ForceLoop:
         )
         rows, least = list[VelocityRow](), list[VelocityRow]()
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
-        is_watching = is_watched and run.shaking.is_watching(self._q, dt)
+        is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._supervision.servo, dt)
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         if holds:

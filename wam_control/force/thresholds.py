@@ -49,8 +49,6 @@ class ForceThresholds:
     slow_joint: float = 0.002  # rad/s, the same of a joint
     # shaking by a dither
     watched_time: float = 0.2  # s, for which it is watched before the arm moves, or a whole cycle
-    # largest swing on a surface, per swing without resonance: the dry friction of shafts takes nearly all of a dither
-    resonance: float = 2.0
     # events
     hysteresis: float = 1.25  # of the doubt, above which an arm that has not touched yet holds again
     quarter: float = 0.25  # of the settling time, in which a force that has been reached may be off
