@@ -2,68 +2,29 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.held_messages import rows_before_gaps
-from wam_analysis.task_forces import TaskForce
+from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import HOLD
 from wam_analysis.traces import Traces
-from wam_bag.arrays import Numbers
-from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, of_force_loop, within
+from wam_sim.reactions import RecordedReaction, of_force_loop, within
 from wam_sim.recording import RecordedRun, RecordedStep
-
-
-class Hold(NamedTuple):
-    """A constant commanded force.
-
-    Attributes
-    ----------
-    name : of the scenario's step, or the force.
-    begin, end : ns.
-    frame : of the force.
-    force : (3,), N, of the arm on the world, in that frame.
-    commanded : its magnitude, N.
-    disturbed : whether the scenario pushed the arm meanwhile.
-    cover : on which a task commands it, '' where none does.
-    axis : of a task with several forces, from 0; -1 where it is the only force.
-    reactions : what the force loop did meanwhile instead of what was commanded.
-    """
-
-    name: str
-    begin: int
-    end: int
-    frame: str
-    force: Numbers
-    commanded: float
-    disturbed: bool
-    cover: str = ""
-    axis: int = -1
-    reactions: tuple[RecordedReaction, ...] = ()
-
-    @property
-    def is_short(self) -> bool:
-        """Whether the force was commanded too briefly for a steady state."""
-        return self.end - self.begin < STEADY * 1e9
-
-    @property
-    def is_refused(self) -> bool:
-        """Whether the force was not controlled in the end: there is nothing to measure of it."""
-        return any(one.holds and one.end >= self.end - BRIEF for one in self.reactions)
 
 
 def holds_of(
     run: RecordedRun,
     steps: Sequence[RecordedStep],
-    tasks: Sequence[TaskForce],
+    tasks: Sequence[Hold],
     traces: Traces,
     reactions: Sequence[RecordedReaction],
 ) -> tuple[Hold, ...]:
     """Intervals with one commanded force, in the order of time."""
     holds: list[Hold] = []
     found = (*_forces(run, steps), *_forces_of_tasks(steps, tasks))
-    for hold in sorted(found, key=lambda one: (one.begin, one.axis)):
+    long = [one for one in found if one.commanded > HOLD.equal_force and one.end - one.begin >= HOLD.shortest * 1e9]
+    for hold in sorted(long, key=lambda one: (one.begin, one.axis)):
         name = next((step.name for step in steps if step.begin <= (hold.begin + hold.end) // 2 < step.end), "")
         taken = [hold.name for hold in holds]
         name = (name or f"{hold.commanded:.3g} N") + f", axis {hold.axis + 1}" * (hold.axis >= 0)
@@ -88,21 +49,13 @@ def _forces(run: RecordedRun, steps: Sequence[RecordedStep]) -> Iterator[Hold]:
     period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
     for a, b in itertools.pairwise(bounds):
         begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
-        yield from _held(begin, end, str(frames[a]), commands.force[a])
+        yield Hold(begin, end, str(frames[a]), commands.force[a])
 
 
-def _forces_of_tasks(steps: Sequence[RecordedStep], tasks: Sequence[TaskForce]) -> Iterator[Hold]:
+def _forces_of_tasks(steps: Sequence[RecordedStep], tasks: Sequence[Hold]) -> Iterator[Hold]:
     """Those of tasks, without names."""
     starts = [step.begin for step in steps]
     for task in tasks:
         bounds = [task.begin, *(at for at in starts if task.begin < at < task.end), task.end]
         for begin, end in itertools.pairwise(bounds):
-            for hold in _held(begin, end, task.frame, task.force):
-                yield hold._replace(cover=task.cover, axis=-1 if task.is_only else task.number)
-
-
-def _held(begin: int, end: int, frame: str, force: Numbers) -> Iterator[Hold]:
-    """The hold of a force between two times, ns, unless that is part of a ramp or there is no force."""
-    commanded = float(np.linalg.norm(force))
-    if commanded > HOLD.equal_force and end - begin >= HOLD.shortest * 1e9:
-        yield Hold("", begin, end, frame, force, commanded, False)
+            yield task._replace(begin=begin, end=end)

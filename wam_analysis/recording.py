@@ -10,9 +10,9 @@ from wam_analysis.findings.held_force import HeldForce, Theory, held_force, theo
 from wam_analysis.findings.transmission import TransmissionFindings, transmission_findings
 from wam_analysis.foreign.sources import Source, alternates, command_of, sources
 from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
-from wam_analysis.holds import Hold, holds_of
+from wam_analysis.holds import holds_of
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
-from wam_analysis.task_forces import RecordedTask, TaskForce, task_forces, tasks_of
+from wam_analysis.task_forces import Hold, RecordedTask, task_forces, tasks_of
 from wam_analysis.traces import Traces, traces_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.arrays import Mask
@@ -173,7 +173,7 @@ class AnalysedRecording:
         return tasks_of(self.run, self.parameters.arm)
 
     @property
-    def task_forces(self) -> list[TaskForce]:
+    def task_forces(self) -> list[Hold]:
         """The forces at points of links in all tasks, in the order of time."""
         return task_forces(self.tasks)
 

@@ -12,35 +12,55 @@ from wam_control.force.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import Table
+from wam_sim.reactions import BRIEF, STEADY, RecordedReaction
 from wam_sim.recording import RecordedRun
 from wam_sim.replay import tables
 
 RecordedTask = tuple[TaskCommand, int, int]  # with begin and end, ns
 
 
-class TaskForce(NamedTuple):
-    """A force of a task.
+class Hold(NamedTuple):
+    """A constant commanded force.
 
     Attributes
     ----------
     begin, end : ns.
-    number : of its axis, from 0.
-    is_only : whether it is the only force of the task.
-    cover : on which it acts.
-    frame : of the task, 'base' or a cover.
-    force : of the arm on the world in that frame (3,), N.
+    frame : of the force, 'base' or a cover.
+    force : (3,), N, of the arm on the world, in that frame.
+    cover : on which a task commands it, '' where none does.
+    axis : of a task with several forces, from 0; -1 where it is the only force.
+    name : of the scenario's step, or the force.
+    disturbed : whether the scenario pushed the arm meanwhile.
+    reactions : what the force loop did meanwhile instead of what was commanded.
     """
 
     begin: int
     end: int
-    number: int
-    is_only: bool
-    cover: str
     frame: str
     force: Numbers
+    cover: str = ""
+    axis: int = -1
+    name: str = ""
+    disturbed: bool = False
+    reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def commanded(self) -> float:
+        """Magnitude of the force, N."""
+        return float(np.linalg.norm(self.force))
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the force was commanded too briefly for a steady state."""
+        return self.end - self.begin < STEADY * 1e9
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the force was not controlled in the end: there is nothing to measure of it."""
+        return any(one.holds and one.end >= self.end - BRIEF for one in self.reactions)
 
 
-def task_forces(tasks: Iterable[RecordedTask]) -> list[TaskForce]:
+def task_forces(tasks: Iterable[RecordedTask]) -> list[Hold]:
     """The forces at points of links in some tasks, in the order of time."""
     return [force for task, begin, end in tasks for force in _of(task, begin, end)]
 
@@ -71,14 +91,13 @@ def _task(table: Table, arm: Arm) -> TaskCommand | None:
         return None
 
 
-def _of(task: TaskCommand, begin: int, end: int) -> list[TaskForce]:
+def _of(task: TaskCommand, begin: int, end: int) -> list[Hold]:
     forces = [
         (i, axis) for i, axis in enumerate(task.axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value
     ]
     return [
-        TaskForce(begin, end, i, len(forces) == 1, axis.cover, task.frame, np.array(axis.direction) * axis.value)
+        Hold(begin, end, task.frame, np.array(axis.direction) * axis.value, axis.cover, i if len(forces) > 1 else -1)
         for i, axis in forces
-        if axis.value
     ]
 
 

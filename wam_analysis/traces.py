@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.held_messages import held_rows, joint_angles, with_holes
-from wam_analysis.task_forces import TaskForce
+from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import TOUCH
 from wam_bag.arrays import Mask, Names, Numbers, Times
 from wam_description.arm import Arm
@@ -151,7 +151,7 @@ class Traces(NamedTuple):
         return reaction._replace(remark=remark)
 
 
-def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[TaskForce] = ()) -> Traces:
+def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[Hold] = ()) -> Traces:
     """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
 
     That is the estimated one, which has a message in every outer period; a program need not command a force in all.
@@ -187,7 +187,7 @@ def traces_of(run: RecordedRun, arm: Arm | None, tasks: Sequence[TaskForce] = ()
     estimated = signal("contact/wrench", _points(run, "contact/point") or _points_of_hypotheses(run))
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:
-        rows = (base >= task.begin) & (base < task.end) & task.is_only
+        rows = (base >= task.begin) & (base < task.end) & (task.axis < 0)
         frames, forces = commanded.frame.astype(object), commanded.force.copy()
         frames[rows], forces[rows], covers[rows] = task.frame, task.force, task.cover
         commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)

@@ -232,7 +232,7 @@ def test_bags_are_read_without_the_rest_of_the_project(tmp_path: Path) -> None:
     shutil.copytree(Path(wam_bag.__file__).parent, tmp_path / "alone" / "wam_bag")
     program = (
         "import sys; from wam_bag import bag, bag_writer, losses, repair; "
-        "assert len(bag.read(sys.argv[1]).topics) == 6; repair.repair(contents.Path(sys.argv[1])); "
+        "assert len(bag.read(sys.argv[1]).topics) == 6; repair.repair(repair.Path(sys.argv[1])); "
         "print(*sorted({name.split('.')[0] for name in sys.modules if name.startswith(('wam_', 'rclpy'))}))"
     )
     done = subprocess.run(

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding
-from wam_analysis.holds import Hold
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.swings import Swings, swings
+from wam_analysis.task_forces import Hold
 from wam_analysis.thresholds import CYCLE, HOLD, SHAFT
 from wam_bag.arrays import Numbers
 from wam_bag.bag import JointColumns
