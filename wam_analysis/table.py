@@ -34,11 +34,6 @@ def plain(
     ]
 
 
-def bounded(number: str, is_lower_bound: bool) -> str:
-    """A number as text, marked where it is only the least one that is possible."""
-    return ">=" * is_lower_bound + number
-
-
 def markdown(head: Cells, rows: Iterable[Cells]) -> str:
     """A table of Markdown, with the line end of its last row."""
     lines = [head, ["---"] * len(head), *rows]

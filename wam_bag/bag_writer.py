@@ -363,15 +363,11 @@ def release(path: Path) -> None:
 def _make(path: Path) -> None:
     try:
         path.mkdir(parents=True)
-    except FileExistsError:
-        if path.parent.is_dir():
+    except OSError as error:
+        if path.exists():
             raise RecordingError(
                 f"bag {path} exists already; nothing was written. Give another name or move it away"
             ) from None
-        raise RecordingError(f"{path.parent} is a file; give a directory for bag {path.name}") from None
-    except NotADirectoryError:
-        raise RecordingError(f"a parent of bag {path} is a file; give another directory") from None
-    except OSError as error:
         raise RecordingError(
             f"bag {path} cannot be created: {error.strerror}; give a directory that can be written"
         ) from None

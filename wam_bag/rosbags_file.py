@@ -43,12 +43,12 @@ class RosbagsFile(BagFile):
         # where the bag defines no types
         reader = self._stack.enter_context(rosbags.AnyReader([self.path], default_typestore=store))
         self._reader, encoding = reader, CDR if reader.is2 else ROS1
-        for number, one in enumerate(reader.connections):
+        for one in reader.connections:
             is_known = one.msgtype in reader.typestore.fielddefs
             text = reader.typestore.generate_msgdef(one.msgtype, ros_version=1 + reader.is2)[0] if is_known else ""
-            self.schemas[number] = Schema(number, text.encode(), SCHEMAS[encoding] if is_known else "", one.msgtype)
-            self.channels[number] = Channel(number, one.topic, encoding, {}, number)
-        counts = {number: one.msgcount for number, one in enumerate(reader.connections)}
+            self.schemas[one.id] = Schema(one.id, text.encode(), SCHEMAS[encoding] if is_known else "", one.msgtype)
+            self.channels[one.id] = Channel(one.id, one.topic, encoding, {}, one.id)
+        counts = {one.id: one.msgcount for one in reader.connections}
         first, last = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
         self.counts = MessageCounts(first, last, counts)
 
@@ -59,10 +59,9 @@ class RosbagsFile(BagFile):
         self.loaded = MessageCounts(0, 0, {})
         reader, size = self._reader, 0
         found: list[tuple[int, int, bytes]] = []
-        every = {id(one): number for number, one in enumerate(reader.connections)}
-        wanted = [one for one in reader.connections if channels is None or every[id(one)] in channels]
+        wanted = [one for one in reader.connections if channels is None or one.id in channels]
         for one, time, data in reader.messages(wanted) if wanted else ():
-            found.append((every[id(one)], time, data))
+            found.append((one.id, time, data))
             size += len(data)
             if size >= BATCH:
                 yield self._taken(packed(found))

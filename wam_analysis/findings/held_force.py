@@ -66,11 +66,6 @@ class HeldForce(NamedTuple):
 
 def held_force(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
     """Evaluate a hold; of a force that was not controlled its signals are all there is."""
-    held = _held(run, traces, parameters, hold)
-    return HeldForce(*held[:5], cover=held.cover, position=held.position) if hold.is_refused else held
-
-
-def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, hold: Hold) -> HeldForce:
     time, measured = _measured(run, hold)
     rows = traces.during(hold.begin, hold.end) & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
@@ -78,22 +73,20 @@ def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, ho
     duration = (hold.end - hold.begin) / 1e9
     late, late_true = time >= (1.0 - HOLD.steady) * duration, time_true >= (1.0 - HOLD.steady) * duration
     estimated_accuracy = _accuracy(hold, estimated[late_true])
+    cover, position = _touched(traces, parameters, hold)
     if not np.any(np.isfinite(true)):
         time_true, true, late_true = np.empty(0), np.empty(0), np.empty(0, bool)
+    held = HeldForce(hold, time, measured, time_true, true, cover=cover, position=position)
+    if hold.is_refused:
+        return held
     swings, swings_true = time >= (1.0 - CYCLE.late_part) * duration, time_true >= (1.0 - CYCLE.late_part) * duration
-    cover, position = _touched(traces, parameters, hold)
     touched = _touch_down(traces, parameters, hold)
     response = _response(hold, time, measured, HOLD.steady * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     timing = parameters.timing
     dither = timing.dither_cycle * timing.period if timing is not None else 0.0
-    return HeldForce(
-        hold=hold,
-        time=time,
-        measured=measured,
-        time_true=time_true,
-        true=true,
+    return held._replace(
         response=response,
         touched=touched,
         before=_before(traces, hold, measured),
@@ -103,8 +96,6 @@ def _held(run: RecordedRun, traces: Traces, parameters: PredictionParameters, ho
         cycle=_cycle(time_true[swings_true], true[swings_true], dither)
         or _cycle(time[swings], measured[swings], dither)
         or NO_CYCLE,
-        cover=cover,
-        position=position,
         swinging=swinging(run, hold, time, measured) if len(measured) else swinging(run, hold, time_true, true),
     )
 

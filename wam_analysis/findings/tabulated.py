@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, shown
-from wam_analysis.table import bounded
 
 MARK = " !"  # after a number more than three standard errors from its prediction
 LEGEND = "! more than three standard errors from its prediction"
@@ -73,4 +72,4 @@ def _table(findings: list[Finding]) -> Tabulated:
 
 def _measured(one: Finding) -> str:
     error = f" +- {shown(one.error)}" if np.isfinite(one.error) and np.isfinite(one.measured) else ""
-    return bounded(shown(one.measured), one.is_lower_bound) + error + MARK * one.deviates
+    return ">=" * one.is_lower_bound + shown(one.measured) + error + MARK * one.deviates

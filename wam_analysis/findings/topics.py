@@ -63,7 +63,7 @@ def _unusual(name: str, columns: Columns, given: TopicMap) -> Iterator[str]:
         values = np.abs(getattr(columns, quantity, np.empty(0)))
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
         if largest > most and quantity not in given.units:
-            taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity])}, if read in the unit of ROS"
+            taken = f"{quantity} reaches {shown(largest, QUANTITIES[quantity][0])}, if read in the unit of ROS"
             yield f"{name}: {taken}; if it is in {other}, give --unit {quantity}={other}."
 
 

@@ -118,8 +118,8 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
     if "," in path:
-        seconds, parts = (np.array(_integers(topic, columns, field), np.int64) for field in path.split(",", 1))
-        return BILLION * seconds + parts
+        seconds, parts = (np.vstack(_numbers(topic, columns, field))[:, 0] for field in path.split(",", 1))
+        return BILLION * seconds.astype(np.int64) + parts.astype(np.int64)
     stamps = [_at(topic, message, path) for message in columns.messages]
     for whole, rest in PARTS_OF_TIME:
         if hasattr(stamps[0], whole):
@@ -132,10 +132,6 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str], given: Topi
     except (TypeError, ValueError):
         raise ValueError(f"{topic}: the field '{path}' has no times") from None
     return nanoseconds(f"{topic}: the field '{path}'", numbers, given, columns.log_time_ns)
-
-
-def _integers(topic: str, columns: Messages, path: str) -> list[int]:
-    return [int(row[0]) for row in _numbers(topic, columns, path)]
 
 
 def _frames(columns: Messages) -> Texts:

@@ -4,16 +4,9 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-QUANTITIES = {
-    "position": "rad",
-    "velocity": "rad/s",
-    "effort": "N m",
-    "force": "N",
-    "torque": "N m",
-    "stamp": "s",
-}  # unit of ROS
-SHOWN = {q: (unit,) for q, unit in QUANTITIES.items()} | {
-    "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"),
+QUANTITIES = {  # units that are shown, that of ROS first
+    "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"), "force": ("N",),
+    "torque": ("N m",), "stamp": ("s",),
 }  # fmt: skip
 MAPPED = (*QUANTITIES, "name")
 UNITS = {  # as given: factor, unit that is shown
@@ -48,7 +41,7 @@ class TopicMap(NamedTuple):
 
     def scaled(self, quantity: str) -> tuple[float, str]:
         """Factor and shown unit of a quantity."""
-        return self.units.get(quantity, (1.0, QUANTITIES[quantity]))
+        return self.units.get(quantity, (1.0, QUANTITIES[quantity][0]))
 
     @property
     def is_given(self) -> bool:
@@ -97,8 +90,8 @@ def _values(option: str, what: str, allowed: Collection[str], texts: Sequence[st
 def unit_of(quantity: str, text: str) -> tuple[float, str]:
     """Factor and shown unit of a unit, or of a factor, as it is written; raises ValueError with what is allowed."""
     if text in UNITS:
-        if UNITS[text][1] not in SHOWN[quantity]:
-            fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in SHOWN[quantity])
+        if UNITS[text][1] not in QUANTITIES[quantity]:
+            fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in QUANTITIES[quantity])
             raise ValueError(f"--unit {quantity}: '{text}' is no unit of {quantity}; it may be a factor or {fitting}")
         return UNITS[text]
     try:
@@ -107,4 +100,4 @@ def unit_of(quantity: str, text: str) -> tuple[float, str]:
         factor = 0.0
     if factor == 0.0 or not math.isfinite(factor):
         raise ValueError(f"--unit {quantity}: '{text}' is neither a number nor one of {', '.join(UNITS)}")
-    return factor, QUANTITIES[quantity]
+    return factor, QUANTITIES[quantity][0]
