@@ -41,12 +41,6 @@ def with_holes(stamps: Times) -> Times:
     return np.sort(np.concatenate([stamps, last + held_for(stamps) + 1])) if len(last) else stamps
 
 
-def at_stamps(columns: JointColumns, stamps: Times) -> tuple[Mask, Index]:
-    """Whether there is a message with each of some stamps, and its row; columns must be sorted by stamp."""
-    row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
-    return columns.stamp_ns[row] == stamps, row
-
-
 def by_names(columns: JointColumns | None, field: str, names: tuple[str, ...]) -> Numbers | None:
     """Columns of a field in the order of some names, (k, n); None without columns, or if a name is missing."""
     values: Numbers = getattr(columns, field, np.empty((0, 0)))

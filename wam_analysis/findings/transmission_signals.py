@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.held_messages import at_stamps, by_names
+from wam_analysis.held_messages import by_names
 from wam_analysis.measures.runs import after_gaps
 from wam_analysis.thresholds import SHAFT
 from wam_bag.arrays import Mask, Numbers, Times
@@ -17,7 +17,6 @@ CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"
 GRAVITY = "gravity alone, while nothing touches"
 TOUCHES = ("contact/wrench", "sim/disturbance")  # the second is of a simulated arm
-SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
 
 
 class TransmissionSignals(NamedTuple):
@@ -60,17 +59,17 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
     stamps = motors.stamp_ns
     cable = _of(run, "sim/joint_states", "effort", joints, stamps)
     strain = _of(run, "joint_sensors", "effort", joints, stamps)
-    speed = _of(run, "joint_sensors", "velocity", joints, stamps)
+    speed, _ = _of(run, "joint_sensors", "velocity", joints, stamps)
     if not np.any(np.isfinite(speed)):
-        speed = _of(run, "sim/joint_states", "velocity", joints, stamps)
+        speed, _ = _of(run, "sim/joint_states", "velocity", joints, stamps)
     gravity = _of(run, "gravity_effort", "effort", joints, stamps)
-    at_joints, load_from = next(
+    at_joints, sampled, load_from = next(
         (
-            (values, name)
-            for values, name in ((cable, CABLE), (strain, STRAIN), (gravity, GRAVITY))
-            if np.any(np.isfinite(values)) and (name != CABLE or _period(run) <= SHAFT.slowest_period)
+            (*one, name)
+            for one, name in ((cable, CABLE), (strain, STRAIN), (gravity, GRAVITY))
+            if np.any(np.isfinite(one[0])) and (name != CABLE or _period(run) <= SHAFT.slowest_period)
         ),
-        (cable, ""),
+        (*cable, ""),
     )
     if not load_from:
         return None
@@ -91,10 +90,10 @@ def transmission_signals(run: RecordedRun, arm: Arm) -> TransmissionSignals | No
         load=at_joints[rows] @ matrix,
         load_from=load_from,
         use=use,
-        sampled=_recorded_at(run, SOURCES[load_from], stamps[rows]),
+        sampled=sampled[rows],
         joint_velocity=speed[rows],
-        cable_torque=cable[rows],
-        strain=strain[rows],
+        cable_torque=cable[0][rows],
+        strain=strain[0][rows],
         caveats=caveats,
     )
 
@@ -146,20 +145,19 @@ def _period(run: RecordedRun) -> float:
     return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
 
 
-def _recorded_at(run: RecordedRun, topic: str, stamps: Times) -> Mask:
-    columns = run.joints(topic)
-    return np.zeros(len(stamps), dtype=np.bool_) if columns is None else at_stamps(columns, stamps)[0]
+def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: Times) -> tuple[Numbers, Mask]:
+    """A field of another topic at some stamps, (k, n), interpolated, and where it was recorded, (k,).
 
-
-def _of(run: RecordedRun, topic: str, field: str, names: tuple[str, ...], stamps: Times) -> Numbers:
-    """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages and in their gaps."""
-    result = np.full((len(stamps), len(names)), np.nan)
+    It is NaN outside of the messages and in their gaps.
+    """
+    result, recorded = np.full((len(stamps), len(names)), np.nan), np.zeros(len(stamps), np.bool_)
     columns = run.joints(topic)
     values = by_names(columns, field, names)
     if columns is not None and values is not None and len(columns.stamp_ns) > 1:
         inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])
         row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
-        inside &= ~after_gaps(columns.stamp_ns)[row] | (stamps == columns.stamp_ns[row])
+        recorded = stamps == columns.stamp_ns[row]
+        inside &= ~after_gaps(columns.stamp_ns)[row] | recorded
         for i in range(len(names)):
             result[inside, i] = np.interp(stamps[inside], columns.stamp_ns, values[:, i])
-    return result
+    return result, recorded
