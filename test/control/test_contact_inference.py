@@ -230,17 +230,6 @@ def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force:
     assert odds == pytest.approx(inner - outer, abs=1.2)  # friction has one size on the whole link
 
 
-def test_probabilities_add_up_to_1_and_the_best_comes_first() -> None:
-    rng = np.random.default_rng(10)
-    for scale in (1e-6, 1.0, 100.0):
-        for _ in range(50):
-            q = tuple(rng.uniform(WAM.joints.lower, WAM.joints.upper))
-            found = INFERENCE.infer(q, rng.normal(0.0, scale, 4).tolist(), W)
-            probabilities = [hypothesis.probability for hypothesis in found]
-            assert sum(probabilities) == pytest.approx(1.0)
-            assert probabilities == sorted(probabilities, reverse=True)
-
-
 def test_two_contacts_are_not_explained_by_one() -> None:
     tau = torques(POSE, "outer_link", (0.35, 0, 0), (0, 0, 8)) + torques(POSE, "inner_link", (0.5, 0, 0), (0, 15, 4))
     assert Reason.MORE in INFERENCE.infer(POSE, tau.tolist(), W)[0].reasons

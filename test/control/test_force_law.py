@@ -1,6 +1,5 @@
 """The law of an axis beside the exact integrator's, and what protects a user of the force loop."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -102,15 +101,6 @@ def test_the_saturation_holds_along_every_direction() -> None:
         out = ask(force_loop(ARM, OWN), World(400.0), (90.0 * unit).tolist())
         assert out.limited == pytest.approx(20.0 * unit)
         assert lever(POSE, unit) @ out.velocity == pytest.approx(GAIN * 20.0, rel=1e-6)
-
-
-def test_different_limits_of_the_axes_are_those_of_an_ellipsoid() -> None:
-    along = law(error_limit=(1.0, 2.0, 3.0), deadband=(0.5, 0.5, 0.0), gain=(1.0, 2.0, 3.0))
-    half = math.sqrt(0.5)
-    assert along.along((half, half, 0.0)).error_limit[0] == pytest.approx(1.0 / math.sqrt(0.5 + 0.5 / 4.0))
-    assert along.along((half, half, 0.0)).deadband[0] == pytest.approx(0.5)
-    assert along.along((half, half, 0.0)).gain[0] == pytest.approx(1.5)
-    assert along.along((0.0, -1.0, 0.0)) == replace(along.along((0.0, 1.0, 0.0)), error_limit=(2.0,), gain=(2.0,))
 
 
 def test_a_force_that_turns_or_flips_is_measured_with_the_right_sign_at_once() -> None:

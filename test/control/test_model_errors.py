@@ -155,17 +155,6 @@ def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_r
     assert tracked.size == 1.0
 
 
-def test_noise_below_what_is_stated_counts_as_none() -> None:
-    """A mean of positive parts alone would find half of the stated variance in errors that are just as stated."""
-    tracked, random, found = errors(), np.random.default_rng(5), []
-    for k in range(2000):
-        tracked.follow(seen(random), QUIET, False, CONTACT.learn_interval)
-        if k > 300:
-            found.append(tracked.noise.copy())
-    stated = np.array([0.05 / 30.0, 0.05 / 20.0]) ** 2
-    assert np.all(np.mean(found, axis=0) < 0.2 * stated)
-
-
 def test_only_an_error_that_is_certainly_large_is_named() -> None:
     variance = np.full(3, SD**2)
     for certainty, named in ((1.0, []), (1e-4, ["b", "a"])):

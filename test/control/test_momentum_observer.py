@@ -200,17 +200,6 @@ def test_declared_uncertainty_covers_a_nominal_model_that_is_wrong(sensors: bool
     assert np.median(ratios) < 1.5
 
 
-def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
-    """cov(2, 3) = N2^2/2 (sd_2^2 - sd_3^2): a diagonal covariance would lose it."""
-    alone = dataclasses.replace(KNOWN, rest_uncertainty=1.0, shape_uncertainty=0.0)
-    observer = MomentumObserver(WAM, alone, use_joint_sensors=False)
-    state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0, 0.0, 9.0, 0.0], [0.1] * 4)
-    for _ in range(3):
-        observer.observe(state, DT)
-    expected = 30.4**2 / 2 * WAM.motors.static_friction[1] ** 2
-    assert observer.torques()[1][1, 2] == pytest.approx(expected)
-
-
 def test_lost_samples_are_bridged() -> None:
     plant, observer = RigidArm(WAM, POSE, friction=0.0), MomentumObserver(WAM, FREE, use_joint_sensors=True)
     swing(observer, plant, 0.3, sensors=True)

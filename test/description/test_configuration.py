@@ -68,14 +68,6 @@ def test_a_number_in_place_of_a_list_is_each_of_its_values() -> None:
     assert WAM.with_values({"force_loop:force_gain": "abc"}).sections["force_loop"]["force_gain"] == "abc"
 
 
-def test_text_of_a_changed_configuration_gives_the_same_values(file: Path, tmp_path: Path) -> None:
-    changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.5, 0.0, 1 / 3)})
-    (tmp_path / "again.yaml").write_text(changed.text)
-    again = Configuration.load(tmp_path / "again.yaml")
-    assert again.sections == changed.sections
-    assert again.shared == changed.shared
-
-
 def test_sections_cannot_be_written(file: Path) -> None:
     with pytest.raises(TypeError):
         Configuration.load(file).sections["loop"]["gain"] = 1.0  # type: ignore[index]

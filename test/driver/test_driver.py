@@ -79,13 +79,6 @@ def test_starts_braked_and_does_not_sag() -> None:
     np.testing.assert_allclose(hardware.plant.q, START, atol=1e-9)
 
 
-def test_brakes_released_without_currents_let_the_arm_fall() -> None:
-    hardware = enabled(watchdog=1e9)
-    for _ in range(200):
-        hardware.advance(0.0)
-    assert max(abs(hardware.plant.q - START)) > 0.01
-
-
 def test_commands_are_ignored_while_braked_and_in_a_fault() -> None:
     hardware = driver()
     assert answered(hardware, 5.0) == [0.0] * 4

@@ -101,12 +101,6 @@ def test_a_study_that_was_stopped_goes_on_from_its_file(tmp_path: Path) -> None:
     assert run_cases == [(1, 0), (1, 1), (1, 2), (1, 3), (2, 0), (2, 1), (2, 2), (2, 3)]
 
 
-def test_the_code_is_that_of_the_configuration_too() -> None:
-    other = SquareStudy(CONFIGURATION.with_values({"force_loop:force_gain": [0.01]}))
-    with ThreadPoolExecutor(1) as executor:
-        assert evaluate(other, {1: [(1, 0)]}, executor).code != measured().code
-
-
 def test_a_missed_value_and_each_failed_case_with_its_command_are_printed() -> None:
     found = measured(count=4)
     assert found.scores.missed == ["largest: 9 m, required 5"]
