@@ -170,13 +170,14 @@ def parts(
             numbers = frozenset(n for n, channel in file.channels.items() if is_selected(channel.topic, topics))
     for buffer, found in file.batches(numbers, *times):
         by_topic: dict[str, list[int]] = {}
-        for number in np.unique(found.channels).tolist():
+        for number in np.flatnonzero(np.bincount(found.channels)).tolist():
             if number not in file.channels:
                 raise Damage(f"a message is on channel {number}, which is not defined")
             by_topic.setdefault(file.channels[number].topic, []).append(number)
         for topic, members in by_topic.items():
             if is_selected(topic, topics):
-                yield TopicPart(file.channels[members[0]], buffer, found.of(np.isin(found.channels, members)))
+                is_own = np.logical_or.reduce([found.channels == number for number in members])
+                yield TopicPart(file.channels[members[0]], buffer, found.of(np.flatnonzero(is_own)))
     if file.counts is None or begin > 0 or end < NEVER:
         return
     for number, channel in file.channels.items():

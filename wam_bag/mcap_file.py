@@ -135,10 +135,10 @@ class BagFile:
     def _taken(self, batch: MessageBatch) -> MessageBatch:
         """The batch, whose messages are counted."""
         before, times = self.loaded, batch.found.times
-        numbers, messages = (each.tolist() for each in np.unique(batch.found.channels, return_counts=True))
-        if numbers:
+        messages = dict(enumerate(np.bincount(batch.found.channels).tolist()))
+        if messages:
             first = min([int(times.min()), *([before.first] if before.by_channel else [])])
-            counts = Counter(before.by_channel) + Counter(dict(zip(numbers, messages, strict=True)))
+            counts = Counter(before.by_channel) + Counter(messages)
             self.loaded = MessageCounts(first, max(before.last, int(times.max())), counts)
         return batch
 

@@ -7,7 +7,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from wam_bag.arrays import Bytes, Mask, Rows, Times
+from wam_bag.arrays import Bytes, Index, Mask, Rows, Times
 from wam_bag.errors import Damage
 from wam_bag.mcap_records import FIRST_PRIVATE, HEAD, MESSAGE, walk
 
@@ -38,7 +38,7 @@ class Found(NamedTuple):
     sizes: Rows
     times: Times
 
-    def of(self, rows: Mask) -> "Found":
+    def of(self, rows: Mask | Index) -> "Found":
         """Some of them."""
         return Found(*(column[rows] for column in self))
 
