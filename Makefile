@@ -116,15 +116,15 @@ ROS_EXTRAS := bus,compile,completion,kit,live,ros
 TEST_EXTRAS := $(ROS_EXTRAS),test
 DOCS_EXTRAS := $(TEST_EXTRAS),docs
 
-# The C++ libraries that come with pin: 200 MB of headers, which nothing here compiles against, and each library in
-# two or three copies, because a wheel has no links.
+# The C++ libraries that come with pin: 200 MB of what others compile against, and each library in two or three copies,
+# because a wheel has no links.
 CXX := $(VENV)/lib/python3*/site-packages/cmeel.prefix
 
 define INSTALL_WITH
 @rm -f $(STAMPS)/installed-*
 @$(TIDY)
 @$(PIP) install -q --no-compile --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
-@rm -rf $(CXX)/include; ! command -v hardlink >/dev/null || hardlink -q $(CXX)
+@rm -rf $(CXX)/include $(CXX)/bin $(CXX)/lib/cmake; ! command -v hardlink >/dev/null || hardlink -q $(CXX)
 @$(TIDY)
 @touch $@
 endef
