@@ -176,7 +176,7 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
-    lines = (_line("Wrong", wrong, "nothing was found."), _line("Shows", shows, "nothing that can be evaluated."))
+    lines = (_line("Wrong", wrong, "no defect was found."), _line("Shows", shows, "nothing that can be evaluated."))
     return Section("verdict", "Verdict", (what, *lines))
 
 

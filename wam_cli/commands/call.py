@@ -41,6 +41,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     ),
     "resume": ("resume the time of the simulated arm", (Call("driver", "pause", False),)),
 }
+STOPS: Final = ("disable", "estop")
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 EXAMPLE: Final = "force_loop:force_gain=0.01"
 NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
@@ -98,7 +99,10 @@ def run(given: argparse.Namespace) -> int:
         try:
             if given.request in others:
                 return others[given.request](given, stack)
-            return _stated(list(map(stack.request, SERVICES[given.request][1])))
+            code = _stated(list(map(stack.request, SERVICES[given.request][1])))
+            if code and given.request in STOPS:
+                print("The arm may still move: press its emergency stop button.", file=sys.stderr)
+            return code
         except Exception as error:
             failure = str(error)
             raise
@@ -189,7 +193,7 @@ def _echo(given: argparse.Namespace, stack: StackClient) -> int:
             is_reported = True
             row = BY_NAME.get(given.topic)
             seldom = ", which is published only when it changes" * bool(row and row.latched)
-            ends = "Ctrl-C ends this; --timeout S ends it after S seconds"
+            ends = "Ctrl-C ends this" + "; --timeout S ends it after S seconds" * (given.timeout is None)
             print(f"{waits}{seldom}{_hint(given.topic, stack)}; {ends}", file=sys.stderr, flush=True)
 
     try:

@@ -480,7 +480,9 @@ class ForceLoop:
     ) -> list[VelocityRow]:
         """What pushes harder than allowed."""
         own, torques = self.parameters, self._measurement.torques
-        pressed = math.fsum(axis.desired for axis in forces) if self._run.is_touching else 0.0
+        # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
+        has_touched = bool(contact.cover) or any(one.watch.touch.has_been for one in self._run.axes)
+        pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
         if not holds:
             allowed = own.limits.contact_force
             if pressed and len(forces) == len(axes):

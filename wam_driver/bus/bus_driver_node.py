@@ -77,7 +77,7 @@ class BusDriver(ArmDriver):
     def _take_advice(self) -> None:
         advice = self.hardware.advice
         if advice != self.unready:
-            self.get_logger().info(advice or "the arm may be enabled")
+            self.get_logger().info(advice or "the arm is ready; it may be enabled when all nodes are connected")
         self.unready, self.warnings = advice, (advice,) if advice else ()
 
     def _publish(self, due: int) -> None:
