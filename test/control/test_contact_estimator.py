@@ -1,6 +1,5 @@
 """The contact estimator on the plant with elastic cables and true stick; its model is not the plant's."""
 
-import copy
 import dataclasses
 import math
 from typing import NamedTuple
@@ -270,22 +269,6 @@ def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) 
     assert settled.link == "outer_link"
     assert np.linalg.norm(np.subtract(settled.force, (0, 4, 3))) < 2.0
     assert abs(settled.position - 0.28) < max(0.04, 2.5 * settled.position_sd)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("parameters", [MOTORS, SENSORS])
-def test_a_restarted_copy_of_an_estimator_knows_what_a_reset_keeps(parameters: ContactEstimatorParameters) -> None:
-    estimator = ContactEstimator(ARM, TIMING, parameters)
-    moving([estimator], Move(3, 1.5), 3.0, 1.05)
-    copied = copy.deepcopy(estimator)
-    copied.reset()
-    restarted, unlearned = estimator.restarted_copy(), ContactEstimator(ARM, TIMING, parameters)
-    expected, found, others = moving([copied, restarted, unlearned], Move(4, 1.0), 1.5, 1.05, push_at=900)
-    is_same = repr(found) == repr(expected)  # as text, in which NaN equals NaN
-    assert is_same
-    assert any(felt.estimate.in_contact for felt in found)
-    is_same = repr(others) == repr(expected)
-    assert is_same is (parameters is SENSORS), "from the motors it learns"
 
 
 def test_contact_is_released_below_the_lower_threshold_only() -> None:

@@ -11,7 +11,7 @@ from test_force_lasting import BODY, DIRECTION, OUTER, POSE, press
 
 from wam_control.task.scenario import ScenarioStep
 from wam_description.event import Code, Level
-from wam_description.signals import NodeStatus
+from wam_description.signals import ForceCommand, NodeStatus
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import RANGES, triple
@@ -92,3 +92,18 @@ def test_the_force_with_which_the_brakes_stop_the_arm_is_no_push() -> None:
     run = Simulation(CONFIGURATION, steps)
     assert not run.play()
     assert not run.reactions
+
+
+def test_a_force_along_what_the_arm_touches_does_not_press_it_ever_harder() -> None:
+    """The arm lies on the packaged box; 8 N across are no force of that contact, so the link slides and may climb."""
+    above, down = (0.0, -1.8, 0.0, 1.45), (0.0, -2.1, 0.0, 1.45)
+    steps = [
+        ScenarioStep("release", RANGES.release, request="enable"),
+        ScenarioStep("above", 1.5, posture=above),
+        ScenarioStep("lower", 3.0, posture=down, until_force=1.5),
+        ScenarioStep("press", 2.0, force=ForceCommand(OUTER, (0.0, 0.0, 8.0))),
+    ]
+    run, peak = Simulation(CONFIGURATION, steps), 0.0
+    while not run.step():
+        peak = max(peak, math.hypot(*run.driver.true_contact.force))
+    assert 1.5 < peak < 1.5 * 8.0

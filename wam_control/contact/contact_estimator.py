@@ -114,7 +114,7 @@ class ContactEstimator:
             f"parameter 'observer.time_constant' is {parameters.observer.time_constant:g} s; "
             f"it must be at least two periods, {2.0 * timing.period:g} s",
         )
-        self._parameters, self._made_of = parameters, (arm, timing, parameters, model)
+        self._parameters = parameters
         self._observer = MomentumObserver(
             arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle, model
         )
@@ -145,12 +145,6 @@ class ContactEstimator:
         self._fusion.reset()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
-
-    def restarted_copy(self) -> "ContactEstimator":
-        """Another one that has seen no sample, but knows what this one has learned and keeps at a `reset`."""
-        other = ContactEstimator(*self._made_of)
-        other._observer.learn(self._observer)
-        return other
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.

@@ -106,11 +106,6 @@ class ModelErrors:
         self._waiting.clear()
         self._since = self._contact = self._hold = 0.0
 
-    def learn(self, other: "ModelErrors") -> None:
-        """Take over what another one has learned."""
-        self.errors, self.covariance, self._pose = other.errors, other.covariance, other._pose
-        self.noise, self.size, self.beyond = other.noise, other.size, other.beyond
-
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
         effects = seen.effects

@@ -126,11 +126,6 @@ class MomentumObserver:
         """Joint angles of the last sample, (n,), rad."""
         return self._last.q
 
-    def learn(self, other: "MomentumObserver") -> None:
-        """Take over what another one of the same parameters has learned and keeps at a reset."""
-        self._errors.learn(other._errors)
-        self._side.learn(other._side)
-
     def observe(self, state: State, dt: float) -> bool:
         """Take one sample.
 

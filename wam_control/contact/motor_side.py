@@ -73,12 +73,6 @@ class MotorSide:
         self.joints.reset()
         self._velocity.reset()
 
-    def learn(self, other: "MotorSide") -> None:
-        """Take over what another one has learned."""
-        self._velocity.learn(other._velocity)
-        self.motors.learn(other.motors)
-        self.joints.learn(other.joints)
-
     @property
     def velocity_sd(self) -> list[float]:
         """Standard deviations of the motors' velocities, (n,), rad/s."""

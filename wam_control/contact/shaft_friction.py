@@ -73,10 +73,6 @@ class ShaftFriction:
         self._held = [0.0] * len(self.dynamic)
         self._travel = [0.0] * len(self.dynamic)
 
-    def learn(self, other: "ShaftFriction") -> None:
-        """Take over how certain the velocities are from another one."""
-        self._rest = list(other._rest)
-
     def expect(self, velocity_sd: Sequence[float]) -> None:
         """Take the standard deviations of the velocities, (n,), rad/s: a shaft slower than them may be at rest."""
         self._rest = [max(self._rest_velocity, CONTACT.rest_noise * sd) for sd in velocity_sd]

@@ -43,10 +43,6 @@ class VelocityFit:
         self._time, self._middle = 0.0, math.nan
         self._period = self._scale = self.delay = 0.0
 
-    def learn(self, other: "VelocityFit") -> None:
-        """Take over the error of the angles from another one."""
-        self._third, self._choice = list(other._third), other._choice
-
     @property
     def sd(self) -> list[float]:
         """Standard deviation of the velocity of each shaft, rad/s."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import compress
 from typing import Any, NamedTuple
 
@@ -196,30 +195,13 @@ def replay(configuration: Configuration, name: str, group: str, recording: Drive
     )
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
-    new = partial(ContactEstimator, shared.model_arm, shared.timing, own, shared.model)
-    estimator, moments = new(), list[EstimatedMoment]()
-    strong = [t for t in recording.touches if np.linalg.norm(t.force) >= EVALUATION.start_force]
-    singles = [touch for touch in strong if touch.kind in ("outer", "inner")]
-    trials: dict[Touch, tuple[ContactEstimator, ContactEstimator]] = {}
-    started: dict[Touch, tuple[bool, bool]] = {}
+    estimator, moments = ContactEstimator(shared.model_arm, shared.timing, own, shared.model), list[EstimatedMoment]()
     for i, state, dt in arriving(recording, period, seed):
-        time = i * period
         estimator.observe(state, None, dt)
-        for touch in singles:
-            begin = touch.begin + EVALUATION.start_after
-            if begin <= time < begin + EVALUATION.start_within:
-                if touch not in trials:
-                    trials[touch] = estimator.restarted_copy(), new()
-                for trial in trials[touch]:
-                    trial.observe(state, None, dt)
-                if i % outer == 0:
-                    warm, cold = (trial.estimate().in_contact for trial in trials[touch])
-                    before = started.get(touch, (False, False))
-                    started[touch] = before[0] or warm, before[1] or cold
         if i % outer == 0:
             is_moving = bool(recording.speed[i] > EVALUATION.moving)
-            moments.append(EstimatedMoment(time, estimator.estimate(), is_moving))
-    return _scored(recording, moments, shared.arm, name=name, group=group, started=tuple(started.values()))
+            moments.append(EstimatedMoment(i * period, estimator.estimate(), is_moving))
+    return _scored(recording, moments, shared.arm, name=name, group=group)
 
 
 def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: Arm, **more: Any) -> ContactScore:

@@ -43,9 +43,6 @@ class EvaluationLimits:
 
     # of a recording
     late: float = 0.45  # s after the start of a contact, until which it is detected
-    start_after: float = 0.1  # s, of an estimator that starts in contact
-    start_within: float = 0.3  # s
-    start_force: float = 9.0  # N
     setting_down: float = 0.5  # s after a mass is set down, in which the model is still that with it
     observer: float = 1.0  # s at the start, whose torques are the observer's own transient
 
@@ -250,7 +247,6 @@ class ContactScore(NamedTuple):
     warnings : share of the time without contact with a warning that the model is off.
     contact_seconds : time with a contact.
     masses : of each mass that was picked up.
-    started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
     failure : why the run ended early.
     """
 
@@ -265,7 +261,6 @@ class ContactScore(NamedTuple):
     warnings: float = 0.0
     contact_seconds: float = 0.0
     masses: tuple[MassOutcome, ...] = ()
-    started: tuple[tuple[bool, bool], ...] = ()
     failure: str = ""
 
 

@@ -259,9 +259,6 @@ def degraded_rows(drives: Scores) -> Iterator[Row]:
     yield percent("90 % set contains the truth, contacts of 0.2 to 10 s", held, *COVERED)
     wrong = sure_and_wrong([*both, *lasting])
     yield percent("sure of a wrong link, of the time in contact, every arm", wrong, (0.0, 0.005), (0.0, 0.002))
-    for k, (start, least, aim) in enumerate((("warm", 0.97, 0.99), ("cold", 0.85, 0.95))):
-        found = _started(identified, k)
-        yield percent(f"start in contact, {start}, {IDENTIFIED_MIX}", found, (least, 1.0), (aim, 1.0))
 
 
 def _identified_rows(links: str, found: Contacts) -> Iterator[Row]:
@@ -276,10 +273,6 @@ def _identified_rows(links: str, found: Contacts) -> Iterator[Row]:
 def _inner_in_time(scores: Scores) -> Interval:
     """Contacts of 10 N on the inner link that are detected in time or from before."""
     return detected_within(near(outcomes(scores, "inner"), 10.0), EVALUATION.inner_within, or_before=True)
-
-
-def _started(scores: Scores, which: int) -> Interval:
-    return share_of([pair[which] for score in scores for pair in score.started])
 
 
 def _worst(groups: Mapping[str, Scores], of: Callable[[Scores], Interval], allowed: Allowed) -> tuple[str, Interval]:
@@ -317,9 +310,8 @@ def _detection(groups: Mapping[str, Scores]) -> tuple[list[str], list[list[str]]
         value, _, _, verdict = alarms.cells
         ratio = max(torque_z([score]).value for score in own)
         warned = f"{100.0 * float(np.mean([score.warnings for score in own])):.0f}"
-        started = " / ".join(cell(_started(own, k)) for k in (0, 1))
-        rows.append([name, value, verdict, cell(_inner_in_time(own)), f"{ratio:.1f}", warned, started])
-    return [*head, "start in contact, warm / cold, %"], rows
+        rows.append([name, value, verdict, cell(_inner_in_time(own)), f"{ratio:.1f}", warned])
+    return head, rows
 
 
 def _position(name: str, own: Scores) -> list[str]:
