@@ -45,7 +45,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
             Finding("contact on the correct link", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding(
-                "size of the force error, median",
+                "force error (vector), median",
                 "N",
                 off,
                 note="norm of the error vector; without forces that are lower bounds",
@@ -96,7 +96,7 @@ def _numbers(name: str, contact: ListedContact, period: float) -> Iterator[Findi
     yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
     unknown = "not known: the force may be a lower bound" * (not one.is_placed)
-    yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
+    yield Finding(f"{name}: error of the force's magnitude", "N", contact.force_error, note=least or unknown)
     note = f"time until its detection, to within {1e3 * period:.0f} ms"
     yield Finding(f"{name}: latency", "ms", 1e3 * (contact.latency + period), note=note)
 
