@@ -53,7 +53,9 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
     answers = [f"{answer}." for answer in verdict(recording)]
-    return Section("steps", "Result of the steps; in brackets the worst step (of a force: error plus ripple)", answers, wrong=wrong)
+    return Section(
+        "steps", "Result of the steps; in brackets the worst step (of a force: error plus ripple)", answers, wrong=wrong
+    )
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:

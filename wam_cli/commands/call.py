@@ -41,7 +41,6 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     ),
     "resume": ("resume the time of the simulated arm", (Call("driver", "pause", False),)),
 }
-STOPS: Final = ("disable", "estop")
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 EXAMPLE: Final = "force_loop:force_gain=0.01"
 NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
@@ -100,7 +99,7 @@ def run(given: argparse.Namespace) -> int:
             if given.request in others:
                 return others[given.request](given, stack)
             code = _stated(list(map(stack.request, SERVICES[given.request][1])))
-            if code and given.request in STOPS:
+            if code and given.request in ("disable", "estop"):
                 print("The arm may still move: press its emergency stop button.", file=sys.stderr)
             return code
         except Exception as error:

@@ -481,7 +481,7 @@ class ForceLoop:
         """What pushes harder than allowed."""
         own, torques = self.parameters, self._measurement.torques
         # whatever is touched is loaded by the arm's own motion, also where that is not along the commanded force
-        has_touched = bool(contact.cover) or any(one.watch.touch.has_been for one in self._run.axes)
+        has_touched = contact.cover or any(one.watch.touch.has_been for one in self._run.axes)
         pressed = math.fsum(axis.desired for axis in forces) if has_touched else 0.0
         if not holds:
             allowed = own.limits.contact_force
