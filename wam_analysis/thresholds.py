@@ -48,6 +48,7 @@ class ShaftThresholds:
     # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
     apart: float = 0.1
     agree: float = 0.2  # by which a recorded velocity may differ from the rate of the position
+    way: float = 1.0  # s, in which they are compared: longer than a velocity is late, shorter than an encoder slips
     least_work: float = 1e-3  # J below which no efficiency is given
     release: int = 200_000_000  # ns after the brakes were released
     # s; with a longer period, cable torques do not show what a resonance does between samples

@@ -234,7 +234,17 @@ def contradictions() -> list[Case]:
         sent = [s._replace(fields=s.fields | {"velocity": factor * s.fields["velocity"]}) for s in sent]
         return Case(f"{factor:g}", write, sent, sine(0.7, 0.5), f"velocity is {factor:.3g} times the rate")
 
-    return [scaled(57.3, by_rosbags, 100.0), scaled(-1.0, sqlite, 200.0), scaled(0.105, ros1, 50.0)]
+    def slipping(kept: float, write: Any, rate: float) -> Case:
+        def slip(q: Any) -> Any:
+            """Of the motion in 3 of every 8 s only a part is counted."""
+            steps = np.diff(q, prepend=0.0)
+            return np.cumsum(np.where(np.arange(len(q)) / rate % 8.0 > 5.0, kept, 1.0) * steps)
+
+        sent = one("/joint_states", rate, 0.3, 0.7, slip)
+        return Case(f"{kept:g} is counted", write, sent, {}, "an encoder slips or stands still")
+
+    scales = [scaled(57.3, by_rosbags, 100.0), scaled(-1.0, sqlite, 200.0), scaled(0.105, ros1, 50.0)]
+    return [*scales, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0)]
 
 
 def formats() -> list[Case]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.stick_slip import rest_speed
-from wam_analysis.foreign.sources import Source, differentiated, pieces, rests
+from wam_analysis.foreign.sources import Piece, Source, differentiated, pieces, rests
 from wam_analysis.measures.friction import UNKNOWN, Friction, FrictionNumber, identify_friction
 from wam_analysis.recording import AnalysedRecording
 from wam_analysis.thresholds import SHAFT
@@ -26,15 +26,11 @@ def effort_section(recording: AnalysedRecording) -> Section:
     states = recording.states
     sentences, findings, doubts, brief, alone, wrong = [], [], [], [], [], []
     for one in states:
-        factor = velocity_factor(one)
-        if math.isfinite(factor):
-            wrong.append(
-                f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the "
-                "two has another unit or sign, so friction and inertia are not computed."
-            )
+        unlike = contradiction(one)
+        wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
         whole = friction(one) if one.is_joint else None
         if whole is None:
-            if not math.isfinite(factor) and {"effort"} < one.values.keys() and not rests(one):
+            if not unlike and {"effort"} < one.values.keys() and not rests(one):
                 doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
             continue
         found = whole.friction
@@ -77,18 +73,61 @@ def effort_section(recording: AnalysedRecording) -> Section:
     return Section("friction", "Friction", (assumed, *sentences, *doubts, *wrong), findings, (), brief, wrong)
 
 
-def velocity_factor(source: Source) -> float:
+def contradiction(source: Source) -> str:
+    """How the recorded velocity is not the rate of the position, '' where the two agree.
+
+    A joint whose encoder only flickers does not move.
+    """
+    if not {"position", "velocity"} <= source.values.keys() or rests(source):
+        return ""
+    some = pieces(source, "position", "velocity")
+    factor = _velocity_factor(some)
+    if math.isfinite(factor):
+        return (
+            f"the recorded velocity is {factor:.3g} times the rate of the position; one of the two has another unit or "
+            "sign"
+        )
+    unit = source.units["position"]
+    for piece in some:
+        if (lost := _lost_way(piece)) is not None:
+            begin, moved, by = lost
+            return (
+                f"within {SHAFT.way:g} s from {begin:.4g} s on the position moved by {shown(moved, unit)}, but by the "
+                f"recorded velocity by {shown(by, unit)}; an encoder slips or stands still, or one of the two is of "
+                "something else"
+            )
+    return ""
+
+
+def _lost_way(piece: Piece) -> tuple[float, float, float] | None:
+    """Where the position moves least as the velocity has it: when, by how much each; None where they agree.
+
+    A velocity that is late differs only as far as it changes meanwhile.
+    """
+    time, position, velocity = piece.time, piece.values["position"], piece.values["velocity"]
+    period = float(time[1] - time[0])
+    width = round(SHAFT.way / period)
+    if len(time) <= width:
+        return None
+    way, path = (
+        np.concatenate(([0.0], np.cumsum(0.5 * period * (v[1:] + v[:-1])))) for v in (velocity, np.abs(velocity))
+    )
+    moved, by, far, change = (x[width:] - x[:-width] for x in (position, way, path, velocity))
+    allowed = SHAFT.agree * far + SHAFT.longest_effort_lag * np.abs(change) + SHAFT.joint_rest * SHAFT.way
+    excess = np.abs(moved - by) - allowed - SHAFT.noisy * piece.noise["position"]
+    if np.sum(excess > 0.0) < width // 2:
+        return None
+    worst = int(np.argmax(excess))
+    return float(time[worst]), float(moved[worst]), float(by[worst])
+
+
+def _velocity_factor(some: Sequence[Piece]) -> float:
     """Recorded velocity over the rate of the position, where that moves; NaN where the two agree or it does not move.
 
-    It is 0 where the velocity is zero, and below zero where its sign is swapped.  A joint whose encoder only flickers
-    does not move.
+    It is 0 where the velocity is zero, and below zero where its sign is swapped.
     """
-    if not {"position", "velocity"} <= source.values.keys():
-        return math.nan
-    if rests(source):
-        return math.nan
     rates, speeds = [], []
-    for piece in pieces(source, "position", "velocity"):
+    for piece in some:
         rate, sd = differentiated(piece.time, piece.values["position"])
         moves = np.abs(rate) > max(SHAFT.joint_rest, SHAFT.noisy * sd)
         rates.append(rate[moves])
@@ -132,7 +171,7 @@ def friction(source: Source) -> FoundFriction | None:
     if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
         source, needed = loaded, ["velocity", "effort"]
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
-    if not some or math.isfinite(velocity_factor(source)):
+    if not some or contradiction(source):
         return None
     period = float(some[0].time[1] - some[0].time[0])
     window = max(SHAFT.window, SHAFT.window_samples * period)
