@@ -241,7 +241,7 @@ def contradictions() -> list[Case]:
             return np.cumsum(np.where(np.arange(len(q)) / rate % 8.0 > 5.0, kept, 1.0) * steps)
 
         sent = one("/joint_states", rate, 0.3, 0.7, slip)
-        return Case(f"{kept:g} is counted", write, sent, {}, "an encoder slips or stands still")
+        return Case(f"{kept:g} is counted", write, sent, {}, "an encoder slips or stops")
 
     scales = [scaled(57.3, by_rosbags, 100.0), scaled(-1.0, sqlite, 200.0), scaled(0.105, ros1, 50.0)]
     return [*scales, slipping(0.0, by_rosbags, 200.0), slipping(0.0, ros1, 50.0), slipping(0.7, sqlite, 125.0)]

@@ -93,7 +93,7 @@ def contradiction(source: Source) -> str:
             begin, moved, by = lost
             return (
                 f"within {SHAFT.way:g} s from {begin:.4g} s on the position moved by {shown(moved, unit)}, but by the "
-                f"recorded velocity by {shown(by, unit)}; an encoder slips or stands still, or one of the two is of "
+                f"recorded velocity by {shown(by, unit)}; an encoder slips or stops, or one of the two is of "
                 "something else"
             )
     return ""
