@@ -291,9 +291,9 @@ class Synchroniser:
         """Refuse what is ahead of the clock; before the first state there is none."""
         if 0 < self._last < stamp - limit_ns:
             raise OutOfTime(
-                f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state, {self._last} ns; "
-                "give a command the stamp of the state that it answers; if a node of the stack sent it, the "
-                "computer is busy, and this node is late"
+                f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state that this node "
+                f"has, {self._last} ns: the node is late, as the computer is busy; if you sent it, give it the stamp "
+                "of the state that it answers"
             )
 
     def _is_announced(self, stamp: int) -> bool:

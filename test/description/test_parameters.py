@@ -280,7 +280,7 @@ def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
     before = node.node.servo
     for given, reason in (
         ({"gain": 2.0, "servo.integral_gain": [200.0] * 4}, "integral gain is too large"),
-        ({"gain": 0.75, "servo.integral_gain": [3.0] * 4}, "the node failed while it set the parameters: ZeroDivisionError"),
+        ({"gain": 0.75, "servo.integral_gain": [3.0] * 4}, "failed while it set the parameters: ZeroDivisionError"),
     ):
         refused = change(ros, "velocity_loop", **given)
         assert not refused.successful
