@@ -124,7 +124,7 @@ define INSTALL_WITH
 @rm -f $(STAMPS)/installed-*
 @$(TIDY)
 @$(PIP) install -q --no-compile --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
-@rm -rf $(CXX)/include $(CXX)/bin $(CXX)/lib/cmake; ! command -v hardlink >/dev/null || hardlink -q $(CXX)
+@rm -rf $(CXX)/include $(CXX)/bin $(CXX)/lib/cmake; hardlink $(CXX) >/dev/null 2>&1 || true
 @$(TIDY)
 @touch $@
 endef
