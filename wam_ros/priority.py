@@ -58,10 +58,7 @@ class Priority:
         self._then, share = now, (now[1] - used) / (now[0] - then)
         if share <= PROCESS_LIMITS.share:
             return False
-        for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0)))
-        for_all_threads(
-            lambda thread: os.setpriority(os.PRIO_PROCESS, thread, max(0, os.getpriority(os.PRIO_PROCESS, thread)))
-        )
+        for_all_threads(_as_usual)
         _session_granted(0)
         self.granted = USUAL
         return True
