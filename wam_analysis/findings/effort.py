@@ -28,7 +28,7 @@ def effort_section(recording: AnalysedRecording) -> Section:
     for one in states:
         unlike = contradiction(one)
         wrong += [f"{one.label}: {unlike}, so friction and inertia are not computed."] * bool(unlike)
-        whole = friction(one) if one.is_joint else None
+        whole = friction(one) if one.is_joint and not unlike else None
         if whole is None:
             if not unlike and {"effort"} < one.values.keys() and not rests(one):
                 doubts.append(f"{one.label}: its effort determines neither a dry nor a viscous friction.")
@@ -160,7 +160,7 @@ class FoundFriction(NamedTuple):
 def friction(source: Source) -> FoundFriction | None:
     """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
 
-    Nor is there one where the recorded velocity is not the rate of the position.
+    The recorded velocity must be the rate of the position, see `contradiction`.
 
     The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, or a drag c v|v|, and
     may lag behind the motion, as where it is filtered, or the motion behind it.  What leaves less of the effort
@@ -171,7 +171,7 @@ def friction(source: Source) -> FoundFriction | None:
     if 2 * len(source.only(*needed).time) < len((loaded := source.only("velocity", "effort")).time):
         source, needed = loaded, ["velocity", "effort"]
     some = [piece for piece in pieces(source, *needed) if {"effort", "velocity"} <= piece.values.keys()]
-    if not some or contradiction(source):
+    if not some:
         return None
     period = float(some[0].time[1] - some[0].time[0])
     window = max(SHAFT.window, SHAFT.window_samples * period)
