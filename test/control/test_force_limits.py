@@ -13,6 +13,7 @@ from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_control.force.limits import (
     WorldPush,
     approach_speed,
+    certain_size,
     followed,
     joint_bounds,
     likeliest_link,
@@ -100,14 +101,14 @@ def test_a_push_is_never_stated_as_larger_than_the_force(cover: str) -> None:
         jacobian = BODY.point_jacobian(q, cover, (0.25, 0.0, 0.0))
         force = random.normal(size=3)
         force *= 50.0 / np.linalg.norm(force)
-        push = WorldPush.at(force @ jacobian, sd, jacobian)
+        push = WorldPush.at(force @ jacobian, certain_size(force @ jacobian, sd), jacobian)
         assert 0.0 <= push.least <= 50.0 * (1.0 + 1e-9)
-        assert WorldPush.at(0.02 * random.normal(size=4), 0.1 * np.ones(4), jacobian).least == 0.0, "noise is no push"
+        assert certain_size(0.02 * random.normal(size=4), 0.1 * np.ones(4)) == 0.0, "noise is no push"
 
 
 def test_an_arm_gives_way_to_what_is_above_the_allowed_force_and_does_not_move_against_it() -> None:
     jacobian = BODY.point_jacobian(POSES[0], OUTER, (0.28, 0.0, 0.0))
-    push = WorldPush.at(np.array([0.0, -40.0, 0.0, 60.0]) @ np.eye(4), np.zeros(4), jacobian)
+    push = WorldPush.at(np.array([0.0, -40.0, 0.0, 60.0]), math.hypot(40.0, 60.0), jacobian)
     for part, sense in ((0.5, 1.0), (1.0, 0.0), (2.0, -1.0)):
         row = push.row(part * push.least, 0.03, 1.5)
         assert row.along @ push.torques > 0.0, "along the torques of the world"

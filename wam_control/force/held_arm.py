@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wam_control.force.axes import CommandedAxis
 from wam_control.force.belief import WorldTorques
 from wam_control.force.force_loop_parameters import ForceLoopParameters
-from wam_control.force.limits import WorldPush, calm, likeliest_link
+from wam_control.force.limits import WorldPush, calm, certain_size, likeliest_link
 from wam_control.force.problem import VelocityRow
 from wam_control.force.thresholds import FORCE
 from wam_description.event import Code, Event, Value, warning
@@ -103,28 +103,45 @@ class PushedArm:
         own : parameters of the force loop.
         dt : s.
         """
-        tool = self._body.tool_pose(q).position
         self._since += dt
-        if self._since > own.limits.settling_time or self._from is None:
-            self._from = tool
-        rows: list[VelocityRow] = []
-        pushes = [WorldPush.at(torques.now, torques.sd, self._jacobian(q, axes, contact))]
-        if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
-            pushes.append(WorldPush.at(torques.now, torques.sd, likeliest_link(self._body, q, torques.now)))
-        hardest = max(pushes, key=lambda push: push.least)
+        is_new = self._since > own.limits.settling_time
+        pushes = self._pushes(q, axes, torques, contact, chi2)
+        hardest = max((push.least for push in pushes), default=0.0)
         # a commanded force that was allowed, and falls, is no push
         fade = dt / (FORCE.quarter * own.limits.settling_time + dt)
         allowed = max(allowed, self._allowed * (1.0 - fade))
         self._allowed = allowed if is_pressing else 0.0
-        if hardest.least > allowed:
+        if hardest > allowed:
             self._since = 0.0
-            values: dict[str, Value] = {"force": hardest.least, "allowed": allowed}
+            values: dict[str, Value] = {"force": hardest, "allowed": allowed}
             self.event = warning(Code.PUSHED, "pushed", **values)
         elif self._since > FORCE.lasting:
             self.event = None
-        if float(np.linalg.norm(tool - self._from)) <= own.limits.free_travel:
-            rows = [push.row(allowed, gain, own.joint_speed_limit) for push in pushes if push.least]
-        return rows
+        if not pushes:
+            return []
+        tool = self._body.tool_pose(q).position
+        if is_new or self._from is None:
+            self._from = tool
+        if float(np.linalg.norm(tool - self._from)) > own.limits.free_travel:
+            return []
+        return [push.row(allowed, gain, own.joint_speed_limit) for push in pushes]
+
+    def _pushes(
+        self,
+        q: Sequence[float],
+        axes: Sequence[CommandedAxis],
+        torques: WorldTorques,
+        contact: Contact,
+        chi2: float,
+    ) -> list[WorldPush]:
+        """What the torques of the world may be; nothing where they may be none."""
+        certain = certain_size(torques.now, torques.sd)
+        if not certain:
+            return []
+        jacobians = [self._jacobian(q, axes, contact)]
+        if chi2 > FORCE.unexplained:  # they may all be those of a push on the link that explains them best
+            jacobians.append(likeliest_link(self._body, q, torques.now))
+        return [WorldPush.at(torques.now, certain, jacobian) for jacobian in jacobians]
 
     def _jacobian(self, q: Sequence[float], axes: Sequence[CommandedAxis], contact: Contact) -> Array:
         """Of where the arm is pushed (3, n): at the one known force, at the estimated contact, or at the tool."""

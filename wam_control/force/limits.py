@@ -111,6 +111,11 @@ def resolution(sensed: ForceAxis, desired: float, own: ForceLoopParameters) -> f
     return min(FORCE.kept * own.limits.tolerance * abs(desired), FORCE.finest_motion / yielding(sensed, own))
 
 
+def certain_size(torques: Array, torque_sd: Array) -> float:
+    """Size of torques (n,), N m, less what is uncertain of it by their standard deviations (n,), N m."""
+    return max(math.sqrt(torques.dot(torques)) - FORCE.certain * math.sqrt(torque_sd.dot(torque_sd)), 0.0)
+
+
 class WorldPush(NamedTuple):
     """What pushes the arm.
 
@@ -126,11 +131,10 @@ class WorldPush(NamedTuple):
     lever: float
 
     @classmethod
-    def at(cls, torques: Array, torque_sd: Array, jacobian: Array) -> "WorldPush":
-        """What pushes with these torques (n,), N m, at a point with this Jacobian (3, n)."""
+    def at(cls, torques: Array, size: float, jacobian: Array) -> "WorldPush":
+        """What pushes with these torques (n,), N m, of this certain size at a point with this Jacobian (3, n)."""
         lever = max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), FORCE.least_lever)
-        size = math.sqrt(torques.dot(torques)) - FORCE.certain * math.sqrt(torque_sd.dot(torque_sd))
-        return cls(max(size, 0.0) / lever, torques, lever)
+        return cls(size / lever, torques, lever)
 
     def row(self, allowed: float, gain: float, fastest: float) -> VelocityRow:
         """No faster against it than a force law, m/s/N, allows up to this force, N; above it away from it."""
