@@ -1,7 +1,10 @@
 """Other transmissions as configurations of the same plant: formulas against the plant, and the stack on each."""
 
 import math
+from functools import partial
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 import yaml
@@ -13,6 +16,7 @@ from wam_description.signals import ForceCommand
 from wam_sim.simulation import Simulation
 from wam_studies.figures.transmissions import KINDS, driven, measured, predicted
 from wam_studies.plant.ideal_testbed import ideal_testbed, released_plant
+from wam_theory.cable import circuit_torque, play_torque
 
 
 @pytest.mark.slow
@@ -43,6 +47,24 @@ def test_stack_presses_with_every_transmission(name: str) -> None:
     q = np.array([row.values[0] for row in run.rows["sim/joint_states"]])
     force = -1464.28 / 0.9144 * q[-200:]
     assert float(force.mean()) == pytest.approx(20.0, abs=0.3)
+
+
+def test_torque_of_a_circuit_over_its_stretch_is_that_of_a_slack_strand_and_of_backlash() -> None:
+    (circuit,), play = ideal_testbed().circuits, 0.04
+    slack = partial(circuit_torque, stiffness=circuit.stiffness, pretension=circuit.pretension, radius=circuit.radius)
+    backlash = partial(play_torque, stiffness=circuit.stiffness, backlash=play)
+    cases: list[tuple[dict[str, Any], float, Any]] = [
+        ({"slack": True}, circuit.slack_stretch, slack),
+        ({"backlash": (play,)}, play, backlash),
+    ]
+    for effects, scale, law in cases:
+        plant, stretches, found = released_plant(ideal_testbed(), **effects), np.linspace(-2.5, 2.5, 101) * scale, []
+        for stretch in stretches:
+            plant.data.qpos[:] = (stretch, 0.0)
+            mujoco.mj_forward(plant.model, plant.data)
+            found.append(plant.circuit_torque[0])
+        expected = law(stretches)
+        assert found == pytest.approx(expected, rel=0.0, abs=1e-6 * np.abs(expected).max())
 
 
 def test_link_moves_within_the_play_and_not_beyond() -> None:

@@ -232,7 +232,7 @@ def test_a_topic_that_had_another_type_is_named_and_not_left_out(tmp_path: Path,
 
 def test_a_comparison_of_nothing_is_no_success() -> None:
     with pytest.raises(BagError, match="velocity_loop publishes nothing from these inputs"):
-        replay(Path(__file__).parents[2] / "bags/sample/active-pretension", "velocity_loop")
+        replay(Path(__file__).parents[2] / "bags/sample/force-accuracy", "velocity_loop")
 
 
 def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from recordings import forces, joints, recorded
 from wam_bag.bag import BagError, PointColumns
 from wam_cli.main import main
 from wam_control.task import scenario
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import packaged
 from wam_description.parameters import ParameterError
 from wam_description.units import si
 from wam_studies.page import section_of
@@ -20,20 +20,17 @@ from wam_studies.thesis import (
     arm_forces,
     cables,
     force_accuracy,
-    inner_loops,
     limit_cycles,
     quantised,
-    step_response,
     testbed,
     transmission,
 )
 from wam_studies.thesis.definition import configured, load, names
 from wam_studies.thesis.evaluation import function_of
-from wam_studies.thesis.one_link import growth, one_link, played
+from wam_studies.thesis.one_link import one_link, played
 from wam_studies.thesis.recording import Step
 from wam_studies.thesis.rows import Comparison, Result
 from wam_studies.thesis.sweeping import SweptRun, record_run
-from wam_theory.stiction import play
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
@@ -105,29 +102,16 @@ def test_a_row_agrees_within_its_bound_and_never_with_what_could_not_be_measured
     assert not Result([Comparison("x", 1.0, 1.0), Comparison("x", 1.0, 2.0, bound=0.1)], []).agrees
 
 
-# measuring
-
-
-def test_growth_of_a_growing_and_of_a_decaying_oscillation() -> None:
-    time = np.arange(0.0, 3.0, 1e-3)
-    for rate in (0.4, -0.7):
-        found = growth(time, 40.0 + np.exp(rate * time) * np.sin(78.0 * time))
-        assert found.rate == pytest.approx(rate, abs=0.01)
-        assert found.frequency == pytest.approx(78.0, rel=1e-3)
-    with pytest.raises(ValueError, match="0 zero crossings are too few"):
-        growth(time, np.ones_like(time))
-
-
 # evaluations
 
 
 def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> None:
-    time, runs = np.arange(0.0, 2.5, 5e-4), []
+    time, runs = np.arange(0.0, 2.5, 5e-4), {}
     for number, gain, rate in ((0, 0.010, -0.6), (1, 0.014, 0.2)):
         steps = (Step("raise the gain", 0.0, 2.5, {"force_loop:force_gain": [gain]}),)
         force = 44.0 + 0.5 * np.exp(rate * time) * np.sin(75.0 * time)
-        runs.append(pressing_run(tmp_path, ("testbed-5.6", number), time, force, steps))
-    gain, frequency, low, high = testbed.margin(*runs, "now")
+        runs[f"{number}"] = pressing_run(tmp_path, ("testbed-5.6", number), time, force, steps)
+    low, high, frequency, gain = testbed.margin(runs, "now")
     assert gain.measured == pytest.approx(0.013, rel=2e-3)  # three quarters of the way
     assert gain.predicted == pytest.approx(1.73e-3 * LEVER**2 / si(1.0, "lb-in"), rel=2e-3)  # of errata and thesis
     assert frequency.measured == pytest.approx(75.0, rel=2e-3)
@@ -220,25 +204,13 @@ def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: P
     assert power.measured * measured == pytest.approx(rows["work of a half cycle"].measured, rel=1e-3)
 
 
-def test_step_response_of_an_exponential(tmp_path: Path) -> None:
-    time = np.arange(0.0, 2.5, 1e-3)
-    force, steps = 21.87 * (1.0 - np.exp(-time / 0.5)), (Step("press", 0.0, 2.5, {}),)
-    run = pressing_run(tmp_path, ("step-response", 0), time, force, steps, 21.87)
-    constant, largest = step_response.responses({"no_friction": run}).rows
-    assert constant.measured == pytest.approx(0.5, rel=1e-4)
-    assert constant.predicted == pytest.approx(1.0 / (0.002 * 772.0), rel=2e-3)  # (5.2), G_I 0.002, K 772 N m/rad
-    # largest between two exponentials of 0.5 and 0.648 s: 0.095 of the step
-    assert largest.measured == pytest.approx(0.095, abs=0.01)
-    assert not largest.agrees
-
-
 def test_errors_at_rest_are_those_of_the_standstills(tmp_path: Path) -> None:
     time = np.arange(0.0, 1.0, 1e-3)
     speed = np.where((time % 0.25) < 0.1, 0.0, 0.3)
     force = np.select([time < 0.25, time < 0.5, time < 0.75], [0.0, 8.0, 9.5], 9.9)
     sensors = joints(time, -force * LEVER / STIFFNESS, -speed)
-    shown = played(pressing_run(tmp_path, ("step-response", 0), time, force, desired=10.0, joint_sensors=sensors))
-    assert step_response.errors_at_rest(shown) == pytest.approx([2.0, 0.5, 0.1], rel=1e-3)
+    shown = played(pressing_run(tmp_path, ("testbed-5.6", 0), time, force, desired=10.0, joint_sensors=sensors))
+    assert testbed.errors_at_rest(shown) == pytest.approx([2.0, 0.5, 0.1], rel=1e-3)
 
 
 def test_resonance_is_where_the_damped_response_has_it_without_damping() -> None:
@@ -291,24 +263,6 @@ def test_the_gain_below_the_resonances_is_that_of_its_frequencies_and_not_the_st
     assert row.measured == pytest.approx(row.predicted, rel=0.02)
 
 
-def test_work_lost_in_a_lift_is_that_of_a_motor_that_turns_too_far(tmp_path: Path) -> None:
-    experiment = load("efficiency")
-    time = np.arange(0.0, 2.7, 1e-3)
-    turn = np.clip(time / 1.2, 0.0, 1.0)
-    topics = {
-        "motor_states": joints(time, 14.0 * turn),
-        "joint_sensors": joints(time, 0.98 * turn),
-        "sim/joint_states": joints(time, 0.0, effort=36.0),
-        "sim/disturbance": forces(time, (0.0, -40.0, 0.0), torque=(0.0, 0.0, -36.0)),
-    }
-    steps = (Step("lift 40 N", 0.0, 1.2, {}), Step("hold 40 N", 1.2, 2.7, {}))
-    (row,) = cables.efficiency({"lift": recorded(experiment, 0, topics, steps, tmp_path)}).rows
-    assert row.measured == pytest.approx(2.0, abs=1e-6)  # %
-    # (6.14) by hand: both stages lose tau/(r E A)
-    by_hand = 36.0 / 14.0 * (1.0 / (0.009525 * 42258.1053) + 3.74166 / (0.009525 * 158116.0))
-    assert row.predicted == pytest.approx(100.0 * by_hand, rel=0.01)
-
-
 def test_creep_is_what_the_link_lags_behind_its_motor(tmp_path: Path) -> None:
     experiment = load("creep")
     time = np.arange(0.0, 4.0, 1e-3)
@@ -317,6 +271,7 @@ def test_creep_is_what_the_link_lags_behind_its_motor(tmp_path: Path) -> None:
     swings = np.where(time < 0.5005, 5e-4 * np.cos(2.0 * math.pi * (time - 0.5) / 0.02), 0.0)  # largest as it begins
     topics = {
         "motor_states": joints(time, theta),
+        "joint_states": joints(time, theta / 14.0),
         "joint_sensors": joints(time, theta / 14.0 - 1e-3 * travel + swings),
         "sim/disturbance": forces(time, (0.0, -45.0, 0.0), torque=(0.0, 0.0, -40.5)),
     }
@@ -500,41 +455,6 @@ def test_cycle_of_the_motor_under_a_force_in_steps_has_the_period_of_both_errors
     assert force.measured == pytest.approx(4.5 * step / LEVER - 11.6, rel=1e-3)
 
 
-def test_a_strand_that_stays_tight_under_a_low_pretension_is_not_what_is_predicted(tmp_path: Path) -> None:
-    """By hand: T_0 as configured, 2 T_0 r/5 is the torque beyond which one strand carries at half the stiffness."""
-    time = np.arange(0.0, 9.5, 1e-3)
-    desired = np.interp(time, [0.0, 1.3, 2.0, 9.0], [0.0, 4.0, 4.0, 25.0])
-    arm = Configuration.load(packaged("testbed")).shared.arm
-    t0, k = arm.cables.pretension[0], arm.circuits[0].stiffness
-    friction = 2e-4 * 2.0 * 0.2 * t0 * 14.0 / LEVER
-    force = np.maximum(desired - friction, 0.0)
-    torque, slack = force * LEVER / 14.0, 2.0 * 0.2 * t0 * 9.525e-3
-    steps = (Step("delicate", 0.0, 2.0, {}), Step("strong", 2.0, 9.5, {}))
-    for stretch, agrees in ((np.maximum(torque, 2.0 * torque - slack) / k, True), (torque / k, False)):
-        motor = -(14.0 * force * LEVER / STIFFNESS + stretch)
-        motors = joints(time, motor, effort=-desired * LEVER / 14.0)
-        run = pressing_run(tmp_path, ("active-pretension", 1), time, force, steps, 25.0, motor_states=motors)
-        deadband, found = force_accuracy.active_pretension({"a_fifth_of_it": run}).rows
-        assert deadband.agrees
-        assert found.agrees == agrees
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("number", "left"), [(0, 1.0), (1, 1.0 / 1.46)])
-def test_friction_that_an_inner_loop_leaves_is_half_of_the_loop_of_force_over_command(
-    number: int, left: float, tmp_path: Path
-) -> None:
-    """By hand: a play of 0.2 N m at the motor, divided by one plus the gain of a torque loop."""
-    time = np.arange(0.0, 5.8, 1e-3)
-    desired = np.interp(time, [0.0, 2.8, 3.0, 5.5], [0.0, 18.0, 18.0, 2.0])
-    steps = (Step("out", 0.0, 3.0, {}), Step("back", 3.0, 5.8, {}))
-    for part, agrees in ((left, True), (0.9 * left, False)):
-        force, command = play(desired, part * 0.2 * 14.0 / LEVER), joints(time, 0.0, effort=-desired * LEVER / 14.0)
-        run = pressing_run(tmp_path, ("inner-loops", number), time, force, steps, motor_effort_command=command)
-        (row,) = inner_loops.friction_left({"run": run}).rows
-        assert row.agrees == agrees, row
-
-
 def test_joint_angles_that_keep_their_creep_are_not_taken_as_corrected(tmp_path: Path) -> None:
     experiment, time = load("creep-correction"), np.arange(0.0, 6.0, 1e-3)
     theta = 5.6 * np.clip(time - 1.0, 0.0, 2.0)
@@ -552,7 +472,7 @@ def test_joint_angles_that_keep_their_creep_are_not_taken_as_corrected(tmp_path:
             "sim/disturbance": forces(time, (0.0, -25.0, 0.0), torque=(0.0, 0.0, -load_torque)),
         }
         runs[name] = recorded(experiment, number, topics, steps, tmp_path)
-    rigid, corrected = cables.corrected(runs).rows
+    rigid, corrected = cables.creeping(runs).rows
     assert rigid.agrees
     assert rigid.measured == pytest.approx(1e3 * per_radian * 11.2, rel=1e-3)
     assert not corrected.agrees

@@ -12,8 +12,6 @@ from wam_studies.plant.effects import (
 
 # relative to theory
 PROMISED = {
-    "slack": 1e-6,
-    "backlash": 1e-6,
     "torque control": 1e-2,  # (6.22) is first order in the strain
     "impact on a damped surface at 0.5 ms": 1e-2,  # a contact begins between two steps
     "backlash in the loop": 1e-2,

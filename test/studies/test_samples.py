@@ -84,7 +84,7 @@ def test_the_page_is_what_the_index_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["step-response"])
+@pytest.mark.parametrize("name", ["stiction-limit-cycle"])
 def test_other_readers_see_the_same(name: str) -> None:
     bag = read(BAGS / "sample" / name)
     counts, sums = dict.fromkeys(bag.topics, 0), dict.fromkeys(bag.topics, 0)
@@ -138,9 +138,9 @@ def test_steps_that_are_not_whole_in_a_sample_are_not_judged() -> None:
 
 
 def test_a_changed_sample_and_a_changed_list_are_noticed(tmp_path: Path) -> None:
-    experiment, entry = load("step-response"), ENTRIES["step-response"]
-    bag = tmp_path / "sample" / "step-response"
-    shutil.copytree(BAGS / "sample" / "step-response", bag)
+    experiment, entry = load("stiction-limit-cycle"), ENTRIES["stiction-limit-cycle"]
+    bag = tmp_path / "sample" / "stiction-limit-cycle"
+    shutil.copytree(BAGS / "sample" / "stiction-limit-cycle", bag)
     first = entry.rows[0]
     other = entry._replace(rows=[first | {"measured": 1.001 * first["measured"]}, *entry.rows[2:]])
     wrong = check(experiment, other, tmp_path)
@@ -182,12 +182,14 @@ def test_a_sample_is_recorded_cut_judged_and_listed_by_one_command(
     Path("bags").mkdir()
     shutil.copy(BAGS / "README.md", "bags")
     with pytest.raises(SystemExit) as ended:
-        main(["experiment", "step-response", "--samples", "make"])
+        main(["experiment", "testbed-own-servo", "--samples", "make"])
     assert ended.value.code == 0
     assert "every sample is as the index lists it" in capfd.readouterr().out
     (entry,) = read_index(Path("bags")).values()
     assert all(row["is_whole"] for row in entry.rows)
-    assert [row["quantity"] for row in entry.rows] == [row["quantity"] for row in ENTRIES["step-response"].rows]
-    assert entry.sha256["step-response_0.mcap"][:16] in Path("bags/README.md").read_text()
-    assert (np.diff(read(Path("bags/sample/step-response")).topics["/wam/joint_sensors"].stamp_ns) == 1_000_000).all()
+    assert [row["quantity"] for row in entry.rows] == [row["quantity"] for row in ENTRIES["testbed-own-servo"].rows]
+    assert entry.sha256["testbed-own-servo_0.mcap"][:16] in Path("bags/README.md").read_text()
+    assert (
+        np.diff(read(Path("bags/sample/testbed-own-servo")).topics["/wam/joint_sensors"].stamp_ns) == 1_000_000
+    ).all()
     assert not Path("bags/recorded").exists()

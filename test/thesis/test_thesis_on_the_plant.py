@@ -3,12 +3,23 @@
 import numpy as np
 import pytest
 
-from wam_studies.figures.closed_forms import resonances
+from wam_studies.figures.closed_forms import line_of, resonances
 from wam_studies.figures.stability import closed_loop_map, equal_node
-from wam_studies.plant.ideal_testbed import force_step, ideal_testbed, link_inertia, loop_arm, loop_node
+from wam_studies.plant.ideal_testbed import (
+    against_spring,
+    force_step,
+    frequencies,
+    ideal_testbed,
+    link_inertia,
+    loop_arm,
+    loop_node,
+    released_plant,
+)
 from wam_theory.friction_model import FrictionNode
 from wam_theory.linear_loop import routh_gain
 from wam_theory.regimes import gamma_3, psi
+from wam_theory.resonance import force_resonances
+from wam_theory.stiction import breakaway_delay
 
 ZETA = 0.25
 CONTACT = 1464.28  # k_c of 5.6, N m/rad
@@ -40,14 +51,28 @@ def test_errors_of_the_plant_grow_by_psi_beyond_gamma_3_and_shrink_before(share:
 
 
 def test_half_the_friction_halves_delay_and_travel_of_the_plants_motor() -> None:
-    """5.7."""
+    """5.7; the delay is that of (5.3)."""
     delays, travels = [], []
     for friction in (6.0, 3.0):
         found = force_step(5.0, CONTACT, 4.3e-2, 18.7, (friction, friction), 4.0)
         delays.append(found.time[np.abs(found.velocity) > 1e-5][0])
+        predicted = breakaway_delay(4.3e-2, found.node.transmission_stiffness, friction, 5.0)
+        assert delays[-1] == pytest.approx(float(predicted), abs=5e-4)  # two steps
         travels.append(np.ptp(found.motor[found.time > 0.15]))
     assert delays[1] / delays[0] == pytest.approx(0.5, rel=0.03)  # a step of the plant
     assert travels[1] / travels[0] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize("ratio", [14.0, 30.0])
+def test_reducer_at_the_joint_has_the_higher_lower_resonance(ratio: float) -> None:
+    """4.4, on 638 lb/in at the tip: (4.4) with the stiffness of (4.1), sqrt(N) less with the reducer at the motor."""
+    contact, found = 93419.0, []
+    for share in (1.0, 0.0):
+        arm = line_of(ratio, share, None)
+        own = arm.motors.inertia[0], link_inertia(arm), arm.circuits[0].stiffness, contact, ratio
+        found.append(frequencies(released_plant(arm, against_spring(contact)))[0])
+        assert found[-1] == pytest.approx(float(force_resonances(*own).lower), rel=0.01)
+    assert found[0] > 1.5 * found[1]
 
 
 @pytest.mark.slow

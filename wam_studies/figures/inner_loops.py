@@ -2,7 +2,7 @@
 
 Every loop is sampled at 1 kHz.  A velocity loop with an integral is a position loop whose reference is the integral
 of the commanded velocity, so that both are one curve.  The loops as nodes: `wam_control.velocity.torque_loop`,
-`wam_control.velocity.position_loop`; measured by the experiment `inner-loops`.
+`wam_control.velocity.position_loop`.
 """
 
 from collections.abc import Callable

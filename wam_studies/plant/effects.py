@@ -6,9 +6,8 @@ see test/driver.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -28,7 +27,6 @@ from wam_studies.plant.ideal_testbed import (
     released_plant,
 )
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
-from wam_theory.cable import circuit_torque, play_torque
 from wam_theory.friction_model import IntegralLoop
 from wam_theory.stick_slip import simulate
 from wam_theory.tension_element import coulomb_like_torque
@@ -53,34 +51,6 @@ class PlantCurve(NamedTuple):
 def _curve(x: Numbers, plant: Callable[[float], float], theory: ArrayLike) -> PlantCurve:
     """What the plant does at each x, next to theory."""
     return PlantCurve(np.array([plant(value) for value in x.tolist()]), np.asarray(theory))
-
-
-def slack() -> PlantCurve:
-    """Torque of a circuit over its stretch, rad and N m, beyond the slack of the loose strand."""
-    (circuit,) = ideal_testbed().circuits
-    stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
-    theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
-    return _curve(stretch, _stretched(slack=True), theory)
-
-
-def backlash() -> PlantCurve:
-    """Torque of a circuit with backlash over its stretch, rad and N m."""
-    play = 0.04
-    stretch = np.linspace(-2.5, 2.5, 101) * play
-    theory = play_torque(stretch, ideal_testbed().circuits[0].stiffness, play)
-    return _curve(stretch, _stretched(backlash=(play,)), theory)
-
-
-def _stretched(**effects: Any) -> Callable[[float], float]:
-    """Torque of the circuit of a plant with these effects, N m, over its stretch, its link at rest."""
-    plant = released_plant(ideal_testbed(), **effects)
-
-    def torque(stretch: float) -> float:
-        plant.data.qpos[:] = (stretch, 0.0)
-        mujoco.mj_forward(plant.model, plant.data)
-        return plant.circuit_torque[0]
-
-    return torque
 
 
 def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
@@ -226,8 +196,6 @@ def stiction_cycle() -> PlantCurve:
 
 
 EFFECTS: dict[str, Callable[[], PlantCurve]] = {
-    "slack": slack,
-    "backlash": backlash,
     "torque control": coulomb_like,
     "impact on a damped surface at 0.5 ms": damped_impact,
     "backlash in the loop": actuator_cycle_with_backlash,

@@ -13,13 +13,11 @@ claims          what the thesis claims and where it is shown: rows of docs/thesi
 samples         the sample bags and their index; cutting makes them of recordings
 sweeping        an experiment with many parameter sets
 
-step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)
 limit_cycles    stiction (5.8), (5.9); actuator (5.20) to (5.22)
 testbed         section 5.6: stable gain with friction, step size, saturation and delay
-transmission    chapter 4: force response by chirp, position of the reducer
-cables          chapter 6: efficiency (6.15), creep (6.19) and its correction
+transmission    chapter 4: force response by chirp
+cables          chapter 6: creep (6.19) and its correction
 force_accuracy  force without feedback, 5.2; a sensor that is calibrated wrong, 2.2
-inner_loops     largest gains of inner loops, and what they leave of friction at the motor, 2.1.2
 quantised       force feedback that is read in steps, 3.2.1
 arm_forces      the arm presses, slides, is pushed, and presses near either end of a link
 groping         the arm finds a box by contacts, 7.3

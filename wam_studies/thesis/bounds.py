@@ -24,22 +24,15 @@ class ThesisBounds:
 
     # thesis.force_accuracy
     settled_force: float = 0.5  # s at the end of a step, over which a settled force is averaged
-    ramp_inertia: float = 0.05  # N; what a ramp of 3 N/s is carried further by the link's inertia
     least_contact: float = 0.02  # N; the force from which contact counts
 
     # thesis.limit_cycles
     neglected: float = 1.0  # allowed deviation of (5.8) and (5.9) over the left side of (5.11), which they neglect
 
-    # thesis.step_response
-    sample_and_hold: float = 0.15  # effect of the sample and hold on (5.18), which is for the continuous loop
-    slip_delay: float = 2e-3  # s; motor and sample lag by parts of a period, and a slip starts slowly
-    standstills_until: float = 2.0  # s, enough for two standstills
-    shortest_standstill: float = 0.005  # s, of a standstill
-
     # thesis.one_link
     settled_span: float = 0.02  # of the step, remaining span of a settled response
-    stuck_speed: float = 1e-5  # rad/s of the joint; far below any motion, far above the noise of a stuck one
     steady_span: float = 0.1  # relative change of the span between two windows, below which a cycle is steady
+    stuck_speed: float = 1e-5  # rad/s of the joint; far below any motion, far above the noise of a stuck one
 
     # thesis.quantised
     neglected_delays: float = 0.05  # allowed of the period: the slip and two samples are neglected
@@ -48,17 +41,16 @@ class ThesisBounds:
 
     # thesis.cables
     creep_left: float = 0.05  # of the creep, that is left of it: friction and acceleration of the rotor count as load
-    creep_of_torque: float = 0.02  # of the creep, its deviation from (6.19)
     rest_before: float = 0.1  # s before the motor turns, to average a small oscillation of the link
 
     # thesis.testbed
+    standstills_until: float = 2.0  # s, enough for two standstills
+    shortest_standstill: float = 0.005  # s, of a standstill
+    least_swing: float = 1e-4  # N, far below any swing that is measured
     mode_transient: float = 0.4  # s after a step, before the growing mode dominates
     small_step: float = 0.3  # N, a step at the margin with the rod
     long_cycle: float = 0.05  # of a cycle with a long transient
     plain_steps: int = 2  # steps of a run, up to which the last one is drawn with its prediction
-
-    # thesis.inner_loops
-    one_mode_after: float = 0.1  # s of a response until one mode is left
 
     # thesis.arm_forces
     steady_press: float = 0.8  # s at the end of a press

@@ -5,8 +5,8 @@ import numpy as np
 from wam_control.force.force_loop_parameters import ForceLoopParameters
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.thesis.bounds import BOUNDS
-from wam_studies.thesis.one_link import TestbedStep, played, set_until
-from wam_studies.thesis.recording import Recording, Runs, Step
+from wam_studies.thesis.one_link import TestbedStep, played
+from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, below, near
 from wam_theory.stiction import play
 
@@ -30,46 +30,13 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     begin = float(desired[np.argmax(force > BOUNDS.least_contact)])
     rows = [near("deadband, F_des at which F_c begins", friction, begin - BOUNDS.least_contact, "N", "5.2")]
     for step in run.steps:
-        last = _last(shown, step)
+        last = int(np.searchsorted(shown.time, step.end)) - 1
         rows.append(near(f"F_c at {desired[last]:.0f} N, {step.name}", expected[last], force[last], "N", "5.2"))
     worst = float(np.abs(force - expected).max() / expected.max())
     rows.append(below("largest difference", worst, "of F_c", BOUNDS.within, "5.2"))
     each = slice(None, None, 40)
     curves = [("measured", measured(desired[each], force[each])), ("play", line_only(desired, expected))]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
-
-
-def active_pretension(runs: Runs) -> Result:
-    """The experiment `active-pretension`: deadband by friction of the tension, and stretch of the cable, over it."""
-    rows, curves = [], []
-    for name, run in runs.items():
-        shown, label = played(run), name.replace("_", " ")
-        desired, force, link, circuit = _fed_forward(shown), shown.force, shown.link, run.shared.arm.circuits[0]
-        steps = run.step("delicate"), run.step("strong")
-        coefficient = float(run.parameters.node("driver")["effects.tension_friction"][0])
-        delicate, strong = (2.0 * _share(run, step) * circuit.pretension for step in steps)
-        friction = coefficient * delicate * link.ratio / link.lever
-        light, last = (_last(shown, step) for step in steps)
-        torque = force[last] * link.lever / link.ratio
-        expected = max(torque, 2.0 * torque - strong * circuit.radius) / circuit.stiffness
-        stretch = link.ratio * (shown.motor[last] - force[last] * link.lever / link.node.contact_stiffness)
-        found, law = desired[light] - force[light], "c (T1 + T2)"
-        rows += [
-            Comparison(f"{label}, deadband", friction, found, "N", BOUNDS.ramp_inertia, law, True),
-            near(f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", "slack strand"),
-        ]
-        curves.append((label, measured(desired[::20], force[::20])))
-    return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
-
-
-def _last(shown: TestbedStep, step: Step) -> int:
-    return int(np.searchsorted(shown.time, step.end)) - 1
-
-
-def _share(run: Recording, step: Step) -> float:
-    """Part of the pretension in a step."""
-    found = run.parameters.with_values(set_until(run, step)).node("driver")["effects.pretension_share"]
-    return float(found[0])
 
 
 def _fed_forward(shown: TestbedStep) -> Numbers:

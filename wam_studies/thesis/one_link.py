@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -169,10 +168,10 @@ class TestbedStep(NamedTuple):
         return str(Verdict.DIVERGED if late > (1.0 + BOUNDS.steady_span) * before else Verdict.LIMIT_CYCLE)
 
 
-def played(run: Recording, step: Step | None = None) -> TestbedStep:
-    """What a run did in a step, or in all of it."""
+def played(run: Recording, step: Step | None = None, topic: str = "joint_sensors") -> TestbedStep:
+    """What a run did in a step, or in all of it, by the joint angles of a topic."""
     link = one_link(run, set_until(run, step) if step else None)
-    sensors, motors = run.joints("joint_sensors"), run.joints("motor_states")
+    sensors, motors = run.joints(topic), run.joints("motor_states")
     begin, end = (step.begin, step.end) if step else (0.0, math.inf)
     if not math.isnan(run.fault_time):
         end = min(end, run.fault_time)
@@ -180,33 +179,3 @@ def played(run: Recording, step: Step | None = None) -> TestbedStep:
     time, force = sensors.time[chosen], -link.node.contact_stiffness * sensors.position[chosen, 0] / link.lever
     motor = -np.interp(time, motors.time, motors.position[:, 0]) / link.ratio
     return TestbedStep(run, step, link, time, force, motor, -sensors.velocity[chosen, 0])
-
-
-class Growth(NamedTuple):
-    """Growth rate of an oscillation, 1/s, negative for decay, and its frequency, rad/s."""
-
-    rate: float
-    frequency: float
-
-
-def growth(time: Numbers, values: Numbers) -> Growth:
-    """Growth of an oscillation about its mean, from the extremes between its zero crossings.
-
-    Raises
-    ------
-    ValueError
-        if there are fewer than five half cycles.
-    """
-    level = values - values.mean()
-    crossings = np.flatnonzero(level[:-1] * level[1:] < 0.0)
-    if len(crossings) < 6:
-        raise ValueError(f"{len(crossings)} zero crossings are too few to measure growth; record a longer run")
-    fractions = level[crossings] / (level[crossings] - level[crossings + 1])
-    times = time[crossings] + fractions * np.diff(time)[crossings]
-    parts = [level[a : b + 1] for a, b in pairwise(crossings)]
-    peaks = np.array([np.abs(part).max() for part in parts])
-    at = 0.5 * (times[:-1] + times[1:])
-    # sums of two neighbours, so that an error of the mean cancels
-    pairs, between = peaks[:-1] + peaks[1:], 0.5 * (at[:-1] + at[1:])
-    rate = float(np.polyfit(between, np.log(pairs), 1)[0])
-    return Growth(rate, math.pi * (len(times) - 1) / float(times[-1] - times[0]))

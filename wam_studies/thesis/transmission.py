@@ -1,20 +1,17 @@
-"""Chapter 4: the force response of a transmission by chirp, and the position of its reducer."""
+"""Chapter 4: the force response of a transmission by chirp."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_bag.losses import CUT
-from wam_description.arm import Arm
-from wam_studies.figures.panels import Line, Numbers, Panel, line_only, measured
+from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.plant.ideal_testbed import link_inertia
 from wam_studies.thesis.bounds import BOUNDS
 from wam_studies.thesis.one_link import joint_stiffness
 from wam_studies.thesis.recording import Recording, Runs
 from wam_studies.thesis.rows import Comparison, Result, near
-from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
 
 Complex = NDArray[np.complex128]
@@ -32,75 +29,33 @@ class Transfer(NamedTuple):
 def frequency_response(runs: Runs) -> Result:
     """The experiment `frequency-response`; of a sample, which has motor and joint only, the resonances."""
     (run,) = runs.values()
-    found = transfer(run)
-    rows = [_resonance(run, found, which) for which in Resonances._fields]
+    (circuit,), found, rows = run.shared.arm.circuits, transfer(run), []
+    for name, natural in resonances(run)._asdict().items():
+        expected = float(natural) * HZ
+        resonance = zero_of(found, expected, circuit.damping / circuit.stiffness)
+        rows.append(near(f"{name} resonance", expected, resonance, "Hz", "(4.4)"))
     if CUT in run.bag.metadata:
         low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
-        return Result(rows, [_gains([_gain("measured", found, low, high)])])
-    low, high = swept(run)
+    else:
+        low, high = swept(run)
     inside = (found.frequency > low) & (found.frequency < high)
-    lowest = inside & (found.frequency < 2.0 * low)
-    predicted, gain = np.abs(response_of(run, found.frequency[lowest])), 1.0 / np.abs(found.inverse[lowest])
-    label = f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz"
-    rows += [
-        near(label, np.median(predicted), np.median(gain), "rad/(N m)", "(4.3)"),
-        Comparison("smallest coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
+    frequency, gain = found.frequency[inside], 1.0 / np.abs(found.inverse[inside])
+    predicted, coherence = np.abs(response_of(run, frequency)), found.coherence[inside]
+    if CUT not in run.bag.metadata:
+        lowest, label = frequency < 2.0 * low, f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz"
+        rows += [
+            near(label, np.median(predicted[lowest]), np.median(gain[lowest]), "rad/(N m)", "(4.3)"),
+            Comparison("smallest coherence", 1.0, float(coherence.min()), "", 0.05, "", True),
+        ]
+    curves = [("measured", measured(frequency, gain)), ("(4.3) with damping", line_only(frequency, predicted))]
+    axis = "frequency [Hz]"
+    panels = [
+        Panel("joint angle over motor torque", axis, "angle over torque [rad/(N m)]", curves, "xy"),
+        Panel("coherence", axis, "coherence [-]", [("", measured(frequency, coherence))], "x"),
     ]
-    curves = [_gain("measured", found, low, high), _theory("(4.3) with damping", run, found, low, high)]
-    coherence = [("", measured(found.frequency[inside], found.coherence[inside]))]
-    panels = [_gains(curves), Panel("coherence", "frequency [Hz]", "coherence [-]", coherence, "x")]
     count = BOUNDS.averaged_frequencies
     remark = f"low coherence: the response changes within the {count} averaged neighbouring frequencies"
     return Result(rows, panels, (remark,))
-
-
-def allocation(runs: Runs) -> Result:
-    """The experiment `stiffness-allocation`, or one of its sweeps, from motor and joint only."""
-    rows, curves = [], []
-    for name, run in runs.items():
-        found, label = transfer(run), name.replace("_", " ")
-        row = _resonance(run, found, "lower", f"{label}, ")
-        ends = 0.5 * float(row.predicted), 3.0 * float(row.predicted)
-        rows.append(row)
-        curves += [_gain(label, found, *ends), _theory("(4.3)", run, found, *ends)]
-    for ratio in (14, 30):
-        names = [f"reducer_at_{where}_N_{ratio}" for where in ("joint", "motor")]
-        if all(name in runs for name in names):
-            joint, motor = (runs[name].shared.arm for name in names)
-            stiffness = joint.circuits[0].stiffness / motor.circuits[0].stiffness
-            label = f"stiffness with reducer at joint over at motor, N {ratio}"
-            rows.append(near(label, stiffness_gain(joint), stiffness, "", "(4.1)", 1e-3))
-    return Result(rows, [_gains(curves)])
-
-
-def _gain(label: str, found: Transfer, low: float, high: float) -> Line:
-    """Joint angle over motor torque between two frequencies, Hz."""
-    inside = (found.frequency > low) & (found.frequency < high)
-    return label, measured(found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
-
-
-def _theory(label: str, run: Recording, found: Transfer, low: float, high: float) -> Line:
-    """The same by (4.3) with damping."""
-    frequency = found.frequency[(found.frequency > low) & (found.frequency < high)]
-    return label, line_only(frequency, np.abs(response_of(run, frequency)))
-
-
-def _gains(lines: Sequence[Line]) -> Panel:
-    return Panel("joint angle over motor torque", "frequency [Hz]", "angle over torque [rad/(N m)]", lines, "xy")
-
-
-def _resonance(run: Recording, found: Transfer, which: str, of: str = "") -> Comparison:
-    """The lower or the upper resonance of (4.4), Hz."""
-    at, (circuit,) = float(getattr(resonances(run), which)) * HZ, run.shared.arm.circuits
-    return near(f"{of}{which} resonance", at, zero_of(found, at, circuit.damping / circuit.stiffness), "Hz", "(4.4)")
-
-
-def stiffness_gain(arm: Arm) -> float:
-    """Stiffness of the line with the reducer at the joint over that with the reducer at the motor, (4.1)."""
-    cables, ratio = arm.cables, 1.0 / arm.joint_from_motor[0]
-    ea, length = cables.stage_ea[0], cables.stage_length[0]
-    ends = [float(stiffness_with_reducer(ea, length, ratio, distance)) for distance in (length, 0.0)]
-    return ends[0] / ends[1]
 
 
 def resonances(run: Recording) -> Resonances:
