@@ -2,7 +2,6 @@
 
 import math
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from wam_description.constants import constants
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
+from wam_studies.figures.backdrivability import Backdriving
 from wam_theory.cable import efficiency, stage_loss, tensions
 from wam_theory.requisites import TOLERANCE, Measures, Requisite, scorecard
 from wam_theory.resonance import (
@@ -25,6 +25,7 @@ from wam_theory.stiction import stiction_cycle_force
 
 POSES = 15  # of each joint apart from the first, which does not change the torques
 DIRECTIONS = 180
+HZ = 0.5 / math.pi
 
 
 def printed(meaning: str) -> tuple[float, ...]:
@@ -54,29 +55,28 @@ def measures(configuration: Configuration) -> Measures:
             "use the configuration 'wam', or one that builds on it"
         )
     driver = configuration.node("driver", DriverParameters)
-    body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
+    body, tip, gears = RigidBody(arm), Backdriving(arm), TransmissionMap.of(arm).motor_from_joint
     pose = printed("pose in the middle of the workspace")
-    rotor = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
     links = body.mass_matrix(pose) + np.diag(arm.joints.armature)
-    levers = normal_directions(body, pose) @ body.tool_jacobian(pose)  # (directions, joints), m
-    friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
+    directions = normal_directions(body, pose)
+    levers = directions @ body.tool_jacobian(pose)  # (directions, joints), m
     stiffness = max(driver.world.obstacles.stiffness)
     radius, pretension = [c.radius for c in arm.circuits], np.array(arm.cables.pretension)
     tight, _ = tensions(arm.motors.peak_torque, pretension, radius)
     return Measures(
         steady_force=steady_force(arm),
         steady_force_required=printed("steady contact force at any point, any pose")[0],
-        least_force=masked_force(levers, friction),
+        least_force=float(tip.pushes(pose, directions).max()),
         cycle_force=cycle_force(arm, levers, stiffness),
-        friction_share=tuple((friction / (np.abs(gears.T) @ arm.motors.peak_torque)).tolist()),
+        friction_share=tuple((tip.friction / (np.abs(gears.T) @ arm.motors.peak_torque)).tolist()),
         friction_required=printed("joint friction, of peak torque; 2 to 4 are bounds"),
         impact_speed=driver.tip_speed_limit,
-        effective_mass=effective_mass(levers, links + rotor),
+        effective_mass=float(tip.masses(pose, directions).max()),
         contact_stiffness=stiffness,
         cable_tension=float(np.max(tight / arm.cables.breaking_strength)),
         pretension=float(np.min(2.0 * pretension * radius / arm.motors.peak_torque)),
         link_inertia=tuple(np.diag(links).tolist()),
-        rotor_inertia=tuple(np.diag(rotor).tolist()),
+        rotor_inertia=tuple(np.diag(tip.rotors).tolist()),
         transmission_stiffness=tuple((np.square(gears.T) @ [c.stiffness for c in arm.circuits]).tolist()),
         joint_contact_stiffness=tuple((stiffness * np.square(levers).max(axis=0)).tolist()),
         coupled_bandwidth=coupled_bandwidth(arm, links, levers, stiffness),
@@ -110,12 +110,6 @@ def steady_force(arm: Arm) -> float:
     return least
 
 
-def masked_force(levers: Array, friction: Array) -> float:
-    """Greatest push, N, normal to the link at the tip that moves no joint, each held by its own friction only."""
-    needed = friction / np.maximum(np.abs(levers), 1e-12)
-    return float(needed.min(axis=1).max())
-
-
 def cycle_force(arm: Arm, levers: Array, stiffness: float) -> float:
     """Greatest stiction cycle (5.8) at the tip, peak to peak, N, over joints and directions, undamped: Omega is 2.
 
@@ -132,12 +126,6 @@ def cycle_force(arm: Arm, levers: Array, stiffness: float) -> float:
     lever = np.maximum(np.abs(levers), 1e-9)
     torque = stiction_cycle_force(cables, stiffness * lever**2, joints.static_friction, joints.dynamic_friction, 0.0)
     return float((torque / lever).max())
-
-
-def effective_mass(levers: Array, inertia: Array) -> float:
-    """Greatest effective mass, kg, at the tip over directions with these levers, (directions, joints)."""
-    mobility = np.einsum("di,ij,dj->d", levers, np.linalg.inv(inertia), levers)
-    return float(1.0 / mobility.min())
 
 
 def coupled_bandwidth(arm: Arm, links: Array, levers: Array, stiffness: float) -> float:
@@ -200,55 +188,34 @@ def report(configuration: Configuration) -> str:
     return table(scorecard(measures(configuration)))
 
 
-class StiffnessRule(NamedTuple):
-    """One joint of the arm, everything at the joint; stiffness in N m/rad, bandwidth in Hz.
+def stiffness_rule(configuration: Configuration) -> dict[str, Array]:
+    """The rule of 4.4, with the hardest contact of the configuration at the tip: quantities of each joint, by name.
 
-    `best_contact` and `best_transmission` are by (4.9) and (4.10); `with_best` is the bandwidth with the
-    transmission that (4.10) requires, on the present contact.
-    """
-
-    joint: int
-    transmission: float
-    contact: float
-    best_transmission: float
-    best_contact: float
-    bandwidth: float
-    asymptote: float
-    with_best: float
-
-
-def stiffness_rule(configuration: Configuration) -> tuple[StiffnessRule, ...]:
-    """The rule of 4.4 for each joint, with the hardest contact of the configuration at the tip.
+    The last one is the bandwidth with the transmission that (4.10) requires, on the present contact.
 
     Parameters
     ----------
     configuration : of the arm, as in `scorecard.measures`.
     """
     m = measures(configuration)
-    rows = []
-    columns = (m.transmission_stiffness, m.joint_contact_stiffness, m.rotor_inertia, m.link_inertia)
-    for joint, (cable, contact, rotor, link) in enumerate(zip(*columns, strict=True), 1):
-        best = float(best_transmission_stiffness(rotor, link, contact))
-        lower = [float(force_resonances(rotor, link, k, contact, 1.0).lower) for k in (cable, best)]
-        asymptote = float(hard_contact_bandwidth(rotor, cable))
-        hertz = [value / (2.0 * math.pi) for value in (lower[0], asymptote, lower[1])]
-        rows.append(
-            StiffnessRule(joint, cable, contact, best, float(best_contact_stiffness(rotor, link, cable)), *hertz)
-        )
-    return tuple(rows)
+    cable, contact, rotor, link = map(
+        np.array, (m.transmission_stiffness, m.joint_contact_stiffness, m.rotor_inertia, m.link_inertia)
+    )
+    best = best_transmission_stiffness(rotor, link, contact)
+    bandwidth, with_best = (force_resonances(rotor, link, k, contact, 1.0).lower * HZ for k in (cable, best))
+    return {
+        "k_tr, N m/rad": cable,
+        "k_c at the tip": contact,
+        "k_tr by (4.10)": best,
+        "k_c by (4.9)": best_contact_stiffness(rotor, link, cable),
+        "bandwidth, Hz": bandwidth,
+        "its asymptote (4.6)": hard_contact_bandwidth(rotor, cable) * HZ,
+        "bandwidth with k_tr of (4.10)": with_best,
+    }
 
 
 def stiffness_table(configuration: Configuration) -> str:
     """`stiffness_rule` as Markdown."""
-    head = (
-        "joint",
-        "k_tr, N m/rad",
-        "k_c at the tip",
-        "k_tr by (4.10)",
-        "k_c by (4.9)",
-        "bandwidth, Hz",
-        "its asymptote (4.6)",
-        "bandwidth with k_tr of (4.10)",
-    )
-    rows = [(str(r.joint), *(f"{value:.3g}" for value in r[1:])) for r in stiffness_rule(configuration)]
-    return markdown(head, rows)
+    rule = stiffness_rule(configuration)
+    joints = enumerate(zip(*rule.values(), strict=True), 1)
+    return markdown(("joint", *rule), [(str(joint), *(f"{value:.3g}" for value in row)) for joint, row in joints])

@@ -37,13 +37,18 @@ class Backdriving:
     Parameters
     ----------
     arm : of a configuration.
+
+    Attributes
+    ----------
+    rotors : inertia of the rotors, (joints, joints), kg m^2.
+    friction : of each joint with its motors, N m.
     """
 
     def __init__(self, arm: Arm) -> None:
         self._body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
-        self._rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
+        self.rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
+        self.friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
         self._armature = np.diag(arm.joints.armature)
-        self._friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
         directions = np.random.default_rng(CASE.backdriven_seed).normal(size=(CASE.backdriven_directions, 3))
         self._directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
@@ -57,20 +62,29 @@ class Backdriving:
         rotors : whether the motors' rotors are moved, too.
         """
         jacobian = self._body.tool_jacobian(q)
-        inertia = self._body.mass_matrix(q) + self._armature + (self._rotors if rotors else 0.0)
+        inertia = self._body.mass_matrix(q) + self._armature + (self.rotors if rotors else 0.0)
         free = jacobian @ np.linalg.solve(inertia, jacobian.T)
         found: NDArray[np.float64] = np.asarray(np.linalg.solve(np.eye(3) + payload * free, free), dtype=np.float64)
         return found
 
+    def masses(
+        self, q: tuple[float, ...], directions: NDArray[np.float64], payload: float = 0.0, rotors: bool = True
+    ) -> NDArray[np.float64]:
+        """Effective mass along each direction, (d, 3), kg; other arguments as in `mobility`."""
+        along = np.einsum("di,ij,dj->d", directions, self.mobility(q, payload, rotors), directions)
+        return np.asarray(1.0 / along, dtype=np.float64)
+
+    def pushes(self, q: tuple[float, ...], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Greatest push along each direction, (d, 3), that moves no joint, each held by its own friction only, N."""
+        levers = np.maximum(np.abs(directions @ self._body.tool_jacobian(q)), 1e-12)
+        return np.asarray((self.friction / levers).min(axis=1), dtype=np.float64)
+
     def at(self, q: tuple[float, ...], payload: float) -> Backdriven:
         """Inertia and friction in this pose; arguments as in `mobility`."""
-        whole, links = (self.mobility(q, payload, rotors) for rotors in (True, False))
-        n = self._directions
-        of_whole, of_links = (np.einsum("di,ij,dj->d", n, matrix, n) for matrix in (whole, links))
-        principal = np.maximum(np.linalg.eigvalsh(whole), 1e-12)
-        share = float(np.mean(1.0 - of_whole / of_links))
-        levers = np.maximum(np.abs(n @ self._body.tool_jacobian(q)), 1e-12)
-        pushed = float(np.median((self._friction / levers).min(axis=1)))
+        whole, links = (self.masses(q, self._directions, payload, rotors) for rotors in (True, False))
+        principal = np.maximum(np.linalg.eigvalsh(self.mobility(q, payload)), 1e-12)
+        share = float(np.mean(1.0 - links / whole))
+        pushed = float(np.median(self.pushes(q, self._directions)))
         masses = 1.0 / principal[-1], 1.0 / principal[0]
         return Backdriven(float(principal[0] / principal[-1]), share, pushed, masses)
 
