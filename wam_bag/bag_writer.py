@@ -6,6 +6,7 @@ No node and no clock of its own: the recorder decides what is written and at wha
 import contextlib
 import errno
 import fcntl
+import math
 import os
 import shutil
 import time
@@ -21,7 +22,7 @@ from wam_bag import safe_yaml
 from wam_bag.cdr import ExactLength
 from wam_bag.definitions import schema, type_hash
 from wam_bag.errors import RecordingError, command
-from wam_bag.mcap_writer import McapWriter
+from wam_bag.mcap_writer import FAST, McapWriter
 from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, described_topic, write_metadata
 
 __all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "policies", "release"]
@@ -84,6 +85,24 @@ class Split(NamedTuple):
 WHOLE: Final = Split(0, 0.0)  # one file
 
 
+class Packing(NamedTuple):
+    """How messages are packed.
+
+    Attributes
+    ----------
+    chunk_size : bytes of a chunk.
+    level : of its compression, 1 to 22.
+    is_timed : whether a chunk is finished every half second of wall time; if not, equal messages give equal files.
+    """
+
+    chunk_size: int = CHUNK_SIZE
+    level: int = FAST
+    is_timed: bool = True
+
+
+LIVE: Final = Packing()
+
+
 class BagWriter:
     """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and so on and, on closing, ``metadata.yaml``.
 
@@ -94,6 +113,7 @@ class BagWriter:
     ----------
     path : directory of the bag; refused if it exists.  Missing parents are created.
     split : when it continues in another file.
+    packing : of the messages.
 
     Attributes
     ----------
@@ -105,17 +125,17 @@ class BagWriter:
         if the bag cannot be created, before anything is recorded.
     """
 
-    def __init__(self, path: Path, split: Split = WHOLE) -> None:
+    def __init__(self, path: Path, split: Split = WHOLE, packing: Packing = LIVE) -> None:
         self.path = path
         self.closed = False
-        self._split = split
+        self._split, self._packing = split, packing
         self._files: list[FileSummary] = []
         self._topics: list[dict[str, Any]] = []
         self._channels: dict[str, int] = {}
         self._lengths: dict[str, ExactLength] = {}
         self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
         self._schemas: dict[str, int] = {}
-        self._next_flush = 0.0
+        self._next_flush = 0.0 if packing.is_timed else math.inf
         self._file_begin: int | None = None
         _make(path)
         try:
@@ -246,7 +266,7 @@ class BagWriter:
         path = self.path / self._file_name()
         stream = path.open("xb", buffering=0)
         try:
-            self._writer = McapWriter(stream, LIBRARY, CHUNK_SIZE)
+            self._writer = McapWriter(stream, LIBRARY, self._packing.chunk_size, self._packing.level)
         except OSError:
             stream.close()
             path.unlink()

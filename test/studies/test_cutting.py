@@ -8,11 +8,12 @@ from rosbags.rosbag2 import Reader
 from sample_messages import QOS
 
 from wam_bag.bag import BagError, read
-from wam_bag.bag_writer import BagWriter
+from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.losses import CUT
-from wam_studies.thesis.cutting import Cut, cut
+from wam_studies.thesis.cutting import cut
+from wam_studies.thesis.definition import SampleDefinition
 
-PART = Cut(20_000_000, 60_000_000)
+PART = SampleDefinition("", "", (0.02, 0.06))
 LATCHED = "/wam/contact/in_contact"
 
 
@@ -51,8 +52,14 @@ def messages(file: Path) -> list[tuple[str, int, int, int, bytes]]:
         return [(c.topic, m.log_time, m.publish_time, m.sequence, bytes(m.data)) for _, c, m in found]
 
 
+def made(source: Path, target: Path, part: SampleDefinition) -> Path:
+    """The file of a part."""
+    cut(source, target, part)
+    return target / "part_0.mcap"
+
+
 def test_the_part_has_the_messages_of_its_time_and_what_was_latched_before(tmp_path: Path) -> None:
-    found = messages(cut(written(tmp_path / "whole"), tmp_path / "part", PART))
+    found = messages(made(written(tmp_path / "whole"), tmp_path / "part", PART))
     assert [time for topic, time, *_ in found if topic == LATCHED] == [5_000_000, 50_000_000]
     assert [entry for entry in found if entry[0] == "/wam/fast"] == [
         ("/wam/fast", k * 1_000_000, k * 1_000_000 + 7, k + 1, bool_message(k % 3 == 0)) for k in range(20, 60)
@@ -69,16 +76,16 @@ def test_the_part_has_the_messages_of_its_time_and_what_was_latched_before(tmp_p
 
 
 def test_a_thinned_topic_has_the_first_of_so_many_messages_and_the_part_says_so(tmp_path: Path) -> None:
-    part = PART._replace(thinned={"fast": 10}, topics=["fast"])
-    found = messages(cut(written(tmp_path / "whole"), tmp_path / "part", part))
+    part = PART._replace(thinned={"fast": 10}, topics=("fast",))
+    found = messages(made(written(tmp_path / "whole"), tmp_path / "part", part))
     assert [time for _, time, *_ in found] == [20_000_000, 30_000_000, 40_000_000, 50_000_000]
     said = read(tmp_path / "part").metadata[CUT]
     assert (said["thinned"], said["topics"]) == ("fast:10", "fast")
 
 
 def test_equal_messages_give_an_equal_file_however_they_were_recorded(tmp_path: Path) -> None:
-    one = cut(written(tmp_path / "one"), tmp_path / "a" / "part", PART)
-    other = cut(written(tmp_path / "other", is_turned=True), tmp_path / "b" / "part", PART)
+    one = made(written(tmp_path / "one"), tmp_path / "a" / "part", PART)
+    other = made(written(tmp_path / "other", is_turned=True), tmp_path / "b" / "part", PART)
     assert one.read_bytes() == other.read_bytes()
     assert (one.parent / "metadata.yaml").read_bytes() == (other.parent / "metadata.yaml").read_bytes()
 
@@ -88,7 +95,7 @@ def test_what_cannot_be_cut_is_refused_and_nothing_is_overwritten(tmp_path: Path
     with pytest.raises(BagError, match="has no topic slow; what it has: 'wam bag info"):
         cut(whole, tmp_path / "part", PART._replace(topics=("fast", "slow")))
     with pytest.raises(BagError, match="has no message from 200000000 to 300000000 ns"):
-        cut(whole, tmp_path / "part", Cut(200_000_000, 300_000_000))
+        cut(whole, tmp_path / "part", PART._replace(seconds=(0.2, 0.3)))
     assert not (tmp_path / "part").exists()
-    with pytest.raises(FileExistsError):
+    with pytest.raises(RecordingError, match="exists already"):
         cut(whole, whole, PART)

@@ -1,39 +1,24 @@
 """A sample cut out of a recording: some of its time, some of its topics, and everything that explains them."""
 
-from collections.abc import Collection, Mapping
+from collections import defaultdict
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-from mcap.reader import McapReader, make_reader
-from mcap.records import Channel, Message, Schema
+from mcap.reader import make_reader
+from mcap.records import Message
 
-from wam_bag import safe_yaml
 from wam_bag.bag_file import files, is_selected
+from wam_bag.bag_writer import BagWriter, Packing
 from wam_bag.errors import BagError, command
 from wam_bag.losses import CUT
-from wam_bag.mcap_writer import McapWriter
-from wam_bag.metadata import LIBRARY, FileSummary, bag_information, profiles, topic_information, write_metadata
+from wam_bag.metadata import profiles
+from wam_studies.thesis.definition import SampleDefinition
 
-CHUNK_SIZE: Final = 4 * 2**20  # bytes; large ones compress better, and a sample is small
-LEVEL: Final = 19  # of zstd: the strongest that needs no more memory to read
+PACKING: Final = Packing(4 * 2**20, 19, is_timed=False)  # the strongest level that needs no more memory to read
 OWN: Final = "rosbag2"  # metadata record that describes the file it is in, and so is written again
-LATCHED: Final = ("transient_local", 1)  # the policy as rosbag2 writes it
 
 
-class Cut(NamedTuple):
-    """What is taken: log times ``begin_ns <= t < end_ns``; topics named as for `wam_bag.bag.read`.
-
-    Of a topic in `thinned`, only the first of so many messages, ``{"sim/joint_states": 10}``.
-    """
-
-    begin_ns: int
-    end_ns: int
-    topics: Collection[str] | None = None
-    thinned: Mapping[str, int] = MappingProxyType({})
-
-
-def cut(source: Path, target: Path, part: Cut) -> Path:
+def cut(source: Path, target: Path, sample: SampleDefinition) -> None:
     """Write a bag that holds a part of a recording of this stack.
 
     Of latched topics everything before the part is kept as well, at its own time: it was valid when the part begins.
@@ -44,95 +29,49 @@ def cut(source: Path, target: Path, part: Cut) -> Path:
     ----------
     source : bag directory, of one file, or the file.
     target : directory of the new bag.
-
-    Returns
-    -------
-    Path
-        the file in it.
+    sample : times, topics as for `wam_bag.bag.read`, and those of which only the first of so many messages is kept.
 
     Raises
     ------
     BagError
         if the source lacks a topic, or has no message in the part.
-    FileExistsError
+    RecordingError
         if the target exists.
     """
+    begin, end = (round(1e9 * seconds) for seconds in sample.seconds)
     (recorded,) = files(source)
+    taken: dict[str, list[Message]] = defaultdict(list)
     with recorded.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
-        channels, taken = _taken(reader, part)
+        summary = reader.get_summary()
+        assert summary  # our recorder writes one
+        topics = dict[str, tuple[str, Any]]()
+        for channel in summary.channels.values():
+            if is_selected(channel.topic, sample.topics):
+                (offered,) = profiles(channel.metadata["offered_qos_profiles"])
+                topics[channel.topic] = summary.schemas[channel.schema_id].name, offered
+        for _, channel, message in reader.iter_messages(list(topics), log_time_order=False):
+            is_latched = topics[channel.topic][1]["durability"] == "transient_local"
+            if (0 if is_latched else begin) <= message.log_time < end:
+                taken[channel.topic].append(message)
         attachments = sorted(reader.iter_attachments(), key=lambda one: str(one.name))
-        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-    lacking = [name for name in part.topics or () if not any(is_selected(topic, [name]) for topic in channels)]
-    if lacking or not any(part.begin_ns <= message.log_time for some in taken.values() for message in some):
-        what = f"topic {', '.join(lacking)}" if lacking else f"message from {part.begin_ns} to {part.end_ns} ns"
+        metadata = {record.name: record.metadata for record in reader.iter_metadata() if record.name != OWN}
+    lacking = [name for name in sample.topics or () if not any(is_selected(topic, [name]) for topic in topics)]
+    if lacking or not any(begin <= message.log_time for some in taken.values() for message in some):
+        what = f"topic {', '.join(lacking)}" if lacking else f"message from {begin} to {end} ns"
         raise BagError(f"{source} has no {what}; what it has: {command('wam bag info', source)}")
-    metadata[CUT] = {"begin_ns": str(part.begin_ns), "end_ns": str(part.end_ns)}
-    metadata[CUT]["topics"] = "*" if part.topics is None else " ".join(part.topics)
-    if part.thinned:
-        metadata[CUT]["thinned"] = " ".join(f"{name}:{each}" for name, each in part.thinned.items())
-    target.mkdir(parents=True)
-    file = target / f"{target.name}_0.mcap"
-    with file.open("xb", buffering=0) as stream:
-        writer = McapWriter(stream, LIBRARY, CHUNK_SIZE, LEVEL)
-        ids = _write_messages(writer, channels, taken)
+    metadata[CUT] = {"begin_ns": str(begin), "end_ns": str(end), "topics": " ".join(sample.topics or "*")}
+    if sample.thinned:
+        metadata[CUT]["thinned"] = " ".join(f"{name}:{each}" for name, each in sample.thinned.items())
+    with BagWriter(target, packing=PACKING) as bag:
+        kept = []
+        for topic in sorted(topics):  # a source may have its topics in any order
+            bag.add_topic(topic, *topics[topic])
+            each = next((each for name, each in sample.thinned.items() if is_selected(topic, [name])), 1)
+            kept += [(m.log_time, topic, m.sequence, m.publish_time, m.data) for m in taken[topic][::each]]
+        for log_time, topic, sequence, publish_time, data in sorted(kept):
+            bag.write(topic, data, log_time, publish_time, sequence)
         for attachment in attachments:
-            writer.attach(attachment)
-        for title in sorted(metadata.keys() - {OWN}):
-            writer.metadata(title, dict(sorted(metadata[title].items())))
-        information = bag_information(
-            [FileSummary(file.name, writer.first, writer.last, sum(writer.counts.values()))],
-            [topic_information(*channels[topic]) for topic in ids],
-            [writer.counts.get(number, 0) for number in ids.values()],
-        )
-        writer.metadata(OWN, {"serialized_metadata": safe_yaml.dump(information).strip()})
-        writer.finish()
-    write_metadata(target, information)
-    return file
-
-
-def _taken(reader: McapReader, part: Cut) -> tuple[dict[str, tuple[Channel, Schema]], dict[str, list[Message]]]:
-    """Definitions and messages of the part, by topic."""
-    summary = reader.get_summary()
-    assert summary  # our recorder writes one
-    channels = {
-        channel.topic: (channel, summary.schemas[channel.schema_id])
-        for channel in summary.channels.values()
-        if is_selected(channel.topic, part.topics)
-    }
-    begins = {topic: 0 if _is_latched(channel) else part.begin_ns for topic, (channel, _) in channels.items()}
-    taken: dict[str, list[Message]] = {topic: [] for topic in channels}
-    for _, channel, message in reader.iter_messages(list(channels), log_time_order=False):
-        if begins[channel.topic] <= message.log_time < part.end_ns:
-            taken[channel.topic].append(message)
-    for topic in taken:
-        for name, each in part.thinned.items():
-            taken[topic] = taken[topic][:: each if is_selected(topic, [name]) else 1]
-    return channels, taken
-
-
-def _is_latched(channel: Channel) -> bool:
-    """Whether publishers keep their last message for late subscribers."""
-    offered: Any = profiles(channel.metadata.get("offered_qos_profiles", ""))
-    return any(profile.get("durability") in LATCHED for profile in offered)
-
-
-def _write_messages(
-    writer: McapWriter, channels: Mapping[str, tuple[Channel, Schema]], taken: Mapping[str, list[Message]]
-) -> dict[str, int]:
-    """Write definitions and messages; the ids of the topics."""
-    schemas: dict[str, int] = {}
-    ids: dict[str, int] = {}
-    for topic, (channel, schema) in sorted(channels.items()):  # a source may have its topics in any order
-        if schema.name not in schemas:
-            schemas[schema.name] = writer.schema(schema.name, schema.encoding, schema.data)
-        ids[topic] = writer.channel(topic, channel.message_encoding, schemas[schema.name], channel.metadata)
-    kept = [
-        (one.log_time, ids[topic], one.sequence, one.publish_time, one.data)
-        for topic, some in taken.items()
-        for one in some
-    ]
-    for log_time, channel_id, sequence, publish_time, data in sorted(kept):
-        writer.add(channel_id, log_time, publish_time, sequence, data)
-    writer.flush()
-    return ids
+            bag.attach(attachment.name, attachment.media_type, attachment.data)
+        for title in sorted(metadata):
+            bag.metadata(title, dict(sorted(metadata[title].items())))

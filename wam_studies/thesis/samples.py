@@ -15,7 +15,7 @@ from wam_analysis.table import markdown
 from wam_bag.bag import read
 from wam_description.parameters import ParameterError, require
 from wam_studies.page import with_section
-from wam_studies.thesis.cutting import Cut, cut
+from wam_studies.thesis.cutting import cut
 from wam_studies.thesis.definition import Experiment
 from wam_studies.thesis.evaluation import evaluate_sample
 from wam_studies.thesis.recording import recording
@@ -67,15 +67,14 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
         if the experiment declares no sample.
     BagError
         if the recording cannot be read, or has not all topics.
-    FileExistsError
+    RecordingError
         if there is a sample of that name.
     """
     sample = experiment.sample
     require(sample is not None, f"experiment {experiment.name} declares no sample; add one to its YAML")
     assert sample is not None  # for mypy
     bag = directory / FOLDER / experiment.name
-    part = Cut(round(1e9 * sample.seconds[0]), round(1e9 * sample.seconds[1]), sample.topics, sample.thinned)
-    cut(whole, bag, part)
+    cut(whole, bag, sample)
     of_whole = _rows(experiment, whole)
     return Entry(
         experiment.name,
