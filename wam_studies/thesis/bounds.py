@@ -64,9 +64,8 @@ class ThesisBounds:
     latency: float = 0.1  # s until a push is detected
     wrong_link: float = 0.05  # of the time of a push, with another link or no detection
     push_in_motion: float = 0.15  # of the force of a push while the arm moves
-    force_along_link: float = 0.1  # of the commanded force, at either end of the link
     arm_cycle: float = 0.02  # of the force, peak to peak of a limit cycle
-    single_slip: float = 0.2  # N; a joint that still slips once, by stiction, is no cycle
+    single_slip: float = 0.2  # N, or a tenth of a small force; a joint that still slips once, by stiction, is no cycle
 
 
 BOUNDS: Final = ThesisBounds()
