@@ -33,17 +33,15 @@ LONG = 300.0  # s, for what must happen at all, on a machine as busy as may be
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that start ROS nodes; one worker runs them all, so that they do not slow each other.
+    """Mark the tests that start ROS nodes.
 
-    Those that share a fixture of a module are run by one worker, too, so that it is made once.
+    One worker runs those of a file, and those that share a fixture of a module, so that it is made once.
     """
     for item in items:
         if {"domain_id", "domain_of_module"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("ros")
         if config.pluginmanager.hasplugin("xdist"):
-            if item.get_closest_marker("ros"):
-                item.add_marker(pytest.mark.xdist_group("ros"))
-            elif isinstance(item, pytest.Function) and _shares_a_fixture(item):
+            if item.get_closest_marker("ros") or (isinstance(item, pytest.Function) and _shares_a_fixture(item)):
                 item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 

@@ -34,6 +34,10 @@ PARTS: Final = {  # of the predicted error of a force, and what makes each small
     "torques": ("the measured torques", "use joint sensors, tare in free space, or command more force"),
     "friction": ("friction of the surface", "lower sensing.friction if the surface has less friction, or bend the arm"),
     "place": ("the contact position", PINNED),
+    "pinned_place": (
+        "the contact position",
+        "bend the arm, or lower contact_position_sd if the position is known better",
+    ),
     "resting": ("the load of the arm", "declare the load (arm.payload), or end the command and tare in free space"),
     "moving_surface": ("the motion of the surface", "move the surface more slowly, or raise force_gain"),
     "slow_arm": ("the slow approach to this force", "declare guard.contact_stiffness, or raise limits.settling_time"),
@@ -98,10 +102,12 @@ SINCE: Final = ("without a contact", "since the force was last right or rising")
 
 
 class _Sentence(string.Formatter):
-    """Format as str.format does; `b` writes a number briefly."""
+    """Format as str.format does; `b` writes a number briefly, and one without a bound in words."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        return brief(value) if format_spec == "b" else str(super().format_field(value, format_spec))
+        if format_spec != "b":
+            return str(super().format_field(value, format_spec))
+        return "any number of" if value == math.inf else brief(value)
 
 
 def sentence(event: Event) -> str:

@@ -119,5 +119,5 @@ def rest_words(stuck: float, motions: int) -> str:
     if not motions:
         return "never moved"
     if not stuck and motions == 1:
-        return "moved all the time"
+        return "never at rest"
     return f"at rest for {100.0 * stuck:.0f} % of the time, moved {times(motions)}"

@@ -322,10 +322,11 @@ class StabilityGuard:
             f"{found.where}, contact up to {self.parameters.contact_stiffness:g} N/m (guard.contact_stiffness)"
         )
         if not found.scale:
+            also = f"{group}_proportional_gain, " if any(law.proportional_gain) else ""
             reason = (
                 f"{group}_gain {listed(law.gain)} is not stable, nor is a hundredth of it "
-                f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, "
-                f"{group}_proportional_gain or guard.contact_stiffness"
+                f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, {also}"
+                f"or guard.contact_stiffness"
             )
         return found._replace(reason=reason)
 
