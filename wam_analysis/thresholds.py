@@ -239,6 +239,7 @@ class StreamThresholds:
     within: float = 1.01  # of a turn, which an angle that wraps does not leave
     zero: float = 5.0  # times what the velocity usually leaves of a step of the position: more may move its zero
     beyond: float = 2.0  # times the largest step by the velocity: a larger one does
+    around: int = 2  # steps on each side that show the velocity where none was recorded
     irregular: float = 0.01  # of a period: stamps that differ more are put on a constant rate
     loud: float = 1e3  # roundings of a number: smaller changes are none
     precise: float = 0.01  # of the largest speed: noise of a velocity that is made from positions

@@ -307,11 +307,11 @@ def _treated(one: Source) -> Source:
             values["position"] = values["position"].copy()
             values["position"][known] = unwrapped
             treated.append(Treated(Treatment.WRAPPED, "position", wraps, len(unwrapped), turn))
-    both = one._replace(values=values).only("position", "velocity")
-    if {"position", "velocity"} <= both.values.keys() and not one.is_command:
-        jumps = _jumps(both)
+    if "position" in values and not one.is_command:
+        shown = one._replace(values=values).only("position", "velocity")
+        jumps = _jumps(shown)
         if len(sizes := jumps[jumps != 0.0]):
-            whole = np.cumsum(jumps)[row_at(both.time, one.time)]
+            whole = np.cumsum(jumps)[row_at(shown.time, one.time)]
             values["position"] = values["position"] - whole
             treated.append(Treated(Treatment.MOVED_ZERO, "position", len(sizes), len(jumps), max(sizes, key=abs)))
     return one._replace(values=values, treated=tuple(treated))
@@ -330,17 +330,28 @@ def _unwrapped(time: Numbers, position: Numbers) -> tuple[Numbers, int, float]:
     return position, 0, math.nan
 
 
-def _jumps(both: Source) -> Numbers:
-    """By how much the zero of the position moved before each message: what its velocity does not explain, (n,)."""
-    position, velocity = both.values["position"], both.values["velocity"]
+def _jumps(shown: Source) -> Numbers:
+    """By how much the zero of the position moved before each message, (n,).
+
+    It is what the velocity does not explain, or, where none was recorded, the steps before and after.
+    """
+    position = shown.values["position"]
     result = np.zeros(len(position))
     if len(position) < SHAFT.fewest_samples:
         return result
-    steps, moved = np.diff(position), 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(both.time)
+    steps = np.diff(position)
+    if "velocity" in shown.values:
+        velocity = shown.values["velocity"]
+        moved, finest = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(shown.time), 0.0
+        fastest = np.abs(moved)
+    else:
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, STREAM.around, "edge"), 2 * STREAM.around + 1)
+        moved, fastest = np.median(around, axis=1), np.sort(np.abs(around), axis=1)[:, -2]  # but for the step itself
+        finest = float(np.min(np.abs(steps[steps != 0.0]), initial=math.inf))  # one count of an encoder
     rest = steps - moved
-    usual = STREAM.zero * float(np.quantile(np.abs(rest), 1.0 - STREAM.repeated))
-    least = max(usual, STREAM.beyond * float(np.max(np.abs(moved))), SHAFT.joint_rest)
-    jumps = (np.abs(rest) > least) & ~after_gaps(both.time)[1:]
+    usual = STREAM.zero * max(float(np.quantile(np.abs(rest), 1.0 - STREAM.repeated)), finest)
+    least = np.maximum(STREAM.beyond * np.maximum(fastest, np.max(np.abs(moved))), max(usual, SHAFT.joint_rest))
+    jumps = (np.abs(rest) > least) & ~after_gaps(shown.time)[1:]
     if np.sum(jumps) <= STREAM.repeated * len(steps):
         result[1:][jumps] = rest[jumps]
     return result
