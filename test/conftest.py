@@ -40,9 +40,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if {"domain_id", "domain_of_module"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("ros")
-        if config.pluginmanager.hasplugin("xdist"):
-            if item.get_closest_marker("ros") or (isinstance(item, pytest.Function) and _shares_a_fixture(item)):
-                item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        is_shared = isinstance(item, pytest.Function) and _shares_a_fixture(item)
+        if (is_shared or item.get_closest_marker("ros")) and config.pluginmanager.hasplugin("xdist"):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 def _shares_a_fixture(item: pytest.Function) -> bool:
