@@ -93,7 +93,8 @@ SENTENCES: Final = {  # by cause
     "node": "{node}: {fault}{late}",
     # a node reports it, and the driver brakes
     "claimed": "{nodes} publish {topic}, but only one node may; stop all but one, then reset_fault",
-    "stopped": "{nodes} has stopped or is very slow: {topics} too old; start it again, then reset_fault",
+    "stopped": "{nodes} has stopped or is very slow: {topics} too old; start it again, or end other programs where the "
+    "computer is busy, then reset_fault",
     "long_step": "{step}: {topics} too old; make its steps faster, then reset_fault",
     "ended": "{node} has ended; start it again, then reset_fault",
 }
