@@ -20,7 +20,7 @@ from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_sim.simulation import Simulation
 from wam_studies.harness import Study, option
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact, share
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, share
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
 RESTS, CYCLES, DIVERGES = "rests", "cycles", "diverges"
@@ -97,7 +97,11 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
 
     def score(self, records: Sequence[ValidationRecord]) -> Scores:
         """What is accepted and diverges, what is refused and comes to rest."""
-        return Scores(list(_rows(records)), [_counts(records)])
+        groups: dict[str, list[ValidationRecord]] = {}
+        for one in sorted(records, key=lambda one: (one.where, one.domain, not one.is_accepted)):
+            verdict = "accepted" if one.is_accepted else "refused"
+            groups.setdefault(f"{one.where}, {one.domain}, {verdict}", []).append(one)
+        return Scores(list(_rows(records)), [by_group("Verdicts and responses", groups, _ends)])
 
     def failure(self, record: ValidationRecord) -> str:
         """An accepted set that diverges."""
@@ -113,19 +117,9 @@ def _rows(records: Sequence[ValidationRecord]) -> Iterator[Row]:
         yield Row(f"refused sets that come to rest, {where}", share(lost, len(own)), "%", 100.0)
 
 
-def _counts(records: Sequence[ValidationRecord]) -> ScoreTable:
-    counts = Counter((one.where, one.domain, one.is_accepted, one.end) for one in records)
-    kinds = sorted({key[:3] for key in counts}, key=lambda kind: (kind[0], kind[1], not kind[2]))
-    rows = [
-        [
-            where,
-            domain,
-            "accepts" if accepted else "refuses",
-            *(str(counts[where, domain, accepted, end]) for end in ENDS),
-        ]
-        for where, domain, accepted in kinds
-    ]
-    return ScoreTable("Verdicts and responses", ("of", "domain", "guard", *ENDS), rows)
+def _ends(records: Sequence[ValidationRecord]) -> Iterator[Row]:
+    counts = Counter(one.end for one in records)
+    return (Row(end, exact(counts[end], len(records))) for end in ENDS)
 
 
 def _nodes(seed: int, count: int) -> Iterator[NodeSet]:

@@ -85,10 +85,6 @@ class Study(ABC, Generic[Case, Record]):
         """Why a case is to be looked at; '' where it is as it should be."""
         return ""
 
-    def details(self, record: Record) -> str:
-        """One record in full."""
-        return str(record)
-
     def own_values(self, case: Case) -> Collection[str]:
         """Parameters that a case sets itself, so that --set has no effect on them."""
         return ()

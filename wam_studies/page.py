@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from wam_studies.harness import Measurement
-from wam_studies.scores import required_table, rows_table
+from wam_studies.scores import rows_table
 
 LISTED = 40  # failed cases
 END = "<!-- end of what is written -->"
@@ -48,7 +48,8 @@ def block(measured: Measurement, command: str, picture: str = "") -> str:
     shown = f"![{measured.study.title}]({picture})" if picture else ""
     missed = measured.scores.missed
     verdict = "\n".join(["Missed:", "", *(f"- {one}" for one in missed)]) if missed else "Every required value is met."
-    return "\n\n".join(filter(None, [head, shown, verdict, required_table(measured.scores.rows)]))
+    table = rows_table([row for row in measured.scores.rows if row.is_bounded])
+    return "\n\n".join(filter(None, [head, shown, verdict, table]))
 
 
 def section_of(file: Path, name: str) -> str:

@@ -1,13 +1,14 @@
 """What a study has measured: values with their 95 % intervals, compared with what is required and aimed at."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
 from wam_analysis.table import markdown
 
+Found = TypeVar("Found")  # what the rows of a group follow from
 Bound = tuple[float, float]  # least and greatest allowed value
 ANY: Final[Bound] = (-math.inf, math.inf)
 NONE_AT_ALL: Final[Bound] = (0.0, 0.0)  # a count that must be zero
@@ -113,10 +114,15 @@ class Row(NamedTuple):
     enough: tuple[float, float] = (0.0, 0.0)
 
     @property
+    def is_bounded(self) -> bool:
+        """Whether something is required, or aimed at."""
+        return (self.required, self.target) != (ANY, ANY)
+
+    @property
     def mark(self) -> str:
         """Comparison with the required and the target values, '' without any."""
         found, required, target = self.found, self.required, self.target
-        if required == ANY == target:
+        if not self.is_bounded:
             return ""
         if math.isnan(found.value):
             return "no data"
@@ -157,6 +163,11 @@ def percent(name: str, found: Interval, required: Bound = ANY, target: Bound = A
     return Row(name, found, "%", 100.0, required, target)
 
 
+def named(rows: Iterable[Row], addition: str) -> Iterator[Row]:
+    """Rows with what they are of."""
+    return (row._replace(name=f"{row.name}, {addition}") for row in rows)
+
+
 class ScoreTable(NamedTuple):
     """A table of a page: its title, the cells of its head and rows, and what a reader has to know."""
 
@@ -169,6 +180,17 @@ class ScoreTable(NamedTuple):
         """In Markdown, with its title."""
         parts = [f"## {self.title}", self.note, markdown(self.head, self.rows)]
         return "\n\n".join(filter(None, parts))
+
+
+def by_group(
+    title: str, groups: Mapping[str, Found], rows: Callable[[Found], Iterable[Row]], note: str = ""
+) -> ScoreTable:
+    """A line of each quantity with its number of observations, a column of each group."""
+    lines = []
+    for first, *others in zip(*map(rows, groups.values()), strict=True):
+        cells = [f"{row.cells[0]} ({row.found.observed})" for row in (first, *others)]
+        lines.append([", ".join(filter(None, (first.name, first.unit))), *cells])
+    return ScoreTable(title, ["quantity", *groups], lines, note)
 
 
 class Scores(NamedTuple):
@@ -193,7 +215,7 @@ class Scores(NamedTuple):
         ]
 
 
-def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]]) -> str:
+def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]] = {}) -> str:
     """Quantities by row in Markdown: a column for each seed, then all seeds; rows that have nothing are left out.
 
     Parameters
@@ -206,23 +228,11 @@ def rows_table(rows: Sequence[Row], by_seed: Mapping[int, Sequence[Row]]) -> str
     head = ["quantity", "unit", "required", "target", *(f"seed {seed}" for seed in seeds), "all", "95 %", "n", ""]
     lines = []
     for row in rows:
-        if row.found.observed or row.required != ANY or row.target != ANY:
+        if row.found.observed or row.is_bounded:
             bounds = [bound_text(row.required, row.scale), bound_text(row.target, row.scale)]
             of_seeds = [single.get((seed, row.name), "–") for seed in seeds]
             lines.append([row.name, row.unit, *bounds, *of_seeds, *row.cells])
     return markdown(head, lines)
-
-
-def required_table(rows: Sequence[Row]) -> str:
-    """Quantities with a required value or a target, of all seeds, in Markdown."""
-    lines = []
-    for row in rows:
-        if row.required != ANY or row.target != ANY:
-            target = f"target {bound_text(row.target, row.scale)}"
-            bound = target if row.required == ANY else bound_text(row.required, row.scale)
-            value, span, _, verdict = row.cells
-            lines.append([f"{row.name}, {row.unit}" if row.unit else row.name, bound, value, span, verdict])
-    return markdown(["quantity", "required", "found", "95 %", ""], lines)
 
 
 def holds(value: float, bound: Bound) -> bool:

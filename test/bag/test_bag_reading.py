@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 import zstandard
-from bag_mutations import break_bags
+from bag_mutations import MEMORY, break_bags, limits
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.opcode import Opcode
 from mcap.records import Chunk
@@ -38,7 +38,6 @@ from wam_bag.limits import READING_LIMITS
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC
 from wam_bag.recorder_parameters import mode_of
 from wam_bag.repair import repair
-from wam_studies.faults.bag_faults import MEMORY, limits
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 

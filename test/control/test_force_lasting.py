@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from arms import BODY, CONFIGURATION
@@ -12,6 +11,7 @@ from wam_control.force.task import AxisKind, TaskAxis, TaskCommand, unit
 from wam_control.task.scenario import Push, ScenarioStep
 from wam_description.event import Code
 from wam_description.signals import ForceCommand
+from wam_driver.loads import contact_force
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.surfaces import NAMES, Surface, obstacles
 from wam_studies.force_benchmark.tasks import (
@@ -48,12 +48,8 @@ def pressed(stiffness: float, *steps: ScenarioStep, **changes: Any) -> tuple[np.
     model, data = run.driver.plant.model, run.driver.plant.data
     rod, wrench, forces, reactions = model.geom(NAMES[0]).id, np.zeros(6), [], []
     while not run.step():
-        total = 0.0
-        for i in range(data.ncon):
-            if rod in data.contact.geom[i]:
-                mujoco.mj_contactForce(model, data, i, wrench)
-                total += abs(float(np.array(DIRECTION) @ data.contact.frame[i].reshape(3, 3).T @ wrench[:3]))
-        forces.append(total)
+        pressing = [i for i in range(data.ncon) if rod in data.contact.geom[i]]
+        forces.append(sum(abs(np.dot(DIRECTION, contact_force(model, data, i, wrench))) for i in pressing))
         reactions.append(run.nodes["force_loop"].event.code)
     begin = round(1e3 * RANGES.release)
     return np.array(forces[begin:]), reactions[begin:]

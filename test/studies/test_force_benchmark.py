@@ -1,6 +1,5 @@
 """The benchmark of force control: its tasks, how it evaluates them, and that it goes on where it was stopped."""
 
-import dataclasses
 import math
 from typing import Any
 
@@ -8,10 +7,8 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
-from wam_description.event import OBEYED, Code, warning
-from wam_description.mismatch import true_arm
+from wam_description.event import OBEYED, Code, fault, warning
 from wam_description.rigid_body import RigidBody
-from wam_driver.amplifier import Amplifier
 from wam_driver.driver import Driver, DriverParameters
 from wam_studies.force_benchmark.controllers import Admittance, TorqueControl
 from wam_studies.force_benchmark.outcome import TaskEnd, TaskResult, TaskTrace, evaluated
@@ -46,7 +43,7 @@ def test_tasks_are_as_wide_as_the_page_says() -> None:
         for low, angle, high in zip(WAM.joints.lower, task.q, WAM.joints.upper, strict=True)
     )
     for grouping in GROUPINGS:
-        counts = {name: sum(grouping.of(task) == name for task in DRAWN) for name in grouping.classes}
+        counts = {name: sum(grouping.name(task) == name for task in DRAWN) for name in grouping.classes}
         assert sum(counts.values()) == len(DRAWN), "every task is in one class"
         least = 8 if grouping.title == "not known" else 15
         assert min(counts.values()) >= least, (grouping.title, counts)
@@ -121,22 +118,16 @@ def test_the_last_command_limits_the_force_at_the_end() -> None:
 
 
 def test_true_motors_give_another_torque_than_their_reported_one() -> None:
-    parameters = CONFIGURATION.node("driver", DriverParameters)
-    mismatch = dataclasses.replace(parameters.mismatch, torque_constant=(1.1, 1.0, 0.9, 1.0))
-    true = true_arm(WAM, mismatch).motors.torque_constant
-    amplifier = Amplifier(WAM.motors, parameters.amplifier, np.random.default_rng(0), true)
-    reported = amplifier.nominal_torque([2.0] * 4)
-    assert [a / b for a, b in zip(amplifier.torque([2.0] * 4, [0.0] * 4), reported, strict=True)] == pytest.approx(
-        [1.1, 1.0, 0.9, 1.0]
-    )
-    configuration = CONFIGURATION.with_values({"driver:mismatch.torque_constant": [1.1, 1.0, 0.9, 1.0]})
-    driver = Driver(configuration.shared, configuration.node("driver", DriverParameters))
-    assert driver.amplifier.torque([2.0] * 4, [0.0] * 4) == amplifier.torque([2.0] * 4, [0.0] * 4)
+    factors = [1.1, 1.0, 0.9, 1.0]
+    configuration = CONFIGURATION.with_values({"driver:mismatch.torque_constant": factors})
+    amplifier = Driver(configuration.shared, configuration.node("driver", DriverParameters)).amplifier
+    true, reported = amplifier.torque([2.0] * 4, [0.0] * 4), amplifier.nominal_torque([2.0] * 4)
+    assert [a / b for a, b in zip(true, reported, strict=True)] == pytest.approx(factors)
 
 
 # ------------------------------------------------------------------------------------ outcomes
 def trace(forces: Any, **more: Any) -> TaskTrace:
-    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, OBEYED, False, False, 0.0)
+    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, OBEYED, False, 0.0)
     return given._replace(**more)
 
 
@@ -157,7 +148,7 @@ def held(newtons: float, **more: Any) -> TaskTrace:
         (held(0.0, event=REPORTED, is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
         (held(2.0, event=REPORTED, is_stopped=True), TaskEnd.GIVEN_UP),
         (trace([0.0, 10.1] + [2.0] * 3000, event=REPORTED, is_stopped=True), TaskEnd.ENDED),
-        (held(2.0, event=REPORTED, is_stopped=True, is_fault=True), TaskEnd.ENDED),
+        (held(2.0, event=fault("hit"), is_stopped=True), TaskEnd.ENDED),
         (held(0.0, event=REPORTED, travel=0.0), TaskEnd.ENDED),
     ],
 )

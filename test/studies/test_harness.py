@@ -123,7 +123,7 @@ def test_a_page_keeps_what_is_around_the_section(tmp_path: Path) -> None:
         with_section(file, "other", "")
     for words in ("`wam evaluate square --write page.md`: 6 cases", "![squares](page/square.png)", "Every required"):
         assert words in text
-    assert "| largest, m | 5 |" in text
+    assert "| largest | m | 5 |  | 4 |" in text
     assert "## Numbers" not in text
 
 

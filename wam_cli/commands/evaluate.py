@@ -93,7 +93,7 @@ def run_study(given: argparse.Namespace) -> int:
     with batch_of(given, 1 if study.over_topics else max(len(every), 1)) as batch:
         measured = evaluate(study, cases, *batch)
     if given.only:
-        print("\n".join(map(study.details, measured.total)))
+        print(*measured.total, sep="\n")
     else:
         print(report(measured, _words(given, study)))
     if given.write:

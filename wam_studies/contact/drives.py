@@ -63,6 +63,7 @@ class RecordingTimes:
 
 
 TIMES = RecordingTimes()
+IDENTIFIED_ARM = "identified"  # group of the scores of an arm that was identified before
 CONTACTS = {  # kinds of contacts, and s from one to the next
     "wide": (KINDS, TIMES.spacing),
     "lasting": (LASTING_KINDS, TIMES.spacing_of_lasting),
@@ -188,38 +189,34 @@ def arriving(recording: DriveRecording, period: float, seed: int) -> Iterator[tu
             gap = 0.0
 
 
-def replay(configuration: Configuration, name: str, group: str, recording: DriveRecording, seed: int) -> ContactScore:
+def replay(drive: Drive, recording: DriveRecording) -> ContactScore:
     """Score the estimator of a configuration on a recording."""
-    configured = configuration.with_values(
-        {**base_values(configuration, False), **recording.degradation.model, **recording.model}
+    configured = drive.configuration.with_values(
+        {**base_values(drive.configuration, False), **recording.degradation.model, **recording.model}
     )
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
     estimator, moments = ContactEstimator(shared.model_arm, shared.timing, own, shared.model), list[EstimatedMoment]()
-    for i, state, dt in arriving(recording, period, seed):
+    for i, state, dt in arriving(recording, period, drive.seed):
         estimator.observe(state, None, dt)
         if i % outer == 0:
             is_moving = bool(recording.speed[i] > EVALUATION.moving)
             moments.append(EstimatedMoment(i * period, estimator.estimate(), is_moving))
-    return _scored(recording, moments, shared.arm, name=name, group=group)
-
-
-def _scored(recording: DriveRecording, moments: Sequence[EstimatedMoment], arm: Arm, **more: Any) -> ContactScore:
     contacts = [_contact(touch, moments) for touch in recording.touches if touch.end < moments[-1].time]
     free = quiet(moments, contacts)
     settled = free & during(moments, EVALUATION.observer + 1e-6, np.inf) & np.array([one.is_moving for one in moments])
     warned = [one.estimate.warning is not None for one in compress(moments, free)]
-    truth = np.zeros((len(moments), len(arm.joints.names)))
     return score_of(
-        arm,
+        shared.arm,
         moments,
         contacts,
-        torques=torque_errors(moments, truth, settled),
+        name=drive.degradation,
+        group=IDENTIFIED_ARM if drive.is_identified else drive.contacts,
+        torques=torque_errors(moments, np.zeros((len(moments), len(shared.arm.joints.names))), settled),
         warnings=sum(warned) / max(1, len(warned)),
         contact_seconds=sum(one.end - one.begin for one in contacts if not one.mass),
         masses=tuple(_mass(one, moments) for one in contacts if one.mass),
         failure=recording.failure,
-        **more,
     )
 
 
@@ -244,13 +241,9 @@ def _mass(contact: TrueContact, moments: Sequence[EstimatedMoment]) -> MassOutco
 
 
 def _contact(touch: Touch, moments: Sequence[EstimatedMoment]) -> TrueContact:
-    first, due, late = (
-        next((i for i, one in enumerate(moments) if one.time >= time), len(moments) - 1)
-        for time in (
-            touch.begin,
-            *(min(touch.begin + wait, touch.end) for wait in (EVALUATION.settled, EVALUATION.late)),
-        )
-    )
+    waits = (0.0, EVALUATION.settled, EVALUATION.late)
+    times = [min(touch.begin + wait, touch.end) for wait in waits]
+    first, due, late = np.searchsorted([one.time for one in moments], times).clip(max=len(moments) - 1).tolist()
     force = float(np.linalg.norm(touch.force)) + STANDARD_GRAVITY * touch.mass
     place = touch.place_at(moments[due].time)
     return TrueContact(

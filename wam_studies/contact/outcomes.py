@@ -207,12 +207,6 @@ def _sums(squares: Array) -> tuple[float, ...]:
     return tuple(squares.sum(axis=0).tolist())
 
 
-def alarms(moments: Sequence[EstimatedMoment], free: Mask) -> int:
-    """Detections that start without contact; one that continues from a true contact ends late, and is no new alarm."""
-    alarm = np.array([one.estimate.in_contact for one in moments])
-    return int((alarm[1:] & ~alarm[:-1] & free[1:]).sum())
-
-
 class MassOutcome(NamedTuple):
     """What was reported of a mass while the tool carried it.
 
@@ -283,11 +277,13 @@ def score_of(
 ) -> ContactScore:
     """Score a run; `more` are other fields of the score."""
     free = quiet(moments, contacts)
+    alarm = np.array([one.estimate.in_contact for one in moments])
     counted = [contact for contact in contacts if contact.counts]
     return ContactScore(
         outcomes=[outcome_of(one, moments, arm.covers.length_of(one.cover)) for one in counted],
         free_seconds=(moments[1].time - moments[0].time) * int(free.sum()),
-        alarms=alarms(moments, free),
+        # one that continues from a true contact ends late, and is no new alarm
+        alarms=int((alarm[1:] & ~alarm[:-1] & free[1:]).sum()),
         excluded=len(contacts) - len(counted),
         **more,
     )

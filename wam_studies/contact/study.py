@@ -9,23 +9,23 @@ import numpy as np
 
 from wam_description.configuration import Configuration
 from wam_studies.contact.degradations import IDENTIFIED, NAMES
-from wam_studies.contact.drives import CONTACTS, TIMES, Drive, record, replay
+from wam_studies.contact.drives import TIMES, Drive, record, replay
 from wam_studies.contact.outcomes import ContactOutcome, ContactScore
 from wam_studies.contact.rows import (
-    IDENTIFIED_ARM,
     MEDIANS,
     degraded_rows,
     degraded_tables,
     error_of,
+    in_groups,
     near,
     on_outer_link,
     stated_rows,
 )
-from wam_studies.contact.scenarios import KINDS, RANGES, BenchmarkScenario, ScenarioGenerator
+from wam_studies.contact.scenarios import GROUPS, KINDS, RANGES, BenchmarkScenario, ScenarioGenerator
 from wam_studies.contact.simulation import play, score
 from wam_studies.figures.panels import Panel, Panels, line_only, measured
 from wam_studies.harness import Study, option
-from wam_studies.scores import Row, Scores, ScoreTable
+from wam_studies.scores import Scores, ScoreTable
 
 ALL = "all"
 BINS = 6  # of the picture
@@ -48,8 +48,7 @@ def play_case(case: ContactCase) -> ContactScore:
     given = case.given
     if isinstance(given, BenchmarkScenario):
         return score(play(case.configuration, given), case.configuration.shared.arm)
-    group = IDENTIFIED_ARM if given.is_identified else given.contacts
-    return replay(given.configuration, given.degradation, group, record(given), given.seed)
+    return replay(given, record(given))
 
 
 @dataclass(frozen=True)
@@ -98,10 +97,8 @@ class ContactStudy(Study[ContactCase, ContactScore]):
 
     def score(self, records: Sequence[ContactScore]) -> Scores:
         """Rows of the arm as stated, then of degradations."""
-        arm = self.configuration.shared.arm
-        scenarios, drives = _of_both(records)
-        rows: list[Row] = [*stated_rows(scenarios, arm), *degraded_rows(drives)]
-        return Scores(rows, [_extent(scenarios), *degraded_tables(drives)])
+        rows = [*stated_rows(records, self.configuration.shared.arm), *degraded_rows(records)]
+        return Scores(rows, [_extent(in_groups(records, *GROUPS)), *degraded_tables(records)])
 
     def failure(self, record: ContactScore) -> str:
         """Why a case ended early."""
@@ -109,14 +106,8 @@ class ContactStudy(Study[ContactCase, ContactScore]):
 
     def panels(self, records: Sequence[ContactScore]) -> Panels:
         """Position errors and calibration on the arm as stated."""
-        found = on_outer_link(_of_both(records)[0], self.configuration.shared.arm)
+        found = on_outer_link(records, self.configuration.shared.arm)
         return _errors(found), _deviations(found)
-
-
-def _of_both(records: Sequence[ContactScore]) -> tuple[list[ContactScore], list[ContactScore]]:
-    """Scores of scenarios, and of drives."""
-    of_drives = (*CONTACTS, IDENTIFIED_ARM)
-    return [one for one in records if one.group not in of_drives], [one for one in records if one.group in of_drives]
 
 
 def _extent(scenarios: Sequence[ContactScore]) -> ScoreTable:
@@ -147,14 +138,9 @@ def _deviations(found: Sequence[ContactOutcome]) -> Panel:
     given = [one for one in found if one.right_link and math.isfinite(one.error) and one.position_sd > 0.0]
     sd = CENTIMETRES * np.array([one.position_sd for one in given])
     error = CENTIMETRES * np.array([one.error for one in given])
-    groups = _bins(sd)
+    groups = np.array_split(np.argsort(sd), BINS) if len(sd) >= BINS else []  # of equal number, from small to large
     middle = np.array([np.median(sd[group]) for group in groups])
     inner = np.array([np.quantile(error[group], 0.683) for group in groups])
     ends = np.array([0.3, 15.0])
     lines = [("68 % quantile of the error", measured(middle, inner)), ("one reported sd", line_only(ends, ends))]
     return Panel("reported standard deviation", "reported sd of the position [cm]", "error [cm]", lines, "xy")
-
-
-def _bins(values: np.ndarray) -> list[np.ndarray]:
-    """Places of the values in groups of equal number, from small to large; none of too few."""
-    return np.array_split(np.argsort(values), BINS) if len(values) >= BINS else []

@@ -3,8 +3,7 @@
 study              every kind of fault, its trials in the harness
 trials             what a trial is, the limits of motion, force and delay, the nodes that trials share
 message_faults     messages broken field by field, stamp by stamp, byte by byte
-bag_faults         bags broken at random, and what a reader makes of them
-messages, parameter_sets, disks, bags   trials on the nodes in one process
+messages, parameter_sets   trials on the nodes in one process
 losses             nodes in processes of their own, and trials on them
 interruptions      Ctrl-C at random moments of the demonstration
 soak               a long run, its memory and its losses

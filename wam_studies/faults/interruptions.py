@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from random import Random
 from tempfile import TemporaryDirectory
 from typing import Final
 
@@ -21,8 +20,7 @@ MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the proce
 
 def play(case: FaultCase) -> FaultTrial:
     """A trial of one demonstration."""
-    chance = Random(f"interruptions {case.seed} {case.number}")
-    moment = chance.uniform(FAULTS.python, FAULTS.starting if case.number % 2 else FAULTS.playing)
+    moment = case.chance.uniform(FAULTS.python, FAULTS.starting if case.number % 2 else FAULTS.playing)
     KEPT.discard()  # the demonstration is alone in its network
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # a process of a batch blocks it, and its children
     with TemporaryDirectory(prefix="wam_faults_") as folder:

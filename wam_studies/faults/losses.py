@@ -3,13 +3,11 @@
 import math
 import signal
 import time
-from collections import deque
 from functools import partial
-from random import Random
 from typing import Any, Final
 
 from wam_description.configuration import Configuration
-from wam_description.signals import BASE, ZERO, NodeStatus, State, Wrench
+from wam_description.signals import BASE, ZERO, State, Wrench
 from wam_description.wiring import Call
 from wam_ros.bring_up import NodeProcess
 from wam_ros.client import StackClient
@@ -40,7 +38,6 @@ class NodeProcesses(StackClient):
     current_stamp : newest stamp of a motor current that is not zero, ns.
     q : true joint angles.
     force : largest true force since it was set, N.
-    reports : last texts of all nodes.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -51,7 +48,6 @@ class NodeProcesses(StackClient):
             if name in configuration.shared.nodes
         }
         self.stamps = dict.fromkeys(self.processes, 0)
-        self.reports: deque[str] = deque(maxlen=200)
         self.current_stamp = 0
         self.q: list[float] = []
         self.force = 0.0
@@ -70,11 +66,6 @@ class NodeProcesses(StackClient):
             process.close()
         super().close()
 
-    @property
-    def ended(self) -> list[str]:
-        """Names of the nodes that do not run."""
-        return [name for name, process in self.processes.items() if process.code is not None]
-
     def _answered(self, name: str, stamp: int, value: Any) -> None:
         self.stamps[name] = stamp
         if name == "transform" and self._hold:
@@ -82,8 +73,7 @@ class NodeProcesses(StackClient):
             self.send("force_command", stamp, Wrench(BASE, ZERO, ZERO))
 
     def _take_currents(self, stamp: int, value: State) -> None:
-        if any(value.effort):
-            self.current_stamp = stamp
+        self.current_stamp = stamp if any(value.effort) else self.current_stamp
 
     def _take_angles(self, stamp: int, value: State) -> None:
         self.q = value.position
@@ -91,41 +81,32 @@ class NodeProcesses(StackClient):
     def _take_force(self, stamp: int, value: Wrench) -> None:
         self.force = max(self.force, math.hypot(*value.force))
 
-    def take_status(self, status: NodeStatus) -> None:
-        """Keep its texts."""
-        self.reports.append(f"{status.node}: {status.message} {status.fault}")
-
     def watch(self, seconds: float) -> None:
         """Let time pass."""
         self.wait(lambda: False, seconds)
 
     def enabled(self) -> str:
         """Do what an operator does; returns why the arm cannot be enabled, '' where it is and stays so."""
-        end = time.monotonic() + FAULTS.recovered
-        reason = ""
-        while time.monotonic() < end:
-            self._hold = []
-            self.request(Call("driver", "reset_fault"), FAULTS.answered)
-            reason = self.request(Call("driver", "enable", True), FAULTS.answered).message
-            silent = self._silent()
-            if not silent:
-                self._hold = list(self.q)
-                self.watch(0.1)
-                if self.mode == "enabled":
-                    return ""
-            found = self.statuses.get("driver")
-            reason += f"; silent: {', '.join(silent) or 'none'}; {found.message if found else 'no status'}"
-        return f"the arm cannot be enabled within {FAULTS.recovered:g} s: {reason}"
+        end, reason = time.monotonic() + FAULTS.recovered, "not tried"
+        while reason and time.monotonic() < end:
+            reason = self._attempt()
+        return reason and f"the arm cannot be enabled within {FAULTS.recovered:g} s: {reason}"
 
-    def _silent(self) -> list[str]:
-        """Nodes that do not answer within a second."""
+    def _attempt(self) -> str:
+        self._hold = []
+        self.request(Call("driver", "reset_fault"), FAULTS.answered)
+        reason = self.request(Call("driver", "enable", True), FAULTS.answered).message
         before = dict(self.stamps)
 
         def silent() -> list[str]:
             return [name for name, stamp in before.items() if self.stamps[name] <= stamp]
 
-        self.wait(lambda: not silent(), 1.0)
-        return silent()
+        if self.wait(lambda: not silent(), 1.0):
+            self._hold = list(self.q)
+            self.watch(0.1)
+            if self.mode == "enabled":
+                return ""
+        return f"{reason}; silent: {', '.join(silent()) or 'none'}; {self.statuses.get('driver')}"
 
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
@@ -135,23 +116,21 @@ FEEDBACK: Final = {"timing.timeout": 2.0, "force_loop:feedback": "contact_estima
 
 def play(case: FaultCase) -> FaultTrial:
     """A trial of one loss."""
-    chance = Random(f"losses {case.seed} {case.number}")
     chain: NodeProcesses = KEPT.ready(NodeProcesses, case.configuration)
     names = list(chain.processes)
     name = names[case.number % len(names)]
-    trial = _lost(case, chain, name, WAYS[case.number // len(names) % len(WAYS)], chance)
+    trial = _lost(case, chain, name, WAYS[case.number // len(names) % len(WAYS)])
     if trial.escapes:
         KEPT.discard()
     return trial
 
 
-def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals, chance: Random) -> FaultTrial:
-    what = f"{name} {way.name}"
+def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals) -> FaultTrial:
+    what, chance = f"{name} {way.name}", case.chance
     if reason := chain.enabled():
         return FaultTrial(case.kind, what, 1, (f"before: {reason}",))
     chain.watch(chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
-    chain.reports.clear()
     process = chain.processes[name]
     process.send(way)
     delay, escapes = math.nan, list[str]()
@@ -161,11 +140,10 @@ def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals,
         delay = _noticed(chain, name, escapes)
     if way == signal.SIGSTOP:
         process.send(signal.SIGCONT)
-    else:
-        chain.wait(lambda: name in chain.ended, FAULTS.noticed)
-        process.send(signal.SIGKILL)
-        chain.wait(lambda: name in chain.ended, FAULTS.noticed)
-    if others := [one for one in chain.ended if one != name]:
+    elif not chain.wait(lambda: process.code is not None, FAULTS.noticed):
+        process.kill()
+    others = [one for one, other in chain.processes.items() if one != name and other.code is not None]
+    if others:
         escapes.append(f"{', '.join(others)} ended, too")
     if way != signal.SIGSTOP:
         process.start()
@@ -188,8 +166,7 @@ def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:
     delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
     if delay > FAULTS.zero_current:
         escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
-    texts = " ".join(chain.reports)
+    texts = " ".join(f"{one.message} {one.fault}" for one in chain.statuses.values())
     if name not in texts and ANSWERS[name] not in texts:
-        found = chain.statuses.get("driver")
-        escapes.append(f"not named: '{found.fault if found else ''}'")
+        escapes.append(f"not named: '{chain.statuses['driver'].fault}'")
     return delay

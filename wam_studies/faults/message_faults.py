@@ -42,6 +42,11 @@ class MessageLeaf(NamedTuple):
         return getattr(self.owner, self.name)
 
     @property
+    def is_real(self) -> bool:
+        """Whether it has real numbers."""
+        return self.kind.removeprefix("sequence<").startswith(("double", "float"))
+
+    @property
     def is_sequence(self) -> bool:
         """Whether it has a number of values."""
         return self.kind.startswith("sequence")
@@ -84,10 +89,6 @@ def _field(is_meant: Callable[[MessageLeaf], bool], value: Callable[[MessageLeaf
 def _numbers(values: tuple[float, ...]) -> Change:
     """One of the values in one number of a message, or in all of an array."""
 
-    def is_number(leaf: MessageLeaf) -> bool:
-        is_float = leaf.kind.removeprefix("sequence<").startswith(("double", "float"))
-        return is_float and not (leaf.is_sequence and not len(leaf.value))
-
     def changed(leaf: MessageLeaf, chance: Random) -> Any:
         value = chance.choice(values)
         if not leaf.is_sequence:
@@ -97,7 +98,7 @@ def _numbers(values: tuple[float, ...]) -> Change:
             numbers[i] = value
         return numbers
 
-    return _field(is_number, changed)
+    return _field(lambda leaf: leaf.is_real and not (leaf.is_sequence and not len(leaf.value)), changed)
 
 
 def _length(leaf: MessageLeaf, chance: Random) -> Any:
@@ -172,12 +173,6 @@ def _stamp(time: Callable[[Random, int], int]) -> Change:
     return lambda message, chance, now: set_stamp(message, time(chance, now))
 
 
-def _too_many_nanoseconds(message: Message, chance: Random, now: int) -> bool:
-    return hasattr(message, "header") and MessageLeaf(message.header.stamp, "nanosec", "").put(
-        chance.randrange(SECOND, 2**32)
-    )
-
-
 def _unchanged(message: Message, chance: Random, now: int) -> bool:
     return True
 
@@ -185,23 +180,20 @@ def _unchanged(message: Message, chance: Random, now: int) -> bool:
 # bytes
 
 
-def garbage(data: bytes, chance: Random) -> bytes:
-    """Bytes that are no message: random, cut, with bits flipped, of the other byte order, or too long."""
-    way = chance.randrange(6)
-    if way == 0:
-        return chance.randbytes(chance.choice([0, 1, 3, 4, 7, 8, 11, 12, 16, 50, 500, 4000]))
-    if way == 1:
-        return data[: chance.randrange(len(data))]
-    if way == 2:
-        return b"\0\0\0\0" + data[4:]  # declared big-endian, is little-endian
-    if way == 3:
-        return data[:4] + chance.randbytes(len(data) - 4)
-    out = bytearray(data)
-    if way == 4:  # a count or a length far too large
-        at = 4 * chance.randrange(1, max(2, len(out) // 4))
-        out[at : at + 4] = struct.pack("<I", chance.choice([2**31, 2**32 - 1, 2**16]))
-        return bytes(out)
-    return data[:4] + struct.pack("<I", 2**32 - 1) * chance.randrange(1, 60)
+def _miscounted(data: bytes, chance: Random) -> bytes:
+    """A count or a length far too large."""
+    at = 4 * chance.randrange(1, max(2, len(data) // 4))
+    return data[:at] + struct.pack("<I", chance.choice([2**31, 2**32 - 1, 2**16])) + data[at + 4 :]
+
+
+NO_MESSAGES: Final[tuple[Callable[[bytes, Random], bytes], ...]] = (  # bytes that are no message
+    lambda data, chance: chance.randbytes(chance.choice([0, 1, 3, 4, 7, 8, 11, 12, 16, 50, 500, 4000])),
+    lambda data, chance: data[: chance.randrange(len(data))],
+    lambda data, chance: b"\0\0\0\0" + data[4:],  # declared big-endian, is little-endian
+    lambda data, chance: data[:4] + chance.randbytes(len(data) - 4),
+    _miscounted,
+    lambda data, chance: data[:4] + struct.pack("<I", 2**32 - 1) * chance.randrange(1, 60),
+)
 
 
 # the faults
@@ -241,7 +233,11 @@ MESSAGE_FAULTS: Final = (
     MessageFault("names in another order", False, _permuted),
     MessageFault("an extreme integer", True, _field(_is_integer, _extreme)),
     *(MessageFault(f"a stamp of the {name}", True, _stamp(time)) for name, time in STAMPS.items()),
-    MessageFault("a stamp of too many nanoseconds", True, _too_many_nanoseconds),
+    MessageFault(
+        "a stamp of too many nanoseconds",
+        True,
+        _field(lambda leaf: leaf.name == "nanosec", lambda leaf, chance: chance.randrange(SECOND, 2**32)),
+    ),
     MessageFault("the same message again", False, _unchanged),
     MessageFault(GARBAGE, True, _unchanged),
 )
@@ -254,7 +250,7 @@ def broken(
     if not fault.change(message, chance, now):
         return None
     data = serialize(message)
-    return garbage(data, chance) if fault.name == GARBAGE else data
+    return chance.choice(NO_MESSAGES)(data, chance) if fault.name == GARBAGE else data
 
 
 # values that would move the arm

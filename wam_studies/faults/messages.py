@@ -53,7 +53,7 @@ def play(case: FaultCase) -> FaultTrial:
     """A trial of `FAULTS.messages` messages."""
     topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
     todo = plan(topics, case.seed, case.number)
-    return watched_trial(case, todo.name, partial(_send, todo, Random(f"messages {case.seed} {case.number}")))
+    return watched_trial(case, todo.name, partial(_send, todo, case.chance))
 
 
 def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:

@@ -4,7 +4,7 @@ A set is in and out of range, of wrong types, of unknown types, in part good and
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from random import Random
 from typing import Any, Final, NamedTuple
@@ -19,16 +19,16 @@ from wam_description.parameters import Field, fields
 from wam_studies.faults.trials import FAULTS, KEPT, FaultCase, FaultTrial
 from wam_studies.faults.watched_stack import WatchedStack, watched_trial
 
-# type codes of rcl_interfaces/ParameterType
-BOOL, INTEGER, DOUBLE, STRING = 1, 2, 3, 4
-ARRAYS: Final = {BOOL: 6, INTEGER: 7, DOUBLE: 8, STRING: 9}
-CODES: Final = {bool: BOOL, int: INTEGER, float: DOUBLE, str: STRING}
+# type codes of rcl_interfaces/ParameterType by the type of the value; that of an array is greater by 5
+CODES: Final = {bool: 1, int: 2, float: 3, str: 4}
+OF_ARRAY: Final = 5
 UNKNOWN_CODES: Final = (10, 11, 77, 200, 255)
-EXTREMES: Final = {
-    BOOL: (True, False),
-    INTEGER: (-(2**63), 2**63 - 1, 0, -1),
-    DOUBLE: (math.nan, math.inf, -math.inf, 1.7e308, -1.7e308, 5e-324, -1.0, 1e9),
-    STRING: ("", "x" * 5000, "\x1b[2J", "\U0001f9be", "nan"),
+UNKNOWN_NAMES: Final = ("x", "x" * 2000, "timing.", "\x1b[2J", "qos_overrides")
+EXTREMES: Final[dict[type, tuple[Any, ...]]] = {
+    bool: (True, False),
+    int: (-(2**63), 2**63 - 1, 0, -1),
+    float: (math.nan, math.inf, -math.inf, 1.7e308, -1.7e308, 5e-324, -1.0, 1e9),
+    str: ("", "x" * 5000, "\x1b[2J", "\U0001f9be", "nan"),
 }
 
 
@@ -51,12 +51,12 @@ class ParameterSet(NamedTuple):
     """
 
     name: str
-    assignments: tuple[Assignment, ...]
+    assignments: Sequence[Assignment]
     is_wrong: bool
 
 
 def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: Random) -> ParameterSet:
-    """A set for a node, drawn at random.
+    """A set for a node, drawn at random: one of each kind, of which one is taken.
 
     Parameters
     ----------
@@ -66,68 +66,50 @@ def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: R
     """
     live = [field for field in fields if field.live]
     field = chance.choice(live if live and chance.random() < 0.8 else fields)
-    good = [_scaled(one, present[one.name], chance) for one in chance.sample(live, min(len(live), chance.randrange(4)))]
-    way = chance.randrange(8)
-    if way == 0 and live:
-        many = chance.sample(live, chance.randrange(1, len(live) + 1))
-        near = tuple(_scaled(one, present[one.name], chance) for one in many)
-        return ParameterSet("values near the present ones", near, False)
-    if way == 1:
-        return ParameterSet("no parameter", (), False)
-    value = present[field.name]
-    if way == 6:
-        twice = tuple(_scaled(field, value, chance) for _ in range(2))
-        return ParameterSet("one name twice", twice, False)
-    name, bad, is_wrong = _bad(way, field, value, chance)
-    others = [one for one in good if one.name != bad.name]
-    others.insert(chance.randrange(len(others) + 1), bad)
-    return ParameterSet(name, tuple(others), is_wrong)
+    value, near = present[field.name], [_scaled(one, present[one.name], chance) for one in live]
+    others = [one for one in chance.sample(near, min(len(near), 3)) if one.name != field.name]
+    kind = chance.choice([kind for kind in CODES if kind is not field.kind])
+    other, is_array = chance.choice(EXTREMES[kind]), chance.random() < 0.5
+    extreme, some = _extreme(field, value, chance), chance.sample(near, chance.randint(min(1, len(near)), len(near)))
 
+    def among(name: str, code: int, value: Any) -> list[Assignment]:
+        return chance.sample(found := [*others, Assignment(name, code, value)], len(found))
 
-def _bad(way: int, field: Field, value: Any, chance: Random) -> tuple[str, Assignment, bool]:
-    """What is wrong with an assignment, in words; the assignment; whether it has to be refused."""
-    if way == 2:
-        return "an unknown type code", Assignment(field.name, chance.choice(UNKNOWN_CODES), value), True
-    if way == 3:
-        kind = chance.choice([kind for kind in CODES.values() if kind != CODES[field.kind]])
-        code = ARRAYS[kind] if chance.random() < 0.5 else kind
-        other = chance.choice(EXTREMES[kind])
-        return "another type", Assignment(field.name, code, [other] if code != kind else other), True
-    if way == 4:
-        name = chance.choice(["x", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"])
-        return "an unknown name", Assignment(name, DOUBLE, 1.0), True
-    if way == 5 and field.is_array:
+    sets = {
+        "values near the present ones": (some, False),
+        "no parameter": ([], False),
+        "one name twice": ([_scaled(field, value, chance) for _ in range(2)], False),
+        "an unknown type code": (among(field.name, chance.choice(UNKNOWN_CODES), value), True),
+        "another type": (among(field.name, CODES[kind] + OF_ARRAY * is_array, [other] if is_array else other), True),
+        "an unknown name": (among(chance.choice(UNKNOWN_NAMES), CODES[float], 1.0), True),
+        "an extreme value": (among(*extreme), not field.live or _is_outside(field, extreme.value)),
+    }
+    if field.is_array:
         values = list(value)
-        values = chance.choice([[], values[:-1], [*values, *values[:1]], values * 1000])
-        return "an array of another length", Assignment(field.name, ARRAYS[CODES[field.kind]], values), False
-    extreme = _extreme(field, value, chance)
-    return "an extreme value", extreme, not field.live or _is_outside(field, extreme.value)
+        lengths = [[], values[:-1], [*values, *values[:1]], values * 1000]
+        sets["an array of another length"] = (among(field.name, _code(field), chance.choice(lengths)), False)
+    name = chance.choice(list(sets))
+    return ParameterSet(name, *sets[name])
 
 
 def _code(field: Field) -> int:
-    return ARRAYS[CODES[field.kind]] if field.is_array else CODES[field.kind]
+    return CODES[field.kind] + OF_ARRAY * field.is_array
 
 
 def _scaled(field: Field, value: Any, chance: Random) -> Assignment:
     """A value between a fifth and five times the present one."""
-
-    def scaled(one: Any) -> Any:
-        if field.kind is float:
-            return one * 5.0 ** chance.uniform(-1.0, 1.0)
-        if field.kind is int and not isinstance(one, bool):
-            return max(0, one + chance.choice([-1, 0, 1, 5]))
-        return not one if field.kind is bool else one
-
-    return Assignment(field.name, _code(field), [scaled(one) for one in value] if field.is_array else scaled(value))
+    factor = 5.0 ** chance.uniform(-1.0, 1.0)
+    scaled = [one * factor if field.kind is float else one for one in (value if field.is_array else [value])]
+    return Assignment(field.name, _code(field), scaled if field.is_array else scaled[0])
 
 
 def _extreme(field: Field, value: Any, chance: Random) -> Assignment:
-    extreme = chance.choice(EXTREMES[CODES[field.kind]])
-    if not field.is_array:
-        return Assignment(field.name, _code(field), extreme)
-    values = list(value) or [extreme]
-    values[chance.randrange(len(values))] = extreme
-    return Assignment(field.name, _code(field), values)
+    extreme = chance.choice(EXTREMES[field.kind])
+    if field.is_array:
+        values = list(value) or [extreme]
+        values[chance.randrange(len(values))] = extreme
+        extreme = values
+    return Assignment(field.name, _code(field), extreme)
 
 
 def _is_outside(field: Field, value: Any) -> bool:
@@ -154,8 +136,7 @@ def play(case: FaultCase) -> FaultTrial:
     """A trial of one set."""
     stack: WatchedStack = KEPT.ready(WatchedStack, case.configuration)
     name = sorted(stack.nodes)[case.number % len(stack.nodes)]
-    chance = Random(f"parameters {case.seed} {case.number}")
-    todo = parameter_set(_fields(stack, name), _present(stack, name), chance)
+    todo = parameter_set(_fields(stack, name), _present(stack, name), case.chance)
     trial = watched_trial(case, f"{name}, {todo.name}", partial(_try, name, todo))
     if trial.escapes:
         KEPT.discard()  # its parameters may have changed
@@ -174,10 +155,8 @@ def _fields(stack: WatchedStack, name: str) -> list[Field]:
 
 
 def _present(stack: WatchedStack, name: str) -> dict[str, Any]:
-    node = stack.nodes[name]
-    found = {one.name: node.get_parameter(one.name).value for one in _fields(stack, name)}
-    return {key: list(value) if hasattr(value, "__iter__") and not isinstance(value, str) else value
-            for key, value in found.items()}  # fmt: skip
+    values = {one: stack.nodes[name].get_parameter(one.name).value for one in _fields(stack, name)}
+    return {one.name: list(value) if one.is_array else value for one, value in values.items()}
 
 
 def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
@@ -185,32 +164,33 @@ def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
     before = _present(stack, name)
     client = stack.client(SetParametersAtomically, f"{name}/set_parameters_atomically")
     stack.wait(client.service_is_ready, 2.0)
-    answer = _answer(stack, client, [message(one) for one in todo.assignments])
-    if answer is None:
+
+    def answer(assignments: Iterable[Assignment]) -> Any:
+        request = SetParametersAtomically.Request(parameters=list(map(message, assignments)))
+        found = stack.answer(client, request, FAULTS.answered, FAULTS.answered)
+        return found and found.result
+
+    answered = answer(todo.assignments)
+    if not answered:
         stack.escapes.append("no answer to the set")
         return 1
     after = _present(stack, name)
-    changed = [key for key in before if before[key] != after[key] and repr(before[key]) != repr(after[key])]
-    if not answer.successful and changed:
-        stack.escapes.append(f"refused, but {changed[0]} has changed")
-    if answer.successful and todo.is_wrong:
-        stack.escapes.append(f"accepted: {str(todo.assignments)[-200:]}")
-    if not answer.successful and not answer.reason:
-        stack.escapes.append("refused without a reason")
-    if answer.successful and changed:
+    changed = [key for key in before if repr(before[key]) != repr(after[key])]
+    for escape, holds in {
+        f"refused, but {changed} has changed": changed and not answered.successful,
+        f"accepted: {str(todo.assignments)[-200:]}": answered.successful and todo.is_wrong,
+        "refused without a reason": not answered.successful and not answered.reason,
+    }.items():
+        if holds:
+            stack.escapes.append(escape)
+    if answered.successful and changed:
         _push(stack)
-        kinds = {one.name: one for one in todo.assignments}
-        back = [message(kinds[key]._replace(value=before[key])) for key in changed if key in kinds]
-        undone = _answer(stack, client, back)
-        if undone is None or not undone.successful:
+        back = [one._replace(value=before[one.name]) for one in todo.assignments if one.name in changed]
+        undone = answer(back)
+        if not (undone and undone.successful):
             stack.escapes.append("the values before are refused")
     stack.run(0.005)
     return 1
-
-
-def _answer(stack: WatchedStack, client: Any, parameters: list[Parameter]) -> Any:
-    future = client.call_async(SetParametersAtomically.Request(parameters=parameters))
-    return future.result().result if stack.wait(future.done, 3.0) else None
 
 
 def _push(stack: WatchedStack) -> None:

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from wam_studies.faults import bags, disks, interruptions, losses, messages, parameter_sets
+from wam_studies.faults import interruptions, losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
 from wam_studies.harness import Study, option
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, ScoreTable, exact
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, named
 
 LOCKSTEP: Final = {"timing.mode": "lockstep"}
 # how many periods are late depends on what else the computer does; nothing here is about that
@@ -20,13 +20,11 @@ class FaultKind(NamedTuple):
 
     Attributes
     ----------
-    unit : of `FaultTrial.size`, plural.
     full, short : number of trials.
     play : plays a trial.
     values : of the configuration.
     """
 
-    unit: str
     full: int
     short: int
     play: Callable[[FaultCase], FaultTrial]
@@ -34,18 +32,16 @@ class FaultKind(NamedTuple):
 
 
 KINDS: Final = {
-    "messages": FaultKind("messages", 960, 2, messages.play, LOCKSTEP),
-    "messages-realtime": FaultKind("messages", 960, 1, messages.play, REALTIME),
-    "floods": FaultKind("messages", 80, 1, messages.play_flood, LOCKSTEP),
-    "floods-realtime": FaultKind("messages", 80, 1, messages.play_flood, REALTIME),
-    "parameters": FaultKind("sets", 2000, 5, parameter_sets.play, LOCKSTEP),
-    "losses": FaultKind("losses", 108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
-    "losses-realtime": FaultKind("losses", 108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
-    "publishers": FaultKind("publishers", 60, 2, messages.play_second, LOCKSTEP),
-    "publishers-realtime": FaultKind("publishers", 60, 1, messages.play_second, REALTIME),
-    "disks": FaultKind("disks", 12, 1, disks.play, LOCKSTEP),
-    "bags": FaultKind("bags", 3000, 10, bags.play, LOCKSTEP),
-    "interruptions": FaultKind("interruptions", 100, 0, interruptions.play, {}),
+    "messages": FaultKind(960, 2, messages.play, LOCKSTEP),
+    "messages-realtime": FaultKind(960, 1, messages.play, REALTIME),
+    "floods": FaultKind(80, 1, messages.play_flood, LOCKSTEP),
+    "floods-realtime": FaultKind(80, 1, messages.play_flood, REALTIME),
+    "parameters": FaultKind(2000, 5, parameter_sets.play, LOCKSTEP),
+    "losses": FaultKind(108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
+    "losses-realtime": FaultKind(108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
+    "publishers": FaultKind(60, 2, messages.play_second, LOCKSTEP),
+    "publishers-realtime": FaultKind(60, 1, messages.play_second, REALTIME),
+    "interruptions": FaultKind(100, 0, interruptions.play, {}),
 }
 
 
@@ -58,7 +54,7 @@ def run_fault(case: FaultCase) -> FaultTrial:
 class FaultStudy(Study[FaultCase, FaultTrial]):
     """Trials of each kind."""
 
-    title = "wrong messages, lost nodes, full disks, Ctrl-C"
+    title = "wrong messages, wrong parameters, lost nodes, Ctrl-C"
     page = "docs/safety.md"
     seeds = (1,)
     over_topics = True
@@ -89,24 +85,14 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
         """Trials of each kind from which something escaped, and the worst values."""
         every = {name: [one for one in records if one.kind == name] for name in self.kinds}
         by_kind = {name: own for name, own in every.items() if own}
-        rows = [
-            Row(f"escapes, {name}", exact(sum(bool(one.escapes) for one in own), len(own)), required=NONE_AT_ALL)
-            for name, own in by_kind.items()
-        ]
-        head = ("kind", "tried", "largest motion [rad]", "largest force [N]", "zero current or answer after [ms]")
-        worst = [
-            [
-                name,
-                f"{sum(one.size for one in own)} {KINDS[name].unit}",
-                _largest([one.motion for one in own], 1.0, 4),
-                _largest([one.force for one in own], 1.0, 1),
-                _largest([one.delay for one in own], 1e3, 0),
-            ]
-            for name, own in by_kind.items()
-        ]
-        return Scores(rows, [ScoreTable("Worst values", head, worst)])
+        rows = [row for name, own in by_kind.items() for row in named(list(_rows(own))[:1], name)]
+        return Scores(rows, [by_group("Worst values", by_kind, _rows)])
 
 
-def _largest(values: Sequence[float], scale: float, digits: int) -> str:
-    known = [scale * value for value in values if not math.isnan(value)]
-    return f"{max(known):.{digits}f}" if known else "–"
+def _rows(trials: Sequence[FaultTrial]) -> Iterator[Row]:
+    """What escaped from the trials of a kind, and their largest values."""
+    yield Row("escapes", exact(sum(bool(one.escapes) for one in trials), len(trials)), required=NONE_AT_ALL)
+    yield Row("messages, sets, nodes and so on", exact(sum(one.size for one in trials), len(trials)))
+    for name, unit, scale in (("motion", "rad", 1.0), ("force", "N", 1.0), ("delay", "ms", 1e3)):
+        known = [value for one in trials if not math.isnan(value := getattr(one, name))]
+        yield Row(f"largest {name}", exact(max(known, default=math.nan), len(known)), unit, scale)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from random import Random
 from typing import Any, NamedTuple
 
 from wam_description.configuration import Configuration
@@ -38,8 +39,6 @@ class FaultLimits:
     noticed: float = 5.0  # s, in which a loss must be reported
     recovered: float = 20.0  # s, in which an operator gets an enabled arm again
     frozen: tuple[float, float] = (0.2, 1.5)  # s that a driver is frozen
-    reported: float = 10.0  # s, in which a full or removed disk must be reported
-    room: tuple[int, ...] = (0, 3_000, 100_000)  # bytes that a full disk still takes
 
     python: float = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own
     starting: float = 4.0  # s, before which one half of the moments of a Ctrl-C is
@@ -70,6 +69,11 @@ class FaultCase(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.kind} {self.number}, seed {self.seed}"
+
+    @property
+    def chance(self) -> Random:
+        """Random numbers of this trial: those in lockstep have the same as those in realtime."""
+        return Random(f"{self.kind.partition('-')[0]} {self.seed} {self.number}")
 
 
 class FaultTrial(NamedTuple):

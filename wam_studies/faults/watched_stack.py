@@ -3,10 +3,12 @@
 import math
 import time
 import traceback
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
@@ -59,7 +61,6 @@ class WatchedStack(StackClient):
     allowed_motion, allowed_force : above which they are an escape.
     """
 
-    clock = staticmethod(worked)
     _anchor: list[float]
     _held: list[float]
     escapes: list[str]
@@ -93,15 +94,9 @@ class WatchedStack(StackClient):
         for name, row in self.topics.items():
             take = self._watching(name, message_type(row))
             self.node.create_subscription(message_type(row), name, take, listening(row), raw=True)
-        for what, until in {
-            "services": lambda: all(
-                self.service(Call("driver", name))[0].service_is_ready() for name in ("estop", "reset_fault")
-            ),
-            "start of the arm's time": lambda: self.driver.stamp > 20 * shared.timing.outer_period_ns,
-        }.items():
-            if not self.wait(until, FAULTS.longest_start):
-                self.close()
-                raise TimeoutError(f"no {what} within {FAULTS.longest_start:g} s")
+        if not self.wait(lambda: self.driver.stamp > 20 * shared.timing.outer_period_ns, FAULTS.longest_start):
+            self.close()
+            raise TimeoutError(f"the arm's time does not start within {FAULTS.longest_start:g} s")
 
     def close(self) -> None:
         """Destroy all nodes."""
@@ -110,6 +105,7 @@ class WatchedStack(StackClient):
     # what is watched
 
     def _watching(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        is_wrong = np.isinf if topic in UNKNOWN else _is_not_finite
         is_bounded = topic in ("motor_current_command", "motor_currents")
 
         def take(data: bytes) -> None:
@@ -124,7 +120,7 @@ class WatchedStack(StackClient):
                 self._clock.advance()
             if topic == "joint_states":
                 self._command(stamp_of(data))
-            bad = [leaf.name for leaf in leaves(message) if _is_wrong(leaf.value, topic in UNKNOWN)]
+            bad = [leaf.name for leaf in leaves(message) if leaf.is_real and np.any(is_wrong(leaf.value))]
             if bad:
                 self._escape(f"{topic} has {bad[0]} not finite")
             if is_bounded and any(
@@ -272,19 +268,8 @@ class WatchedStack(StackClient):
         publisher.publish(data)
 
 
-def _is_wrong(value: Any, may_be_unknown: bool) -> bool:
-    numbers = [value] if isinstance(value, float) else value if hasattr(value, "typecode") else ()
-    if isinstance(numbers, Collection) and getattr(numbers, "typecode", "d") not in ("d", "f"):
-        return False
-    if may_be_unknown:
-        return any(math.isinf(number) for number in numbers)
-    return not math.isfinite(math.fsum(numbers)) if numbers else False
-
-
-def recorded_into(configuration: Configuration, folder: str) -> dict[str, Any]:
-    """Values that add a recorder, which writes into `folder`/bag."""
-    nodes = [*configuration.shared.nodes, "recorder"]
-    return {"nodes": nodes, "recorder:directory": folder, "recorder:name": "bag"}
+def _is_not_finite(values: ArrayLike) -> NDArray[np.bool_]:
+    return ~np.isfinite(values)
 
 
 def watched_trial(case: FaultCase, name: str, work: Callable[[WatchedStack], int]) -> FaultTrial:

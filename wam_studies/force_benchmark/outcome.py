@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.limit_cycle import limit_cycle
-from wam_description.event import CAUSE, OBEYED, Event
+from wam_description.event import CAUSE, OBEYED, Code, Event
 from wam_description.event_text import sentence
 from wam_description.rigid_body import Array
 from wam_studies.force_benchmark.tasks import RANGES, Task
@@ -52,7 +52,6 @@ class TaskTrace(NamedTuple):
     impact : largest force of the first touch by (3.1), N; 0 where nothing was touched.
     event : why the loop or the driver does not do the task, at the end; OBEYED if it does.
     is_stopped : whether the loop holds the arm instead, or the driver is in fault, at the end.
-    is_fault : whether the driver is in fault.
     predicted_cycle : peak to peak of the limit cycle that the guard reports, N.
     """
 
@@ -62,7 +61,6 @@ class TaskTrace(NamedTuple):
     impact: float
     event: Event
     is_stopped: bool
-    is_fault: bool
     predicted_cycle: float
 
 
@@ -137,7 +135,7 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
     # the first command was obeyed, the second one is declined
     is_below = mean <= (1.0 + OUTCOME.tolerance) * task.force
     is_declined = task.before and peak <= OUTCOME.overshoot * task.before and is_below
-    if trace.is_stopped and not trace.is_fault and (peak <= task.force or is_declined):
+    if trace.is_stopped and trace.event.code is not Code.FAULT and (peak <= task.force or is_declined):
         return TaskEnd.GIVEN_UP
     return TaskEnd.ENDED if trace.event != OBEYED else TaskEnd.SILENT
 

@@ -18,7 +18,7 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
-from wam_studies.identification.plants import mismatch
+from wam_studies.identification.plants import factors, mismatch
 
 Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
@@ -243,9 +243,7 @@ def _conditions(arm: Arm, random: np.random.Generator) -> dict[str, Any]:
         "ramp": float(random.uniform(0.0, RANGES.longest_ramp)) if random.random() < RANGES.ramped else 0.0,
         "mismatch": {
             **mismatch(random, arm, RANGES.mass, RANGES.motor_friction, RANGES.cables),
-            "torque_constant": (
-                1.0 + RANGES.torque_constant * random.uniform(-1.0, 1.0, len(arm.motors.names))
-            ).tolist(),
+            "torque_constant": factors(random, RANGES.torque_constant, arm.motors.names),
         },
     }
 
@@ -314,12 +312,6 @@ def configured(base: Configuration, task: Task) -> Configuration:
     return base.with_values(task_values(base, task))
 
 
-def declared(base: Configuration, task: Task) -> float:
-    """Position, m, at which the user declares the first surface."""
-    length = base.shared.arm.covers.length_of(task.surface.cover)
-    return min(max(task.surface.position + task.mistake, 0.0), length)
-
-
 def task_values(base: Configuration, task: Task) -> dict[str, Any]:
     """What `configured` sets, by parameter."""
     surface, n = task.surface, len(task.q)
@@ -342,7 +334,9 @@ def task_values(base: Configuration, task: Task) -> dict[str, Any]:
         values["model.links.centre"] = np.add(base.shared.model.links.centre, task.centres).tolist()
     values["driver:sensors.strain_noise"] = [task.strain_noise] * n
     if task.is_pinned:
-        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": declared(base, task)}
+        length = base.shared.arm.covers.length_of(surface.cover)
+        place = min(max(surface.position + task.mistake, 0.0), length)  # as the user declares it
+        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": place}
     if surface.frequency:
         along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
         values |= {

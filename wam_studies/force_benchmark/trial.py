@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from wam_control.force.force_loop_parameters import ForceLoopParameters
@@ -15,6 +14,7 @@ from wam_description.mismatch import true_arm
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
+from wam_driver.loads import contact_force
 from wam_sim.simulation import Simulation
 from wam_studies.force_benchmark.controllers import Admittance, TorqueControl, UsualController
 from wam_studies.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
@@ -28,15 +28,6 @@ OTHERS: Mapping[str, tuple[Mapping[str, Any], type[UsualController] | None]] = {
     "admittance": ({}, Admittance),
     "torque control": ({}, TorqueControl),
 }
-
-
-class _Standing(NamedTuple):
-    """What driver and loop report in a period: the last fields of `TaskTrace`."""
-
-    event: Event
-    is_stopped: bool
-    is_fault: bool
-    predicted_cycle: float
 
 
 class ForceTaskCase(NamedTuple):
@@ -149,20 +140,21 @@ class TaskWatch:
                 travel = np.maximum(travel, np.abs(self._along(plant.q) - start))
             forces.append(force)
             standing = self._standing
-            stopped = stopped + period if standing.is_stopped else 0.0
+            stopped = stopped + period if standing[1] else 0.0
         return [
             TaskTrace(np.array(column), period, float(way), impact, *standing)
             for column, way in zip(zip(*forces, strict=True), travel, strict=True)
         ]
 
     @property
-    def _standing(self) -> _Standing:
+    def _standing(self) -> tuple[Event, bool, float]:
+        """What driver and loop report now: the last fields of `TaskTrace`."""
         node, topics = self._node, ("force_command", "task_command")
         cycle = float(node.guard_report.facts.get("limit cycle [N]", 0.0))
         if fault := self._run.driver.safety.fault:
-            return _Standing(Event(Code.FAULT, Level.ERROR, {"reason": fault}), True, True, cycle)
+            return Event(Code.FAULT, Level.ERROR, {"reason": fault}), True, cycle
         event = next((node.refusals[topic] for topic in topics if topic in node.refusals), node.event)
-        return _Standing(event, node.event.holds, False, cycle)
+        return event, node.event.holds, cycle
 
     def _along(self, q: list[float]) -> Array:
         """Position of each touched point along its force, m."""
@@ -177,11 +169,10 @@ class TaskWatch:
         model, data = self._run.driver.plant.model, self._run.driver.plant.data
         total = [0.0] * len(self._directions)
         for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, self._wrench)
-            first, second = data.contact.geom[i].tolist()
-            k = self._surfaces[first if first in self._surfaces else second]
-            on_second = float(self._directions[k] @ data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3])
-            total[k] += -on_second if first in self._surfaces else on_second
+            force = contact_force(model, data, i, self._wrench)  # on the second
+            for geom, sign in zip(data.contact.geom[i].tolist(), (-1.0, 1.0), strict=True):
+                if (k := self._surfaces.get(geom)) is not None:
+                    total[k] += sign * float(self._directions[k] @ force)
         return total
 
     def _impact(self, q: list[float], qd: list[float]) -> float:

@@ -6,6 +6,7 @@ Swevers et al. 1997), within limits of joints and speed, away from obstacles.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +16,9 @@ from wam_analysis.identification.parameters import unknowns
 from wam_analysis.identification.regressor import Regressor
 from wam_control.task.motion import FASTEST
 from wam_control.task.scenario import ScenarioStep
-from wam_description.arm import Arm, Shared
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration
-from wam_description.parameters import ParameterError, build_part
+from wam_description.parameters import ParameterError, build_part, rows
 from wam_description.rigid_body import Array, RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import Obstacles
@@ -55,16 +56,13 @@ def scenario(configuration: Configuration, seed: int, seconds: float) -> dict[st
     ParameterError
         if no move is allowed.
     """
-    steps: list[dict[str, Any]] = [{"name": "release the brakes", "seconds": 0.5, "request": "enable"}]
-    for i, move in enumerate(moves(configuration, seed, seconds)):
-        steps.append(
-            {
-                "name": f"move {i + 1}",
-                "seconds": round(move.seconds, 2),
-                "posture": [round(angle, 3) for angle in move.posture],
-            }
-        )
-    return {"steps": [*steps, {"name": "brake", "seconds": 0.5, "request": "disable"}]}
+    drawn = enumerate(moves(configuration, seed, seconds), 1)
+    steps = [
+        {"name": f"move {i}", "seconds": round(one.seconds, 2), "posture": [round(angle, 3) for angle in one.posture]}
+        for i, one in drawn
+    ]
+    begin = {"name": "release the brakes", "seconds": 0.5, "request": "enable"}
+    return {"steps": [begin, *steps, {"name": "brake", "seconds": 0.5, "request": "disable"}]}
 
 
 def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[ScenarioStep]:
@@ -76,13 +74,8 @@ def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[S
     information = np.diag(sought.prior_sd**-2)
     posture, spent = np.array(shared.arm.joints.start), 0.0
     while spent < seconds:
-        found = []
-        for _ in range(MOVES.trials):
-            move = space.draw(random, posture)
-            if move is not None:
-                found.append(move)
-            if len(found) == MOVES.candidates:
-                break
+        drawn = (space.draw(random, posture) for _ in range(MOVES.trials))
+        found = list(islice(filter(None, drawn), MOVES.candidates))
         if not found:
             raise ParameterError(
                 f"no move from {posture.round(2).tolist()} rad is allowed by joint limits, speed limits and obstacles"
@@ -122,17 +115,16 @@ class _Space:
     """What the arm may do."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self._arm: Arm = configuration.shared.arm
-        self._body = RigidBody(self._arm)
-        driver = configuration.sections["driver"]
-        self._obstacles = build_part(Obstacles, driver, "world.obstacles.")
+        arm, driver = configuration.shared.arm, configuration.sections["driver"]
+        self._joints, self._covers, self._body = arm.joints, rows(arm.covers), RigidBody(arm)
+        self._obstacles = rows(build_part(Obstacles, driver, "world.obstacles."))
         self._speed = MOVES.speed * float(configuration.sections["force_loop"]["joint_speed_limit"])
         self._tip = MOVES.speed * float(driver["tip_speed_limit"])
         self._starts = MOVES.speed * float(driver["cover_speed_limit"])
 
     def draw(self, random: np.random.Generator, begin: Array) -> ScenarioStep | None:
         """A random move, None if it is not allowed."""
-        joints = self._arm.joints
+        joints = self._joints
         posture = random.uniform(np.array(joints.lower) + MOVES.margin, np.array(joints.upper) - MOVES.margin)
         speed = self._speed * random.uniform(MOVES.slowest, 1.0)
         seconds = max(MOVES.quickest, FASTEST * float(np.abs(posture - begin).max()) / speed)
@@ -142,30 +134,29 @@ class _Space:
         return move if allowed else None
 
     def _allows(self, q: Array, qd: Array) -> bool:
-        covers = self._arm.covers
-        tip = np.linalg.norm(self._body.tool_jacobian(q) @ qd)
-        starts = self._body.start_velocities(q, qd).values()
-        if tip > self._tip or any(np.linalg.norm(velocity) > self._starts for velocity in starts):
+        *starts, tip = self._body.start_and_tool_speeds(q, qd)
+        if tip > self._tip or any(speed > self._starts for speed in starts):
             return False
-        for i, name in enumerate(covers.names):
-            start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
-            for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-                point = self._body.point(q, name, start + share * (end - start))
-                if _distance(self._obstacles, point) < MOVES.clearance + covers.radius[i]:
-                    return False
-        return True
+        points = (
+            (cover, np.add(cover.start, share * np.subtract(cover.end, cover.start)))
+            for cover in self._covers
+            for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+        )
+        return all(
+            self._distance(self._body.point(q, cover.name, point)) >= MOVES.clearance + cover.radius
+            for cover, point in points
+        )
 
-
-def _distance(obstacles: Obstacles, point: Array) -> float:
-    """Distance from the spheres about the obstacles, m; from the plane through the origin of a plane."""
-    found = [np.inf]
-    for i, shape in enumerate(obstacles.shapes):
-        centre, size = (np.array(values[3 * i : 3 * i + 3]) for values in (obstacles.positions, obstacles.sizes))
-        if shape == "plane":
-            found.append(float(point[2] - centre[2]))
-        else:
-            found.append(float(np.linalg.norm(np.maximum(np.abs(point - centre) - size.max(), 0.0))))
-    return float(min(found))
+    def _distance(self, point: Array) -> float:
+        """Distance from the spheres about the obstacles, m; from the plane through the origin of a plane."""
+        found = [np.inf]
+        for one in self._obstacles:
+            apart = np.subtract(point, one.position)
+            if one.shape == "plane":
+                found.append(apart[2])
+            else:
+                found.append(float(np.linalg.norm(np.maximum(np.abs(apart) - max(one.size), 0.0))))
+        return float(min(found))
 
 
 def _information(shared: Shared, points: MovePoints) -> Array:

@@ -1,8 +1,9 @@
 """Identified against true friction, over kinds of plants and seeds."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from wam_driver.driver import Driver, DriverParameters
 from wam_studies.harness import Study, option
 from wam_studies.identification.excitation import moves, path
 from wam_studies.identification.plants import EXACT, KINDS, MeasuredSignals, measured_signals, plant, true_friction
-from wam_studies.scores import Row, Scores, ScoreTable, exact
+from wam_studies.scores import Interval, Row, Scores, by_group, exact, named, percent, share
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,11 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
     run = staticmethod(run_trial)
 
     def score(self, records: Sequence[IdentificationResult]) -> Scores:
-        """Largest errors, errors by stated ones of each kind, and all of them as a table."""
-        return Scores(list(_rows(records)), [_errors(records)])
+        """Errors of all plants, errors by stated ones of each kind, and all of each kind as a table."""
+        kinds = {kind: [one for one in records if one.kind == kind] for kind in dict.fromkeys(r.kind for r in records)}
+        every = chain.from_iterable(named(_rows(own), kind) for kind, own in kinds.items())
+        ratios = [row for row in every if "standard error, rms" in row.name]
+        return Scores([*_rows(records), *ratios], [by_group("By kind of plant", kinds, _rows)])
 
     def failure(self, record: IdentificationResult) -> str:
         """Why the motion ended early."""
@@ -208,55 +212,19 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
 
 
 def _rows(records: Sequence[IdentificationResult]) -> Iterator[Row]:
-    level = (lambda r: r.level, lambda r: r.level_sd)
-    coulomb = (lambda r: r.coulomb, lambda r: r.coulomb_sd)
-    for name, (error, sd) in (("friction", level), ("Coulomb friction alone", coulomb)):
-        errors = _joined(records, error)
-        largest = exact(float(np.abs(errors).max(initial=0.0)), len(errors))
-        yield Row(f"{name}, largest error", largest, "%", 100.0, (0.0, LIMITS.required), (0.0, LIMITS.target))
-        for kind in dict.fromkeys(result.kind for result in records):
-            some = [result for result in records if result.kind == kind]
-            scores = _joined(some, error) / _joined(some, sd)
-            allowed = 1.0 / LIMITS.factor, LIMITS.factor
-            yield Row(
-                f"{name}, {kind}, error / standard error, rms", exact(_rms(scores), len(scores)), required=allowed
-            )
+    """Errors of friction, of Coulomb friction alone and of gravity."""
+    for name, kind in (("friction", "level"), ("Coulomb friction alone", "coulomb")):
+        errors, stated = (np.concatenate([getattr(one, f"{kind}{end}") for one in records]) for end in ("", "_sd"))
+        ratios, largest = errors / stated, exact(float(np.abs(errors).max()), len(errors))
+        yield percent(f"{name}, error, rms", _rms(errors))
+        yield percent(f"{name}, largest error", largest, (0.0, LIMITS.required), (0.0, LIMITS.target))
+        allowed = 1.0 / LIMITS.factor, LIMITS.factor
+        yield Row(f"{name}, error / standard error, rms", _rms(ratios), required=allowed)
+        yield percent(f"{name}, beyond twice its standard error", share(int((np.abs(ratios) > 2.0).sum()), len(ratios)))
+    yield percent("friction error before, rms", _rms(np.concatenate([one.before for one in records])))
+    yield Row("gravity error, rms", _rms(np.array([one.gravity for one in records])), "N m")
+    yield Row("gravity error before, rms", _rms(np.array([one.gravity_before for one in records])), "N m")
 
 
-def _errors(records: Sequence[IdentificationResult]) -> ScoreTable:
-    """Errors by kind of plant, and of all."""
-    head = (
-        "plant", "runs", "friction error before, rms", "friction error, rms", "largest friction error",
-        "error / standard error, rms", "beyond 2 of it", "Coulomb alone, rms", "largest",
-        "its error / standard error, rms",
-        "gravity error before, N m", "gravity error, N m",
-    )  # fmt: skip
-    kinds = [(kind, [r for r in records if r.kind == kind]) for kind in dict.fromkeys(r.kind for r in records)]
-    return ScoreTable("By kind of plant", head, [_cells(*each) for each in [*kinds, ("every plant", list(records))]])
-
-
-def _cells(name: str, some: Sequence[IdentificationResult]) -> list[str]:
-    level, coulomb = _joined(some, lambda r: r.level), _joined(some, lambda r: r.coulomb)
-    scores = level / _joined(some, lambda r: r.level_sd)
-    return [
-        name,
-        str(len(some)),
-        f"{_rms(_joined(some, lambda r: r.before)):.1%}",
-        f"{_rms(level):.2%}",
-        f"{np.abs(level).max():.2%}",
-        f"{_rms(scores):.2f}",
-        f"{np.mean(np.abs(scores) > LIMITS.factor):.0%}",
-        f"{_rms(coulomb):.2%}",
-        f"{np.abs(coulomb).max():.2%}",
-        f"{_rms(coulomb / _joined(some, lambda r: r.coulomb_sd)):.2f}",
-        f"{_rms(np.array([r.gravity_before for r in some])):.3f}",
-        f"{_rms(np.array([r.gravity for r in some])):.3f}",
-    ]
-
-
-def _joined(some: Sequence[IdentificationResult], get: Callable[[IdentificationResult], Array]) -> Array:
-    return np.concatenate([get(result) for result in some]) if some else np.empty(0)
-
-
-def _rms(values: Array) -> float:
-    return math.sqrt(float(np.mean(np.square(values)))) if len(values) else math.nan
+def _rms(values: Array) -> Interval:
+    return exact(math.sqrt(float(np.mean(np.square(values)))), len(values))
