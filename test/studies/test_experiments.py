@@ -354,14 +354,15 @@ def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> N
     before, after, right, force, x = arm_forces.pushed({"push": run}).rows
     assert before.measured == 0.0
     assert after.measured == pytest.approx(0.06, abs=1e-6)
-    assert right.measured == pytest.approx(1.0 - 0.1 / 0.9, abs=0.01)
+    assert right.measured == pytest.approx(1.0 - 0.16, abs=0.01)
     assert not right.agrees
     assert (force.predicted, force.measured) == pytest.approx((12.0, 11.4))
     assert x.deviation == pytest.approx(0.03)
-    early = {**topics, "contact/wrench": wrench(time > 0.5, 11.4)}
-    before, after, *_ = arm_forces.pushed({"push": recorded(load("wam-touch"), 0, early, (), tmp_path)}).rows
-    assert (before.measured, after.measured) == pytest.approx((0.5, 0.0), abs=0.01)
-    assert not before.agrees
+    for estimated, expected in ((time > 0.5, (0.0, -0.495)), (there | ((time > 0.2) & (time < 0.4)), (0.2, 0.0))):
+        wrong = {**topics, "contact/wrench": wrench(estimated, 11.4)}
+        before, after, *_ = arm_forces.pushed({"push": recorded(load("wam-touch"), 0, wrong, (), tmp_path)}).rows
+        assert (before.measured, after.measured) == pytest.approx(expected, abs=0.01)
+        assert not (before.agrees and after.agrees)
 
 
 # run for real

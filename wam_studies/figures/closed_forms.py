@@ -7,6 +7,7 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Mark, Numbers, Panel, Panels, Series, line_only
+from wam_studies.figures.transmissions import driven, efficiency
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     RATIO,
@@ -18,7 +19,6 @@ from wam_studies.plant.ideal_testbed import (
     limiting_efficiency,
     link_inertia,
     loop_plant,
-    power_ratio,
     released_plant,
     stepped_map,
 )
@@ -96,25 +96,14 @@ def breakpoints() -> Panels:
     )
 
 
-def plant_efficiency(torque: float) -> float:
-    """Power out over power in of the plant in slow motion under a load of a torque of the motor, N m."""
-    arm = ideal_testbed(rotor=IMMOVABLE, damping=0.02)
-    plant, load = released_plant(arm, creep=True), 14.0 * torque
-    plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
-    plant.data.qpos[0] = load / 14.0 / arm.circuits[0].stiffness
-    plant.step([0.0], round(0.1 / STEP))
-    plant.data.qvel[:] = (5.0, 5.0 / 14.0)
-    plant.step([0.0], round(1.5 / STEP))
-    return power_ratio(plant, load, round(1.0 / STEP))
-
-
 def efficiencies() -> Panels:
     """Upper bound (6.15): the testbed over torque and the plant in slow motion; equal stages over the tension."""
     arm, torques, some = ideal_testbed(), np.linspace(0.0, 7.5, 60), np.linspace(1.0, 6.779, 6)
     line = [limiting_efficiency(arm, torque) for torque in torques]
     strain = np.linspace(0.0, 0.03, 60)
     equal = [(f"n = {n}", line_only(1e2 * strain, equal_stages_efficiency(strain, 1.0, float(n)))) for n in range(1, 7)]
-    plant = np.array([plant_efficiency(torque) for torque in some.tolist()])
+    cables = driven("cables")
+    plant = np.array([efficiency(cables, RATIO * torque) for torque in some.tolist()])
     testbed, power = Series(torques, np.array(line), some, plant), "power out over power in [-]"
     return (
         Panel("two-stage testbed", "motor torque [N m]", power, (("(6.15)", testbed),)),

@@ -28,6 +28,7 @@ class FigureConditions:
     # 5.3 to 5.11
     desired: float = 20.0  # F_des, N m
     stairs: float = 7.0  # F_des of figure 5.5, N m
+    coulomb_gamma: float = 1.5  # of figures 5.9 and 5.11
     friction: float = 18.5  # F_friction of figures 5.9 and 5.11, N m: the node sticks after every half cycle
 
     # 2.1.1

@@ -6,7 +6,7 @@ with an ideal motor, k_c = 1464 N m/rad as in section 5.6.
 
 from functools import cache
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,21 @@ def _stiffness() -> tuple[float, float, float]:
 def _points(values: Numbers, count: int) -> Numbers:
     """About `count` of the values, evenly spaced."""
     return values[:: max(1, len(values) // count)]
+
+
+def _compared(
+    desired: float,
+    gain: float,
+    damping: float,
+    friction: float | tuple[float, float],
+    seconds: float,
+    contact: float = CASE.contact,
+    **options: Any,
+) -> tuple[PlantResponse, Trajectory]:
+    """The plant's response and the exact one; arguments as of `force_step`, of friction that of Coulomb as a number."""
+    both = friction if isinstance(friction, tuple) else (friction, friction)
+    found = force_step(desired, contact, gain, damping, both, seconds, **options)
+    return found, simulate(found.node, IntegralLoop(gain), desired, seconds)
 
 
 def _series(found: PlantResponse, plant: Numbers, exact: Trajectory, line: str, count: int) -> Series:
@@ -68,9 +83,7 @@ def simple_responses() -> Panels:
 
 def staircase() -> Panels:
     """Figure 5.5: stiction, with a nearly inertialess node."""
-    gain, seconds, friction = 2e-3, 12.0, (6.0, 3.0)
-    found = force_step(CASE.stairs, CASE.contact, gain, 24.0, friction, seconds)
-    exact = simulate(found.node, IntegralLoop(gain), CASE.stairs, seconds)
+    found, exact = _compared(CASE.stairs, 2e-3, 24.0, (6.0, 3.0), 12.0)
     motor = _series(found, found.motor, exact, "x_m", 70).scaled(1.0, found.node.transmission_stiffness)
     force = _series(found, found.force, exact, "contact_force", 70)
     return (
@@ -79,42 +92,40 @@ def staircase() -> Panels:
     )
 
 
-class Coulomb(NamedTuple):
-    """Response of figures 5.9 and 5.11, in domain II and friction-dominated: the node sticks after each half cycle."""
-
-    found: PlantResponse
-    exact: Trajectory
-    gamma: float
-    zeta: float
-    seconds: float
+def _loop(gamma: float) -> tuple[float, float]:
+    """G_I and damping for this gamma, and the zeta of these figures."""
+    inertia, ktr, natural = _stiffness()
+    damping = 2.0 * CASE.unity_zeta * inertia * natural
+    return gamma * float(routh_gain(inertia, damping, ktr, CASE.contact)), damping
 
 
 @cache
-def _coulomb() -> Coulomb:
-    gamma, zeta, seconds = 1.5, 0.25, 2.0
-    inertia, ktr, natural = _stiffness()
-    damping = 2.0 * zeta * inertia * natural
-    gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
-    friction = CASE.friction, CASE.friction
-    found = force_step(CASE.desired, CASE.contact, gain, damping, friction, seconds, step=5e-5)
-    return Coulomb(found, simulate(found.node, IntegralLoop(gain), CASE.desired, seconds), gamma, zeta, seconds)
+def _coulomb() -> tuple[PlantResponse, Trajectory]:
+    """Figures 5.9 and 5.11, in domain II and friction-dominated: the node sticks after each half cycle."""
+    return _compared(CASE.desired, *_loop(CASE.coulomb_gamma), CASE.friction, 2.0, step=5e-5)
 
 
 def coulomb_response() -> Panels:
     """Figure 5.9: overshoot, stick, a cycle of the motor."""
-    found, exact, gamma, zeta, _ = _coulomb()
+    found, exact = _coulomb()
     force = ("exact", _series(found, found.force, exact, "contact_force", 90))
     motor = ("exact", _series(found, found.motor, exact, "x_m", 90))
     return (
-        Panel(f"a) γ = {gamma:g}, ζ = {zeta:g}", TIME, FORCE, (force,), marks=(Mark("F_des", y=CASE.desired),)),
+        Panel(
+            f"a) γ = {CASE.coulomb_gamma:g}, ζ = {CASE.unity_zeta:g}",
+            TIME,
+            FORCE,
+            (force,),
+            marks=(Mark("F_des", y=CASE.desired),),
+        ),
         Panel("b) motor", TIME, MOTOR, (motor,)),
     )
 
 
 def trajectory() -> Panels:
     """Figure 5.11, which the thesis draws in space, as seen along each of its axes."""
-    found, exact, _, _, seconds = _coulomb()
-    motion = exact.at(np.union1d(np.linspace(0.0, seconds, 2 * EVENLY), [event.time for event in exact.events]))
+    found, exact = _coulomb()
+    motion = exact.at(np.union1d(np.linspace(0.0, exact.until, 2 * EVENLY), [event.time for event in exact.events]))
     shown = np.unique(np.geomspace(100.0, len(found.time) - 1.0, 110).astype(int))  # sticking times grow
     seen = {
         "motor x_m at the joint [mrad]": (1e3 * motion.x_m, 1e3 * found.motor[shown]),
@@ -134,22 +145,18 @@ def lost_contact() -> Panels:
 
     The same loop on a contact of a quarter of the stiffness comes to rest: its first second.
     """
-    zeta, (inertia, ktr, natural) = 0.25, _stiffness()
-    gamma = 1.15 * float(gamma_3(zeta))
-    damping = 2.0 * zeta * inertia * natural
-    gain = gamma * float(routh_gain(inertia, damping, ktr, CASE.contact))
-    hard, soft = _last_motion(CASE.contact, gain, damping), _last_motion(0.25 * CASE.contact, gain, damping)
+    gamma = 1.15 * float(gamma_3(CASE.unity_zeta))
+    hard, soft = (_last_motion(share * CASE.contact, *_loop(gamma)) for share in (1.0, 0.25))
     axes = "k_c x, above 0 the contact force [N m]", "velocity of the link [rad/s]"
     marks = Mark("contact begins", 0.0), Mark("F_des", CASE.desired, 0.0)
     lines = (("exact", hard), ("a quarter of k_c", soft))
-    return (Panel(f"γ = {gamma:.3g}, ζ = {zeta:g}", *axes, lines, marks=marks),)
+    return (Panel(f"γ = {gamma:.3g}, ζ = {CASE.unity_zeta:g}", *axes, lines, marks=marks),)
 
 
 def _last_motion(contact: float, gain: float, damping: float) -> Series:
     """Velocity over k_c x between the last two contacts, of a motion that keeps contact in its first second."""
-    seconds, step = 6.0, 1e-4
-    found = force_step(CASE.desired, contact, gain, damping, (6.0, 6.0), seconds, unilateral=True, step=step)
-    exact = simulate(found.node, IntegralLoop(gain), CASE.desired, seconds)
+    step = 1e-4
+    found, exact = _compared(CASE.desired, gain, damping, 6.0, 6.0, contact, unilateral=True, step=step)
     contacts = [event.time for event in exact.events if event.kind is Kind.SWITCH and event.sign > 0]
     begin, end = contacts[-2:] if len(contacts) > 1 else (0.0, 1.0)
     motion = exact.at(np.linspace(begin, end, 3000))

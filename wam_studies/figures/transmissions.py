@@ -57,7 +57,14 @@ class Driven(NamedTuple):
         """With the friction of the cables, which is the same without load."""
         return self._replace(friction=driven("cables").friction)
 
-    def plant(self, rotor: float | None = None, world: World = EMPTY, dry: bool = False, play: bool = True) -> Plant:
+    def plant(
+        self,
+        rotor: float | None = None,
+        world: World = EMPTY,
+        dry: bool = False,
+        play: bool = True,
+        damping: float = 0.0,
+    ) -> Plant:
         """A plant without gravity, released.
 
         Parameters
@@ -66,10 +73,11 @@ class Driven(NamedTuple):
         world : around it.
         dry : whether rotor and joint have their static friction, also in motion; that by load is there in any case.
         play : whether there is backlash.
+        damping : of the circuit, N m s/rad.
         """
         motors, joints = self.arm.motors, self.arm.joints
         at_motor, at_joint = (part.static_friction[0] if dry else 0.0 for part in (motors, joints))
-        arm = ideal(self.arm, rotor, friction=(at_joint, at_joint), at_motor=at_motor)
+        arm = ideal(self.arm, rotor, damping, (at_joint, at_joint), at_motor=at_motor)
         backlash = self.effects.backlash if play else (0.0,)
         effects = replace(no_effects(arm), creep=self.effects.creep, backlash=backlash)
         plant = Plant(arm, world, effects, self.step, self.friction)
@@ -153,7 +161,7 @@ def measured(kind: str) -> TransmissionMeasures:
         stiffness,
         2.0 * (near - CASE.near_load / stiffness),
         HZ * bandwidth(it, CASE.contact),
-        _efficiency(it),
+        efficiency(it, 14.0 * driven("cables").arm.motors.peak_torque[0]),
         _inertia(it),
         _breakaway(it),
         math.nan,
@@ -179,16 +187,15 @@ def bandwidth(it: Driven, contact: float) -> float:
     return float(frequencies(it.smooth.plant(world=against_spring(contact), play=False), it.step)[0])
 
 
-def _efficiency(it: Driven) -> float:
-    """Work on the load over work of the motor at its peak torque, in slow motion."""
-    load = 14.0 * driven("cables").arm.motors.peak_torque[0]
-    plant = it.plant(rotor=IMMOVABLE)
+def efficiency(it: Driven, load: float) -> float:
+    """Work on a load at the joint, N m, over work of the motor, in slow motion."""
+    plant = it.plant(rotor=IMMOVABLE, damping=0.02)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, -load]))
     carried = load / (1.0 - it.friction.joint_load_factor[0])
     plant.data.qpos[1] = -(carried / it.stiffness + 0.5 * it.effects.play(0) / it.ratio)
     plant.data.qvel[:] = (it.ratio * CASE.speed_under_load, CASE.speed_under_load)
     count = round(1.0 / it.step)
-    plant.step([0.0], count // 2)
+    plant.step([0.0], count)
     return power_ratio(plant, load, count)
 
 
