@@ -1,6 +1,6 @@
 """The thesis's figures that carry data: theory as lines, points of the plant.
 
-catalogue         every figure: caption, function of its panels
+catalogue         every figure: function of its panels
 panels            a figure as data: panels of lines with points, their distance; draws them all
 conditions        loads, steps, poses and frictions of every figure
 transmissions     figure 1.1 and its table: cables, shaft and gears, direct drive

@@ -19,7 +19,6 @@ from wam_sim.pieces import default_file
 from wam_studies.plant.ideal_testbed import (
     IMMOVABLE,
     LEVER,
-    STEP,
     Numbers,
     force_step,
     ideal_testbed,
@@ -29,7 +28,6 @@ from wam_studies.plant.ideal_testbed import (
 from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
 from wam_theory.friction_model import IntegralLoop
 from wam_theory.stick_slip import simulate
-from wam_theory.tension_element import coulomb_like_torque
 
 CRITICAL = 0.8  # part of the stiffness at which the torque loop is marginal
 RUN_STEP = 5e-4  # s, that users run
@@ -51,35 +49,6 @@ class PlantCurve(NamedTuple):
 def _curve(x: Numbers, plant: Callable[[float], float], theory: ArrayLike) -> PlantCurve:
     """What the plant does at each x, next to theory."""
     return PlantCurve(np.array([plant(value) for value in x.tolist()]), np.asarray(theory))
-
-
-def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
-    """Torque of the cables on a link that turns at a speed, and power lost over the speed of the motor, N m.
-
-    Parameters
-    ----------
-    torque : of the motor, N m, against the link's motion for a positive speed.
-    speed : of the link, rad/s, which its inertia keeps.
-    """
-    arm = ideal_testbed(damping=0.02)
-    arm = replace(arm, joints=replace(arm.joints, armature=(IMMOVABLE,)))
-    plant = released_plant(arm, creep=True)
-    plant.data.qpos[0] = torque / arm.circuits[0].stiffness
-    plant.data.qvel[:] = (14.0 * speed, speed)
-    plant.step([torque], round(0.3 / STEP))
-    theta, q, count = plant.theta[0], plant.q[0], round(0.5 / STEP)
-    plant.step([torque], count)
-    travel = plant.theta[0] - theta
-    return plant.cable_torque[0], torque * (travel - 14.0 * (plant.q[0] - q)) / abs(travel)
-
-
-def coulomb_like() -> PlantCurve:
-    """Loss under torque control as a friction torque at the motor, over its torque, N m: (6.22) of all pulleys."""
-    torques = np.linspace(1.0, 6.0, 6)
-    cables = ideal_testbed().cables
-    stages = list(zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, strict=True))
-    theory = sum(2.0 * coulomb_like_torque(n * torques, r, ea) / n for n, r, ea in stages)
-    return _curve(torques, lambda torque: torque_controlled(torque, 0.5)[1], theory)
 
 
 def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
@@ -196,7 +165,6 @@ def stiction_cycle() -> PlantCurve:
 
 
 EFFECTS: dict[str, Callable[[], PlantCurve]] = {
-    "torque control": coulomb_like,
     "impact on a damped surface at 0.5 ms": damped_impact,
     "backlash in the loop": actuator_cycle_with_backlash,
     "backlash in a torque loop": backlash_in_a_torque_loop,

@@ -8,13 +8,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from io import StringIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
 from wam_analysis.table import markdown
+from wam_control.task.scenario_values import known
+from wam_description.parameters import require
 from wam_studies.figures.catalogue import FIGURES
 from wam_studies.plant.effects import EFFECTS
+from wam_studies.thesis.definition import names, tasks
 
 PLACE = re.compile(r"\{(figure|effect) ([^}]+)\}")
 
@@ -57,24 +60,20 @@ def load(file: Path) -> dict[str, tuple[Claim, ...]]:
     ValueError
         if an item has an unknown field or status, is shown by nothing, or is not shown without a reason.
     """
-    chapters: Mapping[str, list[dict[str, object]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    chapters: Mapping[str, list[dict[str, Any]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
     return {title: tuple(map(_claim, rows)) for title, rows in chapters.items()}
 
 
-def _claim(row: dict[str, object]) -> Claim:
-    unknown = set(row) - set(Claim._fields)
-    if unknown:
-        raise ValueError(f"{row} has {', '.join(sorted(unknown))}; an item has {', '.join(Claim._fields)}")
-    shown = row.get("shown") or []
-    if not isinstance(shown, list):
-        raise ValueError(f"{row}: 'shown' must be a list")
-    texts = {key: str(value) for key, value in row.items() if key not in ("shown", "status")}
-    claim = Claim(**texts, status=Status(str(row["status"])), shown=tuple(map(str, shown)))
-    is_shown = claim.status is not Status.NOT_SHOWN
-    if is_shown and not (claim.shown and claim.agreement):
-        raise ValueError(f"{claim.section}, '{claim.claim}': give it 'shown' and 'agreement', or status 'not shown'")
-    if not is_shown and not claim.open:
-        raise ValueError(f"{claim.section}, '{claim.claim}': it is not shown; 'open' must state why")
+def _claim(row: dict[str, Any]) -> Claim:
+    known("item", row, Claim._fields, ("section", "claim", "status"))
+    shown = row.get("shown", [])
+    require(isinstance(shown, list), f"{row}: 'shown' must be a list")
+    claim = Claim(**{**row, "status": Status(str(row["status"])), "shown": tuple(shown)})
+    if claim.status is Status.NOT_SHOWN:
+        require(bool(claim.open), f"{claim.section}, '{claim.claim}': it is not shown; 'open' must state why")
+    else:
+        given = bool(claim.shown and claim.agreement)
+        require(given, f"{claim.section}, '{claim.claim}': give it 'shown' and 'agreement', or status 'not shown'")
     return claim
 
 
@@ -88,15 +87,15 @@ def unresolved(reference: str, root: Path) -> str:
     root : of the repository.
     """
     kind, _, name = reference.partition(" ")
-    known: dict[str, bool] = {
-        "experiment": (root / "config" / "experiments" / f"{name}.yaml").is_file(),
-        "task": (root / "config" / "tasks" / f"{name}.yaml").is_file(),
+    there: dict[str, bool] = {
+        "experiment": name in names(),
+        "task": name in tasks(),
         "figure": name in FIGURES,
         "effect": name in EFFECTS,
         "test": _is_test(root, *name.partition(".")[::2]),
     }
-    if kind in known:
-        return "" if known[kind] else f"there is no {kind} '{name}'"
+    if kind in there:
+        return "" if there[kind] else f"there is no {kind} '{name}'"
     if "/" in reference:
         return "" if (root / reference).is_file() else f"there is no file '{reference}'"
     return "" if _importable(reference) else f"'{reference}' cannot be imported"

@@ -17,6 +17,7 @@ from wam_studies.thesis.one_link import ACROSS, OneLink, TestbedStep, one_link, 
 from wam_studies.thesis.recording import Recording, Runs, Step
 from wam_studies.thesis.rows import Comparison, Result, near, noted
 from wam_theory.stick_slip import Kind, Verdict, assess, simulate
+from wam_theory.velocity_servo import largest_scale
 
 AXES = "time [s]", "force by deflection [N]"
 GROUPS = {  # of the runs of `testbed-5.6`
@@ -61,19 +62,18 @@ def _ratio_at_rest(run: Recording) -> tuple[OneLink, float]:
 
 def friction_margin(link: OneLink, step: float) -> float:
     """G_I at the joint at which the errors of a small step, N, neither grow nor shrink with friction, within 0.1 %."""
-    low, high = link.margin.gain, 10.0 * link.margin.gain
-    while high > 1.001 * low:
-        middle = math.sqrt(low * high)
-        grows = abs(exact_ratio(link._replace(loop=replace(link.loop, gain=middle)), step)) > 1.0
-        low, high = (low, middle) if grows else (middle, high)
-    return low
+
+    def shrinks(gain: float) -> bool:
+        return abs(exact_ratio(link._replace(loop=replace(link.loop, gain=gain)), step)) <= 1.0
+
+    return largest_scale(shrinks, 10.0 * link.margin.gain)
 
 
 def exact_ratio(link: OneLink, force: float) -> float:
-    """Error at the second rest over that at the first, of the exact response of the sampled loop."""
+    """Error at the second rest over that at the first, of the exact response of the sampled loop; inf without rest."""
     trajectory = simulate(link.node, link.loop, force * link.lever, BOUNDS.standstills_until)
     rests = [force * link.lever - event.contact_force for event in trajectory.events if event.kind is Kind.STICK]
-    return rests[1] / rests[0]
+    return rests[1] / rests[0] if len(rests) > 1 else math.inf
 
 
 def errors_at_rest(shown: TestbedStep) -> Numbers:
