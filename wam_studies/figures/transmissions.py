@@ -96,33 +96,14 @@ def driven(kind: str) -> Driven:
     return Driven(configuration.shared.arm, driver.effects, driver.friction, step)
 
 
-class TransmissionMeasures(NamedTuple):
-    """What is compared: at the joint, SI; the last two of the motor, over those with cables."""
-
-    stiffness: float
-    play: float  # rad
-    bandwidth: float  # Hz, at the spring of 10 lb/in
-    efficiency: float  # at peak torque
-    inertia: float  # backdriven, kg m^2
-    friction: float  # torque that backdrives it, N m
-    mass: float
-    heat: float
+Measures = dict[str, float]  # by name and unit
+STIFFNESS, PLAY, BANDWIDTH = "stiffness [N m/rad]", "play [rad]", "force bandwidth on 10 lb/in [Hz]"
+EFFICIENCY, INERTIA = "efficiency at peak torque [-]", "backdriven inertia [kg m²]"
+BREAKAWAY, HEAVIER = "torque that backdrives it [N m]", "mass and heat of the motor, over those with cables [-]"
 
 
-ROWS = (
-    ("stiffness [N m/rad]", "{:.4g}"),
-    ("play [mrad]", "{:.3g}"),
-    ("force bandwidth on 10 lb/in [Hz]", "{:.4g}"),
-    ("efficiency at peak torque", "{:.3f}"),
-    ("backdriven inertia [kg m²]", "{:.4f}"),
-    ("torque that backdrives it [N m]", "{:.3f}"),
-    ("mass of the motor, over that with cables", "{:.3g}"),
-    ("heat at one torque, over that with cables", "{:.3g}"),
-)
-
-
-def predicted(kind: str) -> TransmissionMeasures:
-    """By formulas of shaft, cable and gears."""
+def predicted(kind: str) -> Measures:
+    """At the joint, by formulas of shaft, cable and gears."""
     it = driven(kind)
     motors, joints, cables = it.arm.motors, it.arm.joints, it.arm.cables
     rotor = motors.inertia[0]
@@ -139,34 +120,31 @@ def predicted(kind: str) -> TransmissionMeasures:
         "direct drive": 1.0,
     }[kind]
     factor = it.friction.joint_load_factor[0]
-    return TransmissionMeasures(
-        rigid,
-        0.1e-3 / 36.83e-3 if kind == "shaft and gears" else 0.0,
-        HZ * lower,
-        efficiency,
-        link_inertia(it.arm) + it.ratio**2 * rotor,
-        joints.static_friction[0] + (1.0 + factor) * it.ratio * motors.static_friction[0],
-        rotor / driven("cables").arm.motors.inertia[0],
-        rotor / driven("cables").arm.motors.inertia[0],
-    )
+    return {
+        STIFFNESS: rigid,
+        PLAY: 0.1e-3 / 36.83e-3 if kind == "shaft and gears" else 0.0,
+        BANDWIDTH: HZ * lower,
+        EFFICIENCY: efficiency,
+        INERTIA: link_inertia(it.arm) + it.ratio**2 * rotor,
+        BREAKAWAY: joints.static_friction[0] + (1.0 + factor) * it.ratio * motors.static_friction[0],
+        HEAVIER: rotor / driven("cables").arm.motors.inertia[0],
+    }
 
 
 @cache
-def measured(kind: str) -> TransmissionMeasures:
-    """On the plant; mass and heat of the motor are not measured."""
+def measured(kind: str) -> Measures:
+    """On the plant, without mass and heat of the motor."""
     it = driven(kind)
     near, far = (_deflection(it, torque) for torque in (CASE.near_load, CASE.far_load))
     stiffness = (CASE.far_load - CASE.near_load) / (far - near)
-    return TransmissionMeasures(
-        stiffness,
-        2.0 * (near - CASE.near_load / stiffness),
-        HZ * bandwidth(it, CASE.contact),
-        efficiency(it, 14.0 * driven("cables").arm.motors.peak_torque[0]),
-        _inertia(it),
-        _breakaway(it),
-        math.nan,
-        math.nan,
-    )
+    return {
+        STIFFNESS: stiffness,
+        PLAY: 2.0 * (near - CASE.near_load / stiffness),
+        BANDWIDTH: HZ * bandwidth(it, CASE.contact),
+        EFFICIENCY: efficiency(it, 14.0 * driven("cables").arm.motors.peak_torque[0]),
+        INERTIA: _inertia(it),
+        BREAKAWAY: _breakaway(it),
+    }
 
 
 def _deflection(it: Driven, torque: float) -> float:
@@ -224,11 +202,11 @@ def transmissions() -> Panels:
     for kind in KINDS:
         it, by = driven(kind), predicted(kind)
         rotor = it.arm.motors.inertia[0]
-        lower = force_resonances(rotor, link_inertia(it.arm), by.stiffness / it.ratio**2, contacts, it.ratio).lower
+        lower = force_resonances(rotor, link_inertia(it.arm), by[STIFFNESS] / it.ratio**2, contacts, it.ratio).lower
         points = np.array([bandwidth(it, k) for k in some])
         lines.append((kind, Series(contacts, HZ * lower, some, HZ * points)))
         torque, steps = np.linspace(0.0, 60.0, 100), np.array([10.0, 25.0, 40.0, 55.0])
-        angle = 1e3 * (torque / by.stiffness + 0.5 * by.play)
+        angle = 1e3 * (torque / by[STIFFNESS] + 0.5 * by[PLAY])
         springs.append((kind, Series(torque, angle, steps, 1e3 * np.array([_deflection(it, t) for t in steps]))))
     return (
         Panel("a) force bandwidth (4.4)", "contact stiffness [N m/rad]", "frequency [Hz]", lines, "xy"),
@@ -238,11 +216,7 @@ def transmissions() -> Panels:
 
 def table() -> str:
     """Predicted and measured quantities of each transmission as Markdown."""
-    found = [(kind, predicted(kind), measured(kind)) for kind in KINDS]
     head = ("at the joint", *(text for kind in KINDS for text in (f"{kind}, predicted", "plant")))
-    rows = []
-    for i, (name, form) in enumerate(ROWS):
-        scale = 1e3 if "mrad" in name else 1.0
-        values = [scale * value[i] for _, *pair in found for value in pair]
-        rows.append((name, *("" if math.isnan(value) else form.format(round(value, 6) + 0.0) for value in values)))
+    found = [values for kind in KINDS for values in (predicted(kind), measured(kind))]
+    rows = [(name, *(f"{round(own[name], 6) + 0.0:.4g}" if name in own else "" for own in found)) for name in found[0]]
     return markdown(head, rows)
