@@ -247,8 +247,7 @@ def test_the_gain_below_the_resonances_is_that_of_its_frequencies_and_not_the_st
     time = np.arange(1, 20001) * 1e-3
     torque = np.where(time < 16.0, np.sin(2.0 * np.pi * (2.0 * time + 3.0 * time**2)), 0.0)
     steps = (Step("sweep", 0.0, 16.0, {}), Step("ring down", 16.0, 20.1, {}))
-    command = forces(time, np.stack([0.0 * time, 0.0 * time, 30.0 + 5.0 * torque], axis=1))
-    topics = {"motor_states": joints(time, 0.0, effort=torque), "force_command": command}
+    topics = {"motor_states": joints(time, 0.0, effort=torque)}
     for folder in ("still", "moving"):
         (tmp_path / folder).mkdir()
     run = recorded(experiment, 0, topics, steps, tmp_path / "still")

@@ -14,6 +14,8 @@ class ThesisBounds:
 
     # thesis.transmission
     averaged_frequencies: int = 5  # neighbouring frequencies over which spectra are averaged
+    lowest: float = 0.25  # of the lower resonance, from which the response is compared
+    highest: float = 1.5  # of the upper resonance, up to which it is
     resonance_fit: float = 0.06  # relative to a frequency, range of the linear fit around it
 
     # thesis.groping

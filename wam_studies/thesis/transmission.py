@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_bag.losses import CUT
 from wam_studies.figures.panels import Numbers, Panel, line_only, measured
 from wam_studies.plant.ideal_testbed import link_inertia
 from wam_studies.thesis.bounds import BOUNDS
@@ -27,26 +26,22 @@ class Transfer(NamedTuple):
 
 
 def frequency_response(runs: Runs) -> Result:
-    """The experiment `frequency-response`; of a sample, which has motor and joint only, the resonances."""
+    """The experiment `frequency-response`: both resonances, and the response from a quarter of the lower one on."""
     (run,) = runs.values()
     (circuit,), found, rows = run.shared.arm.circuits, transfer(run), []
-    for name, natural in resonances(run)._asdict().items():
-        expected = float(natural) * HZ
-        resonance = zero_of(found, expected, circuit.damping / circuit.stiffness)
-        rows.append(near(f"{name} resonance", expected, resonance, "Hz", "(4.4)"))
-    if CUT in run.bag.metadata:
-        low, high = 0.5 * float(rows[0].predicted), 1.5 * float(rows[1].predicted)
-    else:
-        low, high = swept(run)
+    expected = [float(natural) * HZ for natural in resonances(run)]
+    for name, natural in zip(Resonances._fields, expected, strict=True):
+        resonance = zero_of(found, natural, circuit.damping / circuit.stiffness)
+        rows.append(near(f"{name} resonance", natural, resonance, "Hz", "(4.4)"))
+    low, high = BOUNDS.lowest * expected[0], BOUNDS.highest * expected[1]
     inside = (found.frequency > low) & (found.frequency < high)
     frequency, gain = found.frequency[inside], 1.0 / np.abs(found.inverse[inside])
     predicted, coherence = np.abs(response_of(run, frequency)), found.coherence[inside]
-    if CUT not in run.bag.metadata:
-        lowest, label = frequency < 2.0 * low, f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz"
-        rows += [
-            near(label, np.median(predicted[lowest]), np.median(gain[lowest]), "rad/(N m)", "(4.3)"),
-            Comparison("smallest coherence", 1.0, float(coherence.min()), "", 0.05, "", True),
-        ]
+    lowest, label = frequency < 2.0 * low, f"joint angle per motor torque, {low:.2g} to {2.0 * low:.2g} Hz"
+    rows += [
+        near(label, np.median(predicted[lowest]), np.median(gain[lowest]), "rad/(N m)", "(4.3)"),
+        Comparison("smallest coherence", 1.0, float(coherence.min()), "", 0.05, "", True),
+    ]
     curves = [("measured", measured(frequency, gain)), ("(4.3) with damping", line_only(frequency, predicted))]
     axis = "frequency [Hz]"
     panels = [
@@ -75,17 +70,6 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
     link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + joint_stiffness(run)
     found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
     return found
-
-
-def swept(run: Recording) -> tuple[float, float]:
-    """Lowest and highest frequency of the chirp, Hz, from the crossings of its force with the steady force."""
-    command, sweep = run.forces("force_command"), run.step("sweep")
-    during = command.during(sweep.begin, sweep.end)
-    after = command.force[int(np.searchsorted(command.time, sweep.end + BOUNDS.rounding))]
-    force = np.linalg.norm(during.force, axis=1) - np.linalg.norm(after)
-    crossings = during.time[np.flatnonzero(force[:-1] * force[1:] < 0.0)]
-    lengths = np.diff(crossings)
-    return 0.5 / float(lengths[:2].mean()), 0.5 / float(lengths[-10:].mean())
 
 
 def transfer(run: Recording) -> Transfer:
