@@ -6,7 +6,7 @@ tasks               whole-arm tasks: pushing, sweeping, holding, a door, a movin
 figures             the thesis's figures that carry data: theory as lines, the plant as circles
 contact             contact estimation with true contacts, on the arm as stated and on others
 identification      a motion that shows the arm's parameters; identified against true ones
-faults              broken messages, wrong parameters, lost nodes, Ctrl-C, a long run, on watched nodes; docs/safety.md
+faults              broken messages, wrong parameters, lost nodes, a long run, on watched nodes; docs/safety.md
 plant               the plant's effects, each measured alone and compared with theory
 force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
 guard_validation    the stability guard validated by Monte Carlo simulation

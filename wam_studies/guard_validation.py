@@ -20,7 +20,7 @@ from wam_control.task.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_sim.simulation import Simulation
 from wam_studies.harness import Study, option
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, share
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, percent, share
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
 RESTS, CYCLES, DIVERGES = "rests", "cycles", "diverges"
@@ -97,11 +97,9 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
 
     def score(self, records: Sequence[ValidationRecord]) -> Scores:
         """What is accepted and diverges, what is refused and comes to rest."""
-        groups: dict[str, list[ValidationRecord]] = {}
-        for one in sorted(records, key=lambda one: (one.where, one.domain, not one.is_accepted)):
-            verdict = "accepted" if one.is_accepted else "refused"
-            groups.setdefault(f"{one.where}, {one.domain}, {verdict}", []).append(one)
-        return Scores(list(_rows(records)), [by_group("Verdicts and responses", groups, _ends)])
+        verdicts = "refused", "accepted"
+        groups = grouped(records, lambda one: f"{one.where}, {one.domain}, {verdicts[one.is_accepted]}")
+        return Scores(list(_rows(records)), [by_group("Verdicts and responses", dict(sorted(groups.items())), _ends)])
 
     def failure(self, record: ValidationRecord) -> str:
         """An accepted set that diverges."""
@@ -109,12 +107,11 @@ class GuardStudy(Study[NodeSet | TestbedSet, ValidationRecord]):
 
 
 def _rows(records: Sequence[ValidationRecord]) -> Iterator[Row]:
-    for where in (NODE, TESTBED):
-        own = [one for one in records if one.where == where]
+    for where, own in grouped(records, lambda one: one.where).items():
         bad = sum(one.is_accepted and one.end == DIVERGES for one in own)
         lost = sum(not one.is_accepted and one.end == RESTS for one in own)
         yield Row(f"accepted sets that diverge, {where}", exact(bad, len(own)), "sets", required=NONE_AT_ALL)
-        yield Row(f"refused sets that come to rest, {where}", share(lost, len(own)), "%", 100.0)
+        yield percent(f"refused sets that come to rest, {where}", share(lost, len(own)))
 
 
 def _ends(records: Sequence[ValidationRecord]) -> Iterator[Row]:

@@ -5,7 +5,6 @@ runs those of `STUDIES`, and `evaluate` runs any other (examples/study.py).
 """
 
 import hashlib
-import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -13,6 +12,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
 from wam_description.configuration import Configuration
@@ -119,9 +119,12 @@ class Measurement(NamedTuple):
     @property
     def failures(self) -> list[tuple[int, int, str]]:
         """Seed, number and reason of each case that is to be looked at."""
-        cases = ((seed, number, record) for seed, own in self.records.items() for number, record in enumerate(own))
-        every = ((seed, number, self.study.failure(record)) for seed, number, record in cases)
-        return [one for one in every if one[2]]
+        return [
+            (seed, number, reason)
+            for seed, own in self.records.items()
+            for number, record in enumerate(own)
+            if (reason := self.study.failure(record))
+        ]
 
     @property
     def by_seed(self) -> dict[int, Scores]:
@@ -155,6 +158,5 @@ def evaluate(
 
 def load(name: str) -> type[Study[Any, Any]]:
     """The class of a study."""
-    module, _, kind = STUDIES[name].partition(":")
-    found: type[Study[Any, Any]] = getattr(importlib.import_module(module), kind)
+    found: type[Study[Any, Any]] = resolve_name(STUDIES[name])
     return found

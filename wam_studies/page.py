@@ -1,6 +1,5 @@
 """The result of a study as text: for a terminal, and between two marks of a page of the documentation."""
 
-import re
 from pathlib import Path
 
 from wam_studies.harness import Measurement
@@ -62,9 +61,8 @@ def kept_rows(text: str) -> dict[str, list[str]]:
     """Cells of each row of the tables in a section, by the first one, without the heads."""
     lines = [line for line in text.splitlines() if line[:2] == "| "]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    rules = [i for i, row in enumerate(rows) if row[0].startswith("---")]
-    heads = {i - 1 for i in rules}
-    return {row[0]: row for i, row in enumerate(rows) if i not in heads and i not in rules}
+    parts = zip(rows, [*rows[1:], [""]], strict=True)
+    return {row[0]: row for row, after in parts if not (row[0].startswith("---") or after[0].startswith("---"))}
 
 
 def with_section(file: Path, name: str, text: str, title: str = "") -> str:
@@ -77,7 +75,8 @@ def with_section(file: Path, name: str, text: str, title: str = "") -> str:
     """
     begin = f"<!-- written: {name} -->\n"
     page = file.read_text(encoding="utf-8") if file.exists() else f"# {title[:1].upper()}{title[1:]}\n\n{begin}{END}\n"
-    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(END), re.DOTALL)
-    if not pattern.search(page):
+    before, _, rest = page.partition(begin)
+    _, is_whole, after = rest.partition(END)
+    if not is_whole:
         raise ValueError(f"{file} has no line '{begin.strip()}'; remove the file, or write into another one")
-    return pattern.sub(lambda found: f"{begin}{text.rstrip()}\n{END}", page)
+    return f"{before}{begin}{text.rstrip()}\n{END}{after}"

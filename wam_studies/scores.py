@@ -182,6 +182,14 @@ class ScoreTable(NamedTuple):
         return "\n\n".join(filter(None, parts))
 
 
+def grouped(records: Iterable[Found], key: Callable[[Found], str]) -> dict[str, list[Found]]:
+    """Records by a text, in the order in which these come first."""
+    found: dict[str, list[Found]] = {}
+    for one in records:
+        found.setdefault(key(one), []).append(one)
+    return found
+
+
 def by_group(
     title: str, groups: Mapping[str, Found], rows: Callable[[Found], Iterable[Row]], note: str = ""
 ) -> ScoreTable:

@@ -305,6 +305,7 @@ def test_a_process_that_ends_is_named_and_takes_the_stack_with_it(started: Any, 
 
 PROGRAMS = {
     "node": ("wam_cli.main", "node", "driver"),
+    "demo": ("wam_cli.main", "demo", "--no-live"),
     "scorecard": ("wam_cli.main", "model", "scorecard"),
     "program": ("wam_ros.program", "gravity", "--ros-args", "--params-file", str(packaged("wam"))),
 }
@@ -314,6 +315,7 @@ PROGRAMS = {
     ("program", "library", "number"),
     [
         ("node", "mujoco", signal.SIGINT),
+        ("demo", "mujoco", signal.SIGINT),
         ("scorecard", "numpy", signal.SIGTERM),
         ("program", "pinocchio", signal.SIGINT),
     ],

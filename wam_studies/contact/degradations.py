@@ -77,31 +77,34 @@ def drawn(name: str, arm: Arm, random: np.random.Generator) -> Degradation:
         "driver:friction.joint_presliding_stiffness": [500.0],
     }
     gaussian = {"driver:friction.stribeck_exponent": 2.0}  # with presliding: LuGre's model, undamped bristles
-    noisy = stated | arms.cogging(0.004) | arms.noise(0.04)
-    heavy = stated | arms.masses(0.05)
-    of = {
-        "as stated": Degradation(stated),
-        "friction 0.8 to 1.3": Degradation(stated | arms.level(0.8, 1.3)),
-        "friction 40 %": Degradation(stated | forty),
-        "asymmetric 25 %": Degradation(stated | arms.asymmetric(0.25)),
-        "Stribeck, F_s + 20 %": Degradation(stated | arms.stribeck(1.2)),
-        "presliding": Degradation(stated | presliding),
-        "LuGre, F_s + 20 %": Degradation(stated | arms.stribeck(1.2) | gaussian | presliding),
-        "load-dependent 6 %": Degradation(stated | _load(0.06)),
-        "friction drifts 20 %": Degradation(stated, drift=0.2),
-        "mass 5 %, centre 5 mm": Degradation(heavy, arms.centre(0.005)),
-        "torque constant 3 %": Degradation(stated, signals=MeasuredSignals(arms.constant(0.03))),
-        "payload 0.1 kg": Degradation(stated | {"driver:mismatch.payload": 0.1}),
-        "payload 0.3 kg": Degradation(stated | {"driver:mismatch.payload": 0.3}),
-        "encoder 4096": Degradation(stated | arms.encoder(4096)),
-        "encoder 16384": Degradation(stated | arms.encoder(16384)),
-        "encoder 65536": Degradation(stated | arms.encoder(65536)),
-        "torque noise, ripple, cogging": Degradation(noisy, signals=MeasuredSignals(noise=0.01)),
-        "delay 2 ms": Degradation(stated, signals=MeasuredSignals(delay=2)),
-        "10 % dropped": Degradation(stated, signals=MeasuredSignals(dropped=0.1)),
+    cogging, heavy = arms.cogging(0.004), arms.masses(0.05)
+    plants: dict[str, Values] = {
+        "friction 0.8 to 1.3": arms.level(0.8, 1.3),
+        "friction 40 %": forty,
+        "asymmetric 25 %": arms.asymmetric(0.25),
+        "Stribeck, F_s + 20 %": arms.stribeck(1.2),
+        "presliding": presliding,
+        "LuGre, F_s + 20 %": arms.stribeck(1.2) | gaussian | presliding,
+        "load-dependent 6 %": _load(0.06),
+        "mass 5 %, centre 5 mm": heavy,
+        "payload 0.1 kg": {"driver:mismatch.payload": 0.1},
+        "payload 0.3 kg": {"driver:mismatch.payload": 0.3},
+        "encoder 4096": arms.encoder(4096),
+        "encoder 16384": arms.encoder(16384),
+        "encoder 65536": arms.encoder(65536),
+        "torque noise, ripple, cogging": cogging | arms.noise(0.04),
+    }
+    models = {"mass 5 %, centre 5 mm": arms.centre(0.005)}
+    signals = {
+        "torque constant 3 %": MeasuredSignals(arms.constant(0.03)),
+        "torque noise, ripple, cogging": MeasuredSignals(noise=0.01),
+        "delay 2 ms": MeasuredSignals(delay=2),
+        "10 % dropped": MeasuredSignals(dropped=0.1),
     }
     mix = arms.level(0.8, 1.3) | arms.stribeck(1.1) | arms.asymmetric(0.1) | _load(0.03) | arms.encoder(16384)
     mix |= arms.cogging(0.003) | arms.masses(0.02) | arms.noise(0.02)
-    centre, constant = arms.centre(0.003), arms.constant(0.02)
-    of["realistic mix"] = Degradation(mix, centre, MeasuredSignals(constant, noise=0.005, delay=1, dropped=0.02), 0.1)
-    return of[name]
+    if name == "realistic mix":
+        centre, constant = arms.centre(0.003), arms.constant(0.02)
+        return Degradation(mix, centre, MeasuredSignals(constant, noise=0.005, delay=1, dropped=0.02), 0.1)
+    drift = 0.2 if name == "friction drifts 20 %" else 0.0
+    return Degradation(stated | plants.get(name, {}), models.get(name, {}), signals.get(name, EXACT), drift)

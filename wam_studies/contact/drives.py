@@ -35,14 +35,7 @@ from wam_studies.contact.outcomes import (
     torque_errors,
 )
 from wam_studies.contact.scenarios import base_values, moves_and_stops
-from wam_studies.contact.touches import (
-    KINDS,
-    LASTING_KINDS,
-    LEVEL_KINDS,
-    MASS_KINDS,
-    Touch,
-    touches,
-)
+from wam_studies.contact.touches import CONTACTS, Touch, touches
 from wam_studies.identification.plants import Values
 from wam_studies.identification.study import play
 
@@ -52,9 +45,6 @@ class RecordingTimes:
     """When contacts are, for how long the arm is moved, and how many drives of one kind there are."""
 
     warm_up: float = 6.0  # s of free motion before the first contact
-    spacing: float = 1.9  # s from one contact to the next
-    spacing_of_masses: float = 6.0  # s
-    spacing_of_lasting: float = 11.0  # s
     excitation: float = 20.0  # s of motion for an identification
     drift_steps: int = 20  # of friction, over a recording
     shortest: float = 10.0  # s, with one contact
@@ -64,12 +54,6 @@ class RecordingTimes:
 
 TIMES = RecordingTimes()
 IDENTIFIED_ARM = "identified"  # group of the scores of an arm that was identified before
-CONTACTS = {  # kinds of contacts, and s from one to the next
-    "wide": (KINDS, TIMES.spacing),
-    "lasting": (LASTING_KINDS, TIMES.spacing_of_lasting),
-    "level": (LEVEL_KINDS, TIMES.spacing),
-    "masses": (MASS_KINDS, TIMES.spacing_of_masses),
-}
 
 
 class Drive(NamedTuple):
@@ -122,9 +106,9 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     moves = MoveGenerator(arm)
     start = moves.pose(random)
     steps = moves_and_stops(moves, random, start, drive.seconds, (0.0, 0.0, 0.0, 0.1, 0.4))
-    kinds, spacing = CONTACTS[drive.contacts]
-    times = np.arange(TIMES.warm_up, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
-    return degradation, touches(arm, random, times.tolist(), kinds), steps, list(start)
+    given = CONTACTS[drive.contacts]
+    times = np.arange(TIMES.warm_up, drive.seconds - given.spacing, given.spacing) + random.uniform(0.0, 0.4)
+    return degradation, touches(arm, random, times.tolist(), given), steps, list(start)
 
 
 def record(drive: Drive) -> DriveRecording:

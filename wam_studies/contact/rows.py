@@ -25,6 +25,7 @@ from wam_studies.scores import (
     by_group,
     events,
     exact,
+    grouped,
     named,
     percent,
     quantile,
@@ -210,12 +211,6 @@ def torque_z(scores: Scores) -> Interval:
 # arms and signals that differ from what the estimator states
 
 
-def by_name(drives: Scores, group: str) -> dict[str, list[ContactScore]]:
-    """Scores by degradation of the drives of a group."""
-    own = in_groups(drives, group)
-    return {name: [one for one in own if one.name == name] for name in dict.fromkeys(one.name for one in own)}
-
-
 def sure_and_wrong(scores: Scores) -> Interval:
     """Part of the time in contact in which another link is reported with certainty; observed: contacts."""
     every = [one for score in scores for one in score.outcomes if one.kind != PICKING_UP]
@@ -257,7 +252,7 @@ def degraded_rows(drives: Scores) -> Iterator[Row]:
     if not wide:
         return
     lasting, both = in_groups(drives, "lasting"), [*wide, *identified]
-    alone = {name: own for name, own in by_name(drives, "wide").items() if name not in (STATED_ARM, MIX)}
+    alone = grouped([one for one in wide if one.name not in (STATED_ARM, MIX)], lambda one: one.name)
     yield from _worst({name: alarms_row(own) for name, own in alone.items()})
     yield from named([alarms_row([one for one in wide if one.name == MIX])], MIX)
     yield from named([alarms_row(identified), *outer_rows(identified)], IDENTIFIED_MIX)
@@ -286,14 +281,13 @@ def _worst(rows: Mapping[str, Row]) -> Iterator[Row]:
 
 def degraded_tables(drives: Scores) -> Iterator[ScoreTable]:
     """Tables by degradation, by kind of contact and force, by mass; none without drives."""
-    groups = by_name(drives, "wide")
+    ways = {"wide": "", "level": ", as configured", IDENTIFIED_ARM: ", identified"}
+    groups = grouped(in_groups(drives, *ways), lambda one: f"{one.name}{ways[one.group]}")
     if not groups:
         return
-    groups |= {f"{name}, as configured": own for name, own in by_name(drives, "level").items()}
-    groups |= {f"{name}, identified": own for name, own in by_name(drives, IDENTIFIED_ARM).items()}
     yield by_group("By degradation", groups, _rows_of_degradation, NOTE)
     every = outcomes(in_groups(drives, "wide", "masses"))
-    kinds = {kind: of_kind(every, kind) for kind in sorted({one.kind for one in every})}
+    kinds = dict(sorted(grouped(every, lambda one: one.kind).items()))
     forces = {f"{a:g} to {b:g} N": [one for one in every if a <= one.force < b] for a, b in pairwise(EVALUATION.forces)}
     yield by_group("By kind of contact and by force, all degradations", kinds | forces, _rows_of_contacts)
     masses = [one for score in in_groups(drives, "masses") for one in score.masses]

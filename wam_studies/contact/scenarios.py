@@ -15,7 +15,7 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.world import Obstacles
 from wam_studies.contact.moves import MoveGenerator
-from wam_studies.identification.plants import mismatch
+from wam_studies.identification.plants import drawn_cover, mismatch
 
 
 @dataclass(frozen=True)
@@ -99,16 +99,13 @@ def dither_values(configuration: Configuration) -> dict[str, Any]:
 
 def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
     """Values of every scenario: no obstacle within reach, fast moves allowed, the estimator's model as configured."""
-    estimator = configuration.sections["contact_estimator"]
-    joints = len(configuration.shared.arm.joints.names)
-    values: dict[str, Any] = {
+    return {
         **{f"driver:world.obstacles.{key}": [] for key in Obstacles.__dataclass_fields__},
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
+        "contact_estimator:observer.mass_scale": [1.0] * len(configuration.shared.arm.joints.names),
+        "contact_estimator:observer.friction_scale": 1.0,
     }
-    own = {"observer.mass_scale": [1.0] * joints, "observer.friction_scale": 1.0}
-    values |= {f"contact_estimator:{name}": value for name, value in own.items() if name in estimator}
-    return values
 
 
 class ScenarioGenerator:
@@ -176,7 +173,7 @@ class ScenarioGenerator:
 
     def _contact(self, random: np.random.Generator, begin: float, end: float) -> PlannedContact:
         covers = self._arm.covers
-        cover = _drawn_cover(random.random(), len(covers.names)) if len(covers.names) > 1 else 0
+        cover = drawn_cover(random.random(), RANGES.beyond_first, len(covers.names))
         kind = str(random.choice(("push", "sphere", "flat"), p=(0.4, 0.3, 0.3)))
         level = float(random.choice((*RANGES.levels, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
         force = (
@@ -212,11 +209,6 @@ class ScenarioGenerator:
             **{f"driver:mismatch.{name}": factors for name, factors in drawn.items()},
             **_pushers(random, [contact for contact in planned if contact.kind in ("sphere", "flat")]),
         }
-
-
-def _drawn_cover(share: float, covers: int) -> int:
-    """Index of the cover in contact for a number from 0 to 1."""
-    return 1 + int(share / RANGES.beyond_first * (covers - 1)) if share < RANGES.beyond_first else 0
 
 
 def _opening() -> list[ScenarioStep]:

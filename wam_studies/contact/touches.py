@@ -64,6 +64,23 @@ PICKING_UP = "picking up"
 MASS_KINDS = {PICKING_UP: 1.0}  # in the recordings in which the tool picks up a mass, carries it and sets it down
 
 
+class DrawnContacts(NamedTuple):
+    """How often each kind is drawn, s from one to the next, share of forces of the levels, whether any length is."""
+
+    kinds: Mapping[str, float]
+    spacing: float = 1.9
+    of_levels: float = 0.5
+    are_lasting: bool = False
+
+
+CONTACTS = {
+    "wide": DrawnContacts(KINDS),
+    "lasting": DrawnContacts(LASTING_KINDS, 11.0, are_lasting=True),
+    "level": DrawnContacts(LEVEL_KINDS, of_levels=1.0),
+    "masses": DrawnContacts(MASS_KINDS, 6.0),
+}
+
+
 class Touch(NamedTuple):
     """One contact, an exact force; or a mass at the tool, which is in the plant while it is carried.
 
@@ -117,15 +134,14 @@ class Touch(NamedTuple):
         return np.concatenate((force, np.cross(np.add(axis, self.arm), force) + twist))
 
 
-def touches(
-    arm: Arm, random: np.random.Generator, times: Sequence[float], kinds: Mapping[str, float] = KINDS
-) -> list[Touch]:
+def touches(arm: Arm, random: np.random.Generator, times: Sequence[float], given: DrawnContacts) -> list[Touch]:
     """A contact at each time, s."""
     found: list[Touch] = []
+    shares = np.array(list(given.kinds.values()))
     for begin in times:
-        kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
-        drawn = _drawn(arm, random, kind, begin, 1.0 if kinds is LEVEL_KINDS else 0.5)
-        if kinds is LASTING_KINDS:
+        kind = str(random.choice(list(given.kinds), p=shares / sum(given.kinds.values())))
+        drawn = _drawn(arm, random, kind, begin, given.of_levels)
+        if given.are_lasting:
             hold = _log_uniform(random, *TOUCHES.lasting)
             rise = TOUCHES.slow if random.random() < 0.3 else TOUCHES.rise
             drawn = drawn._replace(end=begin + hold, rise=min(rise, 0.5 * hold))

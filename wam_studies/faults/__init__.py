@@ -5,7 +5,6 @@ trials             what a trial is, the limits of motion, force and delay, the n
 message_faults     messages broken field by field, stamp by stamp, byte by byte
 messages, parameter_sets   trials on the nodes in one process
 losses             nodes in processes of their own, and trials on them
-interruptions      Ctrl-C at random moments of the demonstration
 soak               a long run, its memory and its losses
 watched_stack      the nodes in one process and what is measured on them
 answered_clock     realtime that does not depend on the speed of the machine

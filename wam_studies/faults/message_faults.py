@@ -123,17 +123,8 @@ def _text(leaf: MessageLeaf, chance: Random) -> Any:
     """A name or a text replaced, doubled or lost."""
     if not leaf.is_sequence:
         return chance.choice([text for text in TEXTS if text != leaf.value])
-    names = list(leaf.value) or ["joint1"]
-    i, way = chance.randrange(len(names)), chance.randrange(4)
-    if way == 0:
-        names[i] = chance.choice(TEXTS[:3])
-    elif way == 1:
-        names[i] = names[i - 1]
-    elif way == 2:
-        del names[i]
-    else:
-        names.append(names[0])
-    return names
+    first, *others = names = list(leaf.value) or ["joint1"]
+    return chance.choice([[chance.choice(TEXTS[:3]), *others], [names[-1], *others], others, [*names, first]])
 
 
 def _is_integer(leaf: MessageLeaf) -> bool:

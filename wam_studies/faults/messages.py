@@ -49,10 +49,15 @@ def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
     return every[index % len(every)]
 
 
+def _topics(case: FaultCase) -> list[str]:
+    """Topics that a node takes."""
+    stack: WatchedStack = KEPT.ready(WatchedStack, case.configuration)
+    return [name for name in stack.topics if stack.interface.subscribers(name)]
+
+
 def play(case: FaultCase) -> FaultTrial:
     """A trial of `FAULTS.messages` messages."""
-    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
-    todo = plan(topics, case.seed, case.number)
+    todo = plan(_topics(case), case.seed, case.number)
     return watched_trial(case, todo.name, partial(_send, todo, case.chance))
 
 
@@ -70,7 +75,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
         message = stack.newest(todo.topic)
         if todo.fault.moves:
             made_effective(todo.topic, message, stack.cover)
-        data = broken(message, todo.fault, chance, stack.stamp(), serialize_message)
+        data = broken(message, todo.fault, chance, stack.driver.stamp, serialize_message)
         if data is not None:
             stack.inject(publisher, data)
             sent += 1
@@ -83,7 +88,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
 
 def play_second(case: FaultCase) -> FaultTrial:
     """A trial with a second publisher of false commands or feedback with right stamps; topics in turn."""
-    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    topics = _topics(case)
     topic = topics[case.number % len(topics)]
     return watched_trial(case, f"{topic}, second publisher", partial(_stream, topic))
 
@@ -92,11 +97,11 @@ def _stream(topic: str, stack: WatchedStack) -> int:
     """Answer every period with a false message that has the right stamp."""
     publisher = stack.foreign_publisher(topic)
     try:
-        end = stack.stamp() + int(FAULTS.streamed * SECOND)
-        while stack.stamp() < end and not stack.driver.safety.fault:
+        end = stack.driver.stamp + int(FAULTS.streamed * SECOND)
+        while stack.driver.stamp < end and not stack.driver.safety.fault:
             message = stack.newest(topic)
             made_effective(topic, message, stack.cover)
-            set_stamp(message, stack.stamp())
+            set_stamp(message, stack.driver.stamp)
             stack.inject(publisher, serialize_message(message))
             stack.run(0.001)
         stack.run(FAULTS.after_publishers)
@@ -109,7 +114,7 @@ def _stream(topic: str, stack: WatchedStack) -> int:
 
 def play_flood(case: FaultCase) -> FaultTrial:
     """A trial with many messages in each period, half of the trials with long arrays; topics in turn."""
-    topics = KEPT.ready(WatchedStack, case.configuration).taken_topics()
+    topics = _topics(case)
     topic, is_large = topics[case.number % len(topics)], case.number // len(topics) % 2 == 1
     return watched_trial(case, f"{topic}, {'large ' * is_large}flood", partial(_flood, topic, is_large))
 
@@ -120,10 +125,10 @@ def _flood(topic: str, is_large: bool, stack: WatchedStack) -> int:
     publisher = own or stack.foreign_publisher(topic)
     client, request = stack.service(Call("driver", "estop"))
     stack.allowed_motion = FAULTS.held_motion
-    sent, before, begin, future = 0, 0, stack.stamp(), None
+    sent, before, begin, future = 0, 0, stack.driver.stamp, None
     end = worked() + FAULTS.patience
     while (future is None or not future.done()) and worked() < end:
-        if (now := stack.stamp()) != before:
+        if (now := stack.driver.stamp) != before:
             before, message = now, stack.newest(topic)
             if is_large:
                 enlarge(message)
@@ -135,7 +140,7 @@ def _flood(topic: str, is_large: bool, stack: WatchedStack) -> int:
         if future is None and now - begin >= FAULTS.flooded * SECOND:
             future, begin = client.call_async(request), now
         stack.spin_once()
-    stack.delay = (stack.stamp() - begin) / SECOND
+    stack.delay = (stack.driver.stamp - begin) / SECOND
     if future is None or not future.done() or stack.delay > FAULTS.stopped:
         stack.escapes.append(f"no answer to an emergency stop within {1e3 * stack.delay:.0f} ms")
     if not own:

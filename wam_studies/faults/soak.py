@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import cycle, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -12,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import yaml
 
-from wam_bag.bag import Bag, read
+from wam_bag.bag import read
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
@@ -69,7 +70,9 @@ def soak(case: SoakCase) -> SoakRecord:
     first, last, early = samples[0], samples[-1], samples[len(samples) // 10].memory
     factor = (last.seconds - first.seconds) / max(last.wall - first.wall, 1e-9)
     count = sum(found.counts.values())
-    return SoakRecord(last.seconds, factor, early, last.memory, count, tuple(lost_in(found)), failure)
+    return SoakRecord(
+        last.seconds, factor, early, last.memory, count, tuple(found.losses.sentences(found.first)), failure
+    )
 
 
 @dataclass(frozen=True)
@@ -109,18 +112,12 @@ class SoakStudy(Study[SoakCase, SoakRecord]):
         return Scores([Row(name, exact(v, len(records)), required=bound) for name, (v, bound) in counts.items()])
 
 
-def lost_in(found: Bag) -> list[str]:
-    """What a bag lacks, in words."""
-    return found.losses.sentences(found.first)
-
-
 def _steps(arm: Arm, case: SoakCase) -> list[dict[str, Any]]:
     drawn = MoveGenerator(arm).moves(np.random.default_rng(case.seed), arm.joints.start, FAULTS.postures)
-    postures = [list(move.posture) for move in drawn]
     push = {"cover": arm.covers.names[-1], "contact_position": FAULTS.along * arm.covers.length[-1], **PUSH}
     moves = [
-        {"name": f"move {i}", "seconds": FAULTS.move, "posture": postures[i % FAULTS.postures], "push": push}
-        for i in range(max(1, int(case.seconds / FAULTS.move)))
+        {"name": f"move {i}", "seconds": FAULTS.move, "posture": list(move.posture), "push": push}
+        for i, move in enumerate(islice(cycle(drawn), max(1, int(case.seconds / FAULTS.move))))
     ]
     return [
         {"name": "release", "seconds": 0.5, "request": "enable"},

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from wam_studies.faults import interruptions, losses, messages, parameter_sets
+from wam_studies.faults import losses, messages, parameter_sets
 from wam_studies.faults.trials import FaultCase, FaultTrial
 from wam_studies.harness import Study, option
-from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, named
+from wam_studies.scores import NONE_AT_ALL, Row, Scores, by_group, exact, grouped, named
 
 LOCKSTEP: Final = {"timing.mode": "lockstep"}
 # how many periods are late depends on what else the computer does; nothing here is about that
@@ -20,28 +20,26 @@ class FaultKind(NamedTuple):
 
     Attributes
     ----------
-    full, short : number of trials.
+    full : number of trials.
     play : plays a trial.
     values : of the configuration.
     """
 
     full: int
-    short: int
     play: Callable[[FaultCase], FaultTrial]
     values: Mapping[str, Any]
 
 
 KINDS: Final = {
-    "messages": FaultKind(960, 2, messages.play, LOCKSTEP),
-    "messages-realtime": FaultKind(960, 1, messages.play, REALTIME),
-    "floods": FaultKind(80, 1, messages.play_flood, LOCKSTEP),
-    "floods-realtime": FaultKind(80, 1, messages.play_flood, REALTIME),
-    "parameters": FaultKind(2000, 5, parameter_sets.play, LOCKSTEP),
-    "losses": FaultKind(108, 0, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
-    "losses-realtime": FaultKind(108, 0, losses.play, {**REALTIME, **losses.FEEDBACK}),
-    "publishers": FaultKind(60, 2, messages.play_second, LOCKSTEP),
-    "publishers-realtime": FaultKind(60, 1, messages.play_second, REALTIME),
-    "interruptions": FaultKind(100, 0, interruptions.play, {}),
+    "messages": FaultKind(960, messages.play, LOCKSTEP),
+    "messages-realtime": FaultKind(960, messages.play, REALTIME),
+    "floods": FaultKind(80, messages.play_flood, LOCKSTEP),
+    "floods-realtime": FaultKind(80, messages.play_flood, REALTIME),
+    "parameters": FaultKind(2000, parameter_sets.play, LOCKSTEP),
+    "losses": FaultKind(108, losses.play, {**LOCKSTEP, **losses.FEEDBACK}),
+    "losses-realtime": FaultKind(108, losses.play, {**REALTIME, **losses.FEEDBACK}),
+    "publishers": FaultKind(60, messages.play_second, LOCKSTEP),
+    "publishers-realtime": FaultKind(60, messages.play_second, REALTIME),
 }
 
 
@@ -54,14 +52,13 @@ def run_fault(case: FaultCase) -> FaultTrial:
 class FaultStudy(Study[FaultCase, FaultTrial]):
     """Trials of each kind."""
 
-    title = "wrong messages, wrong parameters, lost nodes, Ctrl-C"
+    title = "wrong messages, wrong parameters, lost nodes"
     page = "docs/safety.md"
     seeds = (1,)
     over_topics = True
 
     kinds: tuple[str, ...] = option(tuple(KINDS), "kinds of faults", choices=tuple(KINDS))
     trials: int = option(0, "trials of each kind; 0: as many as in docs/safety.md", 0)
-    short: bool = option(False, "one or a few trials of each kind")
 
     run = staticmethod(run_fault)
 
@@ -70,7 +67,7 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
         for name in self.kinds:
             kind = KINDS[name]
             configuration = self.configuration.with_values(kind.values)
-            for number in range(self.trials or (kind.short if self.short else kind.full)):
+            for number in range(self.trials or kind.full):
                 yield FaultCase(configuration, name, seed, number)
 
     def own_values(self, case: FaultCase) -> Mapping[str, Any]:
@@ -83,8 +80,7 @@ class FaultStudy(Study[FaultCase, FaultTrial]):
 
     def score(self, records: Sequence[FaultTrial]) -> Scores:
         """Trials of each kind from which something escaped, and the worst values."""
-        every = {name: [one for one in records if one.kind == name] for name in self.kinds}
-        by_kind = {name: own for name, own in every.items() if own}
+        by_kind = grouped(records, lambda one: one.kind)
         rows = [row for name, own in by_kind.items() for row in named(list(_rows(own))[:1], name)]
         return Scores(rows, [by_group("Worst values", by_kind, _rows)])
 

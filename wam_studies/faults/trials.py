@@ -40,11 +40,6 @@ class FaultLimits:
     recovered: float = 20.0  # s, in which an operator gets an enabled arm again
     frozen: tuple[float, float] = (0.2, 1.5)  # s that a driver is frozen
 
-    python: float = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own
-    starting: float = 4.0  # s, before which one half of the moments of a Ctrl-C is
-    playing: float = 12.0  # s, before which the other half is
-    longest_end: float = 30.0  # s, from a Ctrl-C to the end
-
     push: float = 3.0  # N, after which a stable arm is slow
     pushed: float = 0.02  # s
     settling: float = 0.1  # s

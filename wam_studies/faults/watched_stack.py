@@ -188,10 +188,6 @@ class WatchedStack(StackClient):
                 self._escape(f"the arm's time is at rest for {FAULTS.patience:g} s of work without a fault")
                 return
 
-    def stamp(self) -> int:
-        """Time of the present state, ns."""
-        return int(self.driver.stamp)
-
     # states
 
     def _start_trial(self) -> None:
@@ -238,10 +234,6 @@ class WatchedStack(StackClient):
     def type_of(self, topic: str) -> Any:
         """Message class of a topic."""
         return message_type(self.topics[topic])
-
-    def taken_topics(self) -> list[str]:
-        """Topics that a node takes."""
-        return [name for name in self.topics if self.interface.subscribers(name)]
 
     def own_publisher(self, topic: str, chance: Any) -> Publisher | None:
         """A publisher that belongs to the stack: that of the node which publishes the topic, or of the commander."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.measures.limit_cycle import limit_cycle
-from wam_description.event import CAUSE, OBEYED, Code, Event
+from wam_description.event import OBEYED, Code, Event
 from wam_description.event_text import sentence
 from wam_description.rigid_body import Array
 from wam_studies.force_benchmark.tasks import RANGES, Task
@@ -116,7 +116,7 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
         cycle=cycle,
         cycle_is_reported=trace.event != OBEYED or trace.predicted_cycle >= OUTCOME.predicted * cycle > 0.0,
         reason=sentence(trace.event),
-        cause=_cause(trace.event),
+        cause=f"{trace.event.code} {trace.event.cause}".strip() if trace.event != OBEYED else "",
         is_over=peak > limit or mean > OUTCOME.overshoot * task.force + trace.impact,
     )
 
@@ -138,11 +138,6 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
     if trace.is_stopped and trace.event.code is not Code.FAULT and (peak <= task.force or is_declined):
         return TaskEnd.GIVEN_UP
     return TaskEnd.ENDED if trace.event != OBEYED else TaskEnd.SILENT
-
-
-def _cause(event: Event) -> str:
-    """Code of an event, and its cause where the code has several; '' where nothing has happened."""
-    return f"{event.code} {event.values.get(CAUSE, '')}".strip() if event != OBEYED else ""
 
 
 def _cycle(task: Task, trace: TaskTrace) -> float:

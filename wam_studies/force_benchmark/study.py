@@ -12,9 +12,9 @@ import numpy as np
 from wam_studies.figures.panels import FEW, Panel, Panels, measured
 from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd, TaskResult
 from wam_studies.force_benchmark.tasks import RANGES, Task, draw, task_values
-from wam_studies.force_benchmark.trial import ForceTaskCase, ForceTrial, play
+from wam_studies.force_benchmark.trial import FORCE_LOOP, ForceTaskCase, ForceTrial, play
 from wam_studies.harness import Study, option
-from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, ScoreTable, exact, percent, share
+from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, ScoreTable, by_group, exact, percent, share
 
 SENSORS, MOTORS = "joint sensors", "motors with dither"
 
@@ -33,6 +33,10 @@ class TaskGrouping(NamedTuple):
     def trials(self, every: Sequence[ForceTrial], name: str) -> list[ForceTrial]:
         """Those of a class."""
         return [trial for trial in every if self.name(trial.task) == name]
+
+    def results(self, every: Sequence[ForceTrial]) -> dict[str, list[TaskResult]]:
+        """Results of each class."""
+        return {name: [trial.result for trial in self.trials(every, name)] for name in self.classes}
 
 
 def _motion(task: Task) -> int:
@@ -121,8 +125,9 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
     def score(self, records: Sequence[ForceTrial]) -> Scores:
         """Shares of accepted tasks, what must not happen, outcomes by class, reasons."""
         rows = [*_accepted(records), *_of_feasible(records), *_forbidden(records), *_further(records)]
-        compared = [_controllers(records)] if any(trial.others for trial in records) else []
-        return Scores(rows, [*compared, _outcomes(records), _reasons(records)])
+        tables = [by_group("Outcomes", {"all": [trial.result for trial in records]}, _results)]
+        tables += [by_group(f"Outcomes by {one.title}", one.results(records), _results) for one in GROUPINGS]
+        return Scores(rows, [*_controllers(records), *tables, _reasons(records)])
 
     def failure(self, record: ForceTrial) -> str:
         """A wrong force without a reason, a force above the limit, an unreported cycle."""
@@ -176,26 +181,27 @@ def _of_feasible(trials: Sequence[ForceTrial]) -> Iterator[Row]:
             yield percent(f"right, of the feasible, {name}", share(ends[TaskEnd.DONE], ends.total()), *allowed)
 
 
-def _controllers(trials: Sequence[ForceTrial]) -> ScoreTable:
-    """What other controllers do with the same tasks."""
-    results: dict[tuple[str, str], list[TaskResult]] = {}
-    for feedback in FEEDBACK.classes:
-        for trial in FEEDBACK.trials(trials, feedback):
-            for name, result in {"force loop": trial.result, **trial.others}.items() if trial.others else ():
-                results.setdefault((feedback, name), []).append(result)
+def _controllers(trials: Sequence[ForceTrial]) -> Iterator[ScoreTable]:
+    """What other controllers do with the same tasks, where some were compared."""
     note = (
         f"A task is feasible where the force can be known to {KNOWN:.0%} by generalised least squares with the true "
         "friction, or where one of these gets it right."
     )
-    head = ("feedback", "controller", "tasks", "within 10 %", "wrong", "above the limit")
-    return ScoreTable("Other controllers", head, [[*who, *_counted(found)] for who, found in results.items()], note)
+    for feedback in FEEDBACK.classes:
+        results: dict[str, list[TaskResult]] = {}
+        for trial in FEEDBACK.trials(trials, feedback):
+            for name, result in {FORCE_LOOP: trial.result, **trial.others}.items() if trial.others else ():
+                results.setdefault(name, []).append(result)
+        if results:
+            yield by_group(f"Other controllers, {feedback}", results, _results, note)
 
 
-def _counted(results: Sequence[TaskResult]) -> Iterator[str]:
-    """Tasks, those that are right, those that are wrong and not declined, those above the limit."""
-    ends = Counter(one.outcome for one in results)
-    wrong = ends[TaskEnd.ENDED] + ends[TaskEnd.SILENT]
-    return map(str, (len(results), ends[TaskEnd.DONE], wrong, sum(one.is_over for one in results)))
+def _results(results: Sequence[TaskResult]) -> Iterator[Row]:
+    """How tasks have ended, and whatever the end, which were above the limit or cycled without a report."""
+    ends, count = Counter(one.outcome for one in results), len(results)
+    yield from (percent(end.value, share(ends[end], count)) for end in TaskEnd)
+    yield Row("above the limit", exact(sum(one.is_over for one in results), count), "tasks")
+    yield Row("cycles that nothing reports", exact(sum(one.cycles_silently for one in results), count), "tasks")
 
 
 def _forbidden(trials: Sequence[ForceTrial]) -> Iterator[Row]:
@@ -223,22 +229,6 @@ def _further(trials: Sequence[ForceTrial]) -> Iterator[Row]:
         *((f"tasks {end.value}", ends[end], len(trials)) for end in (TaskEnd.REFUSED, TaskEnd.GIVEN_UP)),
     ):
         yield percent(title, share(hits, of))
-
-
-def _outcomes(trials: Sequence[ForceTrial]) -> ScoreTable:
-    """Outcomes of each class of tasks."""
-    head = ("tasks", "", "n", *(end.value.split(":")[0] for end in TaskEnd), "above the limit", "cycles unreported")
-    groups = {("all", ""): trials}
-    groups |= {(one.title, name): one.trials(trials, name) for one in GROUPINGS for name in one.classes}
-    note = "Fractions of all tasks of a class; the last two columns are numbers of tasks, whatever their outcome."
-    return ScoreTable("Outcomes", head, [[*which, *_counts(own)] for which, own in groups.items()], note)
-
-
-def _counts(trials: Sequence[ForceTrial]) -> list[str]:
-    ends, results = _ends(trials), [trial.result for trial in trials]
-    shares = [f"{ends[end] / len(trials):.0%}" if trials else "–" for end in TaskEnd]
-    others = sum(one.is_over for one in results), sum(one.cycles_silently for one in results)
-    return [str(len(trials)), *shares, *map(str, others)]
 
 
 def _reasons(trials: Sequence[ForceTrial]) -> ScoreTable:

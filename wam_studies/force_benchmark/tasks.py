@@ -18,7 +18,7 @@ from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
 from wam_studies.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
-from wam_studies.identification.plants import factors, mismatch
+from wam_studies.identification.plants import drawn_cover, factors, mismatch
 
 Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
@@ -267,8 +267,7 @@ def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[flo
 
 def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -> Surface:
     covers = body.arm.covers
-    share = random.random()
-    cover = covers.names[1 + int(share / RANGES.on_outer * (len(covers.names) - 1)) if share < RANGES.on_outer else 0]
+    cover = covers.names[drawn_cover(random.random(), RANGES.on_outer, len(covers.names))]
     length = covers.length_of(cover)
     is_plane = cover == covers.names[-1] and bool(random.random() < RANGES.at_plane)
     lean = float(random.uniform(0.0, RANGES.steepest)) if is_plane else 0.0

@@ -22,8 +22,11 @@ from wam_studies.force_benchmark.surfaces import NAMES
 from wam_studies.force_benchmark.tasks import RANGES, Task, configured, steps
 
 STOPPED = 1.0  # s, after which a task that is held or in fault is over
+FORCE_LOOP = "force loop"
+Doer = tuple[Mapping[str, Any], type[UsualController] | None]
 # what else does a task: values of the configuration, and what takes the place of the force loop
-OTHERS: Mapping[str, tuple[Mapping[str, Any], type[UsualController] | None]] = {
+OWN: dict[str, Doer] = {FORCE_LOOP: ({}, None)}
+OTHERS: dict[str, Doer] = {
     "force loop that tries everything": ({"force_loop:limits.doubt": 1e6}, None),
     "admittance": ({}, Admittance),
     "torque control": ({}, TorqueControl),
@@ -60,16 +63,13 @@ class ForceTrial(NamedTuple):
 
 def play(case: ForceTaskCase) -> ForceTrial:
     """Do the task of a case."""
-    seed, number, task = case.seed, case.number, case.task
-    result = perform(case.configuration, task, case.seconds)
-    if not case.is_compared:
-        return ForceTrial(seed, number, task, result)
-    others = {
-        name: perform(case.configuration, task, case.seconds, changes, controller)
-        for name, (changes, controller) in OTHERS.items()
-        if not (task.second and controller)  # these know one force
+    results = {
+        name: perform(case.configuration, case.task, case.seconds, changes, controller)
+        for name, (changes, controller) in (OWN | OTHERS if case.is_compared else OWN).items()
+        if not (case.task.second and controller)  # these know one force
     }
-    return ForceTrial(seed, number, task, result, others, knowable(case.configuration, task))
+    known = knowable(case.configuration, case.task) if case.is_compared else math.nan
+    return ForceTrial(case.seed, case.number, case.task, results.pop(FORCE_LOOP), results, known)
 
 
 def perform(

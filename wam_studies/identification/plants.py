@@ -150,6 +150,11 @@ def mismatch(random: np.random.Generator, arm: Arm, mass: float, friction: float
     }
 
 
+def drawn_cover(share: float, beyond_first: float, covers: int) -> int:
+    """Index of the touched cover for a number from 0 to 1, of which a part is not the first one's."""
+    return 1 + int(share / beyond_first * (covers - 1)) if share < beyond_first and covers > 1 else 0
+
+
 class TrueFriction(NamedTuple):
     """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
 
@@ -235,26 +240,23 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     at_joint = own.T @ joint_coulomb + signs * ((own.T * np.sign(matrix.T)) @ (joint_lean * joint_coulomb))
     factor = load * (1.0 + signs * lean) + (own.T > 0.0) @ joint_load
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
-    # torques are reported with the torque constants as configured
-    scale = 1.0 / np.array(driver.mismatch.torque_constant)
-    found = TrueFriction(
-        # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
+    # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
+    at_motor = (
         coulomb * (1.0 + signs * lean)
         + by_tension
         + own.T @ joint_coulomb
         + signs * (constant - offset)
-        + factor * at_joint,
-        at_joint,
-        drop * (1.0 + signs * lean),
-        factor,
-        np.array(arm.motors.viscous_friction) + (own**2).T @ arm.joints.viscous_friction,
-        _each(law.motor_stribeck_velocity, n),
+        + factor * at_joint
     )
-    return found._replace(
-        coulomb=scale * found.coulomb,
-        at_joint=scale * found.at_joint,
-        drop=scale * found.drop,
-        viscous=scale * found.viscous,
+    # torques are reported with the torque constants as configured
+    scale = 1.0 / np.array(driver.mismatch.torque_constant)
+    return TrueFriction(
+        scale * at_motor,
+        scale * at_joint,
+        scale * (drop * (1.0 + signs * lean)),
+        factor,
+        scale * (np.array(arm.motors.viscous_friction) + (own**2).T @ arm.joints.viscous_friction),
+        _each(law.motor_stribeck_velocity, n),
     )
 
 

@@ -13,7 +13,6 @@ from wam_analysis.identification.motion import MotionSamples, evenly, motion
 from wam_analysis.identification.overlay import model_values
 from wam_analysis.identification.parameters import DIRECTIONS
 from wam_analysis.identification.regressor import Regressor
-from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import Array, RigidBody
@@ -22,7 +21,7 @@ from wam_driver.driver import Driver, DriverParameters
 from wam_studies.harness import Study, option
 from wam_studies.identification.excitation import moves, path
 from wam_studies.identification.plants import EXACT, KINDS, MeasuredSignals, measured_signals, plant, true_friction
-from wam_studies.scores import Interval, Row, Scores, by_group, exact, named, percent, share
+from wam_studies.scores import Interval, Row, Scores, by_group, exact, grouped, named, percent, share
 
 
 @dataclass(frozen=True)
@@ -87,18 +86,19 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     shared = configuration.shared
     found = identify(shared, samples)
     truth = true_friction(configuration)
-    load = link_load(shared, samples, found)
+    load = Regressor(shared, found.unknowns, samples, found.stribeck_velocity).load(found.values)
+    load = load.reshape(-1, load.shape[2])  # of each motor apart from friction, at each state, N m
     errors: dict[str, list[Array]] = {name: [] for name in ("level", "level_sd", "coulomb", "coulomb_sd", "before")}
     for way, direction in enumerate(DIRECTIONS):
         moves = (samples.velocities * (1.0 - 2.0 * way) > 0.0).reshape(load.shape)
         rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
-        true = truth.level(way, AT.speed, load, moves)
+        true, coulomb = truth.level(way, AT.speed, load, moves), truth.coulomb[way]
+        at = found.unknowns.places(f"motors.coulomb_{direction}")
         errors["level"].append((rows @ found.values - true) / true)
         errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
         errors["before"].append((rows @ found.unknowns.present - true) / true)
-        at = found.unknowns.places(f"motors.coulomb_{direction}")
-        errors["coulomb"].append((found.values[at] - truth.coulomb[way]) / truth.coulomb[way])
-        errors["coulomb_sd"].append(found.sd[at] / truth.coulomb[way])
+        errors["coulomb"].append((found.values[at] - coulomb) / coulomb)
+        errors["coulomb_sd"].append(found.sd[at] / coulomb)
     gravity = _gravity_errors(configuration, found)
     joined = {name: np.concatenate(each) for name, each in errors.items()}
     return IdentificationResult(
@@ -137,13 +137,6 @@ def play(
     n, values = len(matrix), np.array(rows)
     torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, AT.signals])))
     return motion(evenly(np.array(stamps)[arrives], values[arrives, :n], torque[arrives])), driver.safety.fault
-
-
-def link_load(shared: Shared, samples: MotionSamples, found: Identification) -> Array:
-    """Torque that the cables transmit to each motor apart from friction, at each state, (k, n), N m."""
-    regressor = Regressor(shared, found.unknowns, samples, found.stribeck_velocity)
-    load = regressor.load(found.values)
-    return load.reshape(-1, load.shape[2])
 
 
 def friction_row(found: Identification, direction: str, load: Array) -> Array:
@@ -201,7 +194,7 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
 
     def score(self, records: Sequence[IdentificationResult]) -> Scores:
         """Errors of all plants, errors by stated ones of each kind, and all of each kind as a table."""
-        kinds = {kind: [one for one in records if one.kind == kind] for kind in dict.fromkeys(r.kind for r in records)}
+        kinds = grouped(records, lambda one: one.kind)
         every = chain.from_iterable(named(_rows(own), kind) for kind, own in kinds.items())
         ratios = [row for row in every if "standard error, rms" in row.name]
         return Scores([*_rows(records), *ratios], [by_group("By kind of plant", kinds, _rows)])
