@@ -28,7 +28,7 @@ from wam_studies.thesis import (
 from wam_studies.thesis.definition import configured, load, names
 from wam_studies.thesis.evaluation import function_of
 from wam_studies.thesis.one_link import one_link, played
-from wam_studies.thesis.recording import Step
+from wam_studies.thesis.recording import Recording, Step
 from wam_studies.thesis.rows import Comparison, Result
 from wam_studies.thesis.sweeping import SweptRun, record_run
 
@@ -47,6 +47,11 @@ def pressing_run(folder: Path, run: tuple[str, int], time, force, steps=PRESS, d
     if desired:
         given["force_command"] = forces(time, (0.0, -desired, 0.0))
     return recorded(load(run[0]), run[1], given | topics, steps, folder)
+
+
+def after(run: Recording, settings: dict[str, list[float]]) -> Recording:
+    """A run with other live parameters."""
+    return run._replace(parameters=run.parameters.with_values(settings))
 
 
 # definition
@@ -150,7 +155,7 @@ def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Pa
     experiment = load("testbed-5.6")
     number = [run.name for run in experiment.runs].index("large_step_saturated")
     run = recorded(experiment, number, {}, PRESS, tmp_path)
-    link = one_link(run, {"driver:effects.added_coulomb_friction": [0.949]})
+    link = one_link(after(run, {"driver:effects.added_coulomb_friction": [0.949]}))
     assert link.loop.error_limit == pytest.approx(22.24 * LEVER)
     assert link.loop.gain == pytest.approx(0.01921 / LEVER**2)
     assert link.node.static_friction == pytest.approx(0.949)
@@ -158,7 +163,7 @@ def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Pa
     late = recorded(experiment, number + 1, {}, PRESS, tmp_path)
     assert (link.loop.delay_samples, one_link(late).loop.delay_samples) == (0, 1)
     with pytest.raises(ValueError, match="without G_P"):
-        one_link(run, {"force_loop:force_proportional_gain": [0.001]})
+        one_link(after(run, {"force_loop:force_proportional_gain": [0.001]}))
 
 
 def test_stiction_cycle_of_a_square_wave(tmp_path: Path) -> None:

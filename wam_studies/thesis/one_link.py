@@ -1,16 +1,15 @@
 """The one-link testbed in the model of chapter 5, from the parameters of a recording."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from wam_control.force.force_law import ForceLaw
-from wam_control.force.force_loop_parameters import AXES
+from wam_control.force.force_loop_parameters import ForceLoopParameters, force_law
 from wam_description.arm import seconds
 from wam_description.world import Springs
+from wam_driver.driver import DriverParameters
 from wam_studies.figures.panels import Line, Numbers, Series, line_only, measured
 from wam_studies.plant.ideal_testbed import loop_node
 from wam_studies.thesis.bounds import BOUNDS
@@ -18,7 +17,6 @@ from wam_studies.thesis.recording import Recording, Step
 from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Motion, Verdict, simulate
 
-LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
 ACROSS = 1  # y of the link's frame, along which the testbed presses
 
 
@@ -62,50 +60,34 @@ def joint_stiffness(recording: Recording) -> float:
     return float(springs.stiffness[0] * springs.lever[0] ** 2)
 
 
-def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) -> OneLink:
-    """Node and loop from a recording.
-
-    Parameters
-    ----------
-    settings : live parameters set since the start, ``{'driver:effects.added_coulomb_friction': [0.9]}``.
+def one_link(recording: Recording) -> OneLink:
+    """Node and loop from the parameters of a recording.
 
     Raises
     ------
     ValueError
         if the arm has more than one joint, or the loop has a G_P.
     """
-    recording = recording._replace(parameters=recording.parameters.with_values(settings or {}))
-    arm, timing = recording.shared.arm, recording.shared.timing
+    arm, control = recording.shared.arm, recording.node("force_loop", ForceLoopParameters)
     if len(arm.joints.names) != 1:
         raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
-    control = recording.parameters.node("force_loop")
-    law = ForceLaw("force", AXES, *(tuple(control[f"force_{name}"]) for name in LAW))
+    law = force_law(control)
     if law.proportional_gain[ACROSS]:
         raise ValueError(
             f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P"
         )
-    ratio, lever = 1.0 / arm.joint_from_motor[0], float(control["contact_position"])
-    added = float(recording.parameters.node("driver")["effects.added_coulomb_friction"][0])
+    ratio, lever = 1.0 / arm.joint_from_motor[0], control.contact_position
+    (added,) = recording.node("driver", DriverParameters).effects.added_coulomb_friction
     node = loop_node(arm, joint_stiffness(recording))
     friction = {f"{kind}_friction": getattr(node, f"{kind}_friction") + added for kind in ("dynamic", "static")}
     loop = IntegralLoop(
         gain=law.gain[ACROSS] / lever**2,
         error_limit=law.error_limit[ACROSS] * lever,
         deadband=law.deadband[ACROSS] * lever,
-        sample_period=seconds(timing.outer_period_ns),
-        delay_samples=int(control["delay_samples"]),
+        sample_period=seconds(recording.shared.timing.outer_period_ns),
+        delay_samples=control.delay_samples,
     )
     return OneLink(replace(node, **friction), loop, lever, ratio)
-
-
-def set_until(recording: Recording, step: Step) -> dict[str, Any]:
-    """Live parameters set before and by a step."""
-    found: dict[str, Any] = {}
-    for played in recording.steps:
-        found.update(played.settings)
-        if played == step:
-            break
-    return found
 
 
 class TestbedStep(NamedTuple):
@@ -170,7 +152,9 @@ class TestbedStep(NamedTuple):
 
 def played(run: Recording, step: Step | None = None, topic: str = "joint_sensors") -> TestbedStep:
     """What a run did in a step, or in all of it, by the joint angles of a topic."""
-    link = one_link(run, set_until(run, step) if step else None)
+    before = run.steps[: run.steps.index(step) + 1] if step in run.steps else ()
+    settings = {key: value for one in before for key, value in one.settings.items()}
+    link = one_link(run._replace(parameters=run.parameters.with_values(settings)))
     sensors, motors = run.joints(topic), run.joints("motor_states")
     begin, end = (step.begin, step.end) if step else (0.0, math.inf)
     if not math.isnan(run.fault_time):
