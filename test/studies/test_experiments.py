@@ -66,7 +66,7 @@ def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played
         configuration = configured(experiment, run, tmp_path)
         shared = configuration.shared  # refuses what does not fit together
         steps = scenario.load(tmp_path / f"{run.name}.yaml", shared)
-        assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
+        assert sum(step.seconds for step in steps) == pytest.approx(sum(step["seconds"] for step in run.steps))
 
 
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:

@@ -8,15 +8,14 @@ import numpy as np
 from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
-from wam_description.effects import Ripples, no_effects
+from wam_description.effects import Ripples
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
-from wam_driver.plant import Plant
 from wam_studies.figures.conditions import CASE
 from wam_studies.figures.panels import Numbers, Panel, Panels, Series, line_only
-from wam_studies.plant.ideal_testbed import EMPTY
+from wam_studies.plant.ideal_testbed import released_plant
 
 WORST = "worst by statics, "  # label of a bound
 Pushes = list[tuple[tuple[float, ...], Numbers]]
@@ -65,8 +64,7 @@ class OpenLoopArm:
         """
         arm, n = self.arm, len(q)
         start = replace(arm, joints=replace(arm.joints, start=q))
-        plant = Plant(start, EMPTY, replace(no_effects(start), ripples=self._ripples), CASE.open_loop_step)
-        plant.brake(False)
+        plant = released_plant(start, step=CASE.open_loop_step, ripples=self._ripples)
         amplifier = Amplifier(start.motors, self._amplifier_parameters, np.random.default_rng(0))
         jacobian = self._body.tool_jacobian(q)
         stiffness = CASE.contact_at_tip * jacobian.T @ jacobian

@@ -30,11 +30,6 @@ class Run(NamedTuple):
     values: Mapping[str, Any] = {}
     stops: bool = False  # whether the driver is expected to stop the arm
 
-    @property
-    def seconds(self) -> float:
-        """Length of all steps, s."""
-        return sum(float(step["seconds"]) for step in self.steps)
-
 
 class SampleDefinition(NamedTuple):
     """The part of a run that is kept as a sample bag.
