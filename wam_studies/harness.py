@@ -82,8 +82,8 @@ class Study(ABC, Generic[Case, Record]):
         return ()
 
     def failure(self, record: Record) -> str:
-        """Why a case is to be looked at; '' where it is as it should be."""
-        return ""
+        """Why a case is to be looked at, by default the field of this name; '' where it is as it should be."""
+        return str(getattr(record, "failure", ""))
 
     def own_values(self, case: Case) -> Collection[str]:
         """Parameters that a case sets itself, so that --set has no effect on them."""

@@ -63,9 +63,6 @@ def outcome(force: list[float], hypotheses: dict[int, tuple[Hypothesis, ...]]) -
     return found
 
 
-# true contacts
-
-
 def test_a_contact_is_evaluated_as_by_hand() -> None:
     outer, inner = hypothesis("outer_link", 0.8, 0.33, 0.02), hypothesis("inner_link", 0.2)
     found = outcome([*PUSHED, *[0.0] * 40], dict.fromkeys(range(104, 170), (outer, inner)))
@@ -139,9 +136,6 @@ def test_a_dithered_arm_is_compared_with_the_truth_over_a_whole_cycle() -> None:
     assert errors["dither"] < 1e-9
 
 
-# numbers and marks
-
-
 def test_intervals_are_those_of_the_textbooks() -> None:
     found = share(8, 10)  # Wilson 1927, as in Brown, Cai & DasGupta 2001
     assert (found.value, found.low, found.high) == (0.8, pytest.approx(0.490, abs=2e-3), pytest.approx(0.943, abs=2e-3))
@@ -211,9 +205,6 @@ def test_a_missed_must_is_named_and_a_met_one_is_not() -> None:
     assert half.value == math.inf, "half the contacts without a place"
 
 
-# truth
-
-
 @pytest.mark.parametrize("cover", ["inner_link", "outer_link"])
 def test_torques_of_a_load_are_those_of_virtual_work(cover: str) -> None:
     random = np.random.default_rng(3)
@@ -261,9 +252,6 @@ def test_a_hand_that_misses_is_not_counted() -> None:
     assert found_there.outcomes == []
     assert found_there.excluded == 0
     assert found_there.not_made == len(scenario.planned)
-
-
-# scenarios
 
 
 def study(**options: Any) -> ContactStudy:

@@ -50,17 +50,14 @@ def test_every_fault_changes_a_message_unless_it_means_the_same() -> None:
         made = {broken(message(), one, Random(seed), NOW, lambda m: bytes(serialize_message(m))) for seed in range(20)}
         if one.name not in ("the same message again", "names in another order", "an extreme integer"):
             assert whole not in made, one.name
+    found = broken_message("names in another order", 3)
+    assert dict(zip(found.name, found.position, strict=True)) == {"joint1": 0.1, "joint2": 0.2}
 
 
 def test_the_same_seed_breaks_a_message_in_the_same_way() -> None:
     for one in MESSAGE_FAULTS:  # as text, because CDR has padding that nobody sets
         first, again = (broken(message(), one, Random(7), NOW, lambda m: str(m).encode()) for _ in "12")
         assert first == again
-
-
-def test_names_in_another_order_keep_their_values() -> None:
-    found = broken_message("names in another order", 3)
-    assert dict(zip(found.name, found.position, strict=True)) == {"joint1": 0.1, "joint2": 0.2}
 
 
 def test_stamps_of_the_future_are_later_and_of_the_past_earlier() -> None:
@@ -106,13 +103,9 @@ def test_escapes_are_counted_by_kind_and_each_is_listed() -> None:
 
 def test_cases_are_the_trials_of_each_kind() -> None:
     found = list(FaultStudy(CONFIGURATION, ("parameters", "losses"), trials=2).cases(3))
-    assert [str(case) for case in found] == [
-        "parameters 0, seed 3", "parameters 1, seed 3", "losses 0, seed 3", "losses 1, seed 3",
-    ]  # fmt: skip
+    names = [f"{kind} {number}, seed 3" for kind in ("parameters", "losses") for number in (0, 1)]
+    assert [str(case) for case in found] == names
     assert all(case.configuration.shared.timing.mode == "lockstep" for case in found)
-
-
-# what is watched, on the nodes
 
 
 def in_lockstep(**more: object) -> Configuration:

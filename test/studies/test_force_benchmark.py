@@ -24,7 +24,6 @@ REPORTED = warning(Code.NOT_REACHED, "force_strays", axis="force", unit="N", mea
 TASK = Task(Q, ACROSS, 10.0)
 
 
-# --------------------------------------------------------------------------------------- tasks
 def test_a_task_depends_on_its_seed_and_number_alone() -> None:
     assert draw(WAM, 1, 17) == DRAWN[17]
     assert draw(WAM, 2, 17) != DRAWN[17]
@@ -125,7 +124,6 @@ def test_true_motors_give_another_torque_than_their_reported_one() -> None:
     assert [a / b for a, b in zip(true, reported, strict=True)] == pytest.approx(factors)
 
 
-# ------------------------------------------------------------------------------------ outcomes
 def trace(forces: Any, **more: Any) -> TaskTrace:
     given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, OBEYED, False, 0.0)
     return given._replace(**more)
@@ -181,7 +179,6 @@ def test_the_dither_is_no_cycle() -> None:
     assert not evaluated(dithered, trace(wave)).cycles_silently
 
 
-# -------------------------------------------------------------------------------------- trials
 def test_the_inertia_of_an_impact_is_that_of_the_compiled_plant() -> None:
     """Kinetic energy of MuJoCo's model with links and rotors at the speeds of stiff cables."""
     import mujoco
@@ -217,7 +214,6 @@ def test_a_force_is_done_a_blind_one_refused_and_a_wrong_place_is_not_called_don
     assert abs(wrong.mean - 10.0) > 1.0
 
 
-# -------------------------------------------------------------------------------------- scores
 STUDY = ForceStudy(CONFIGURATION)
 
 

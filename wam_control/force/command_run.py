@@ -137,7 +137,8 @@ class Resting:
         if self._is_decided or (axis.sensed is not None and axis.sensed.force_sd == math.inf):
             return
         self._is_decided = True
-        mass, left = measurement.payload(q, self.torques, torque_sd)
+        sd = math.hypot(torque_sd, FORCE.payload_rest * float(np.abs(self.torques).max()))
+        mass, left = measurement.payload(q, self.torques, sd)
         if mass > 0.0 and left <= FORCE.unexplained:
             return
         if axis.sensed is None or axis.place is None:

@@ -100,10 +100,6 @@ class ContactStudy(Study[ContactCase, ContactScore]):
         rows = [*stated_rows(records, self.configuration.shared.arm), *degraded_rows(records)]
         return Scores(rows, [_extent(in_groups(records, *GROUPS)), *degraded_tables(records)])
 
-    def failure(self, record: ContactScore) -> str:
-        """Why a case ended early."""
-        return record.failure
-
     def panels(self, records: Sequence[ContactScore]) -> Panels:
         """Position errors and calibration on the arm as stated."""
         found = on_outer_link(records, self.configuration.shared.arm)

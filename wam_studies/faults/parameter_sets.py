@@ -97,9 +97,9 @@ def _code(field: Field) -> int:
 
 
 def _scaled(field: Field, value: Any, chance: Random) -> Assignment:
-    """A value between a fifth and five times the present one."""
-    factor = 5.0 ** chance.uniform(-1.0, 1.0)
-    scaled = [one * factor if field.kind is float else one for one in (value if field.is_array else [value])]
+    """A value between a fifth and five times the present one, each number of an array by itself."""
+    numbers = value if field.is_array else [value]
+    scaled = [one * 5.0 ** chance.uniform(-1.0, 1.0) if field.kind is float else one for one in numbers]
     return Assignment(field.name, _code(field), scaled if field.is_array else scaled[0])
 
 

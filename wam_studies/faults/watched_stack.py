@@ -215,8 +215,8 @@ class WatchedStack(StackClient):
         while worked() < end:
             if self.driver.safety.mode is Mode.ENABLED and self._goes_on():
                 return ""
-            self.ask("reset_fault")
-            message = self.ask("enable", True)
+            self.request(Call("driver", "reset_fault"))
+            message = self.request(Call("driver", "enable", True)).message
             self.wait(lambda: self.driver.safety.mode is Mode.ENABLED, 0.2)
         why = message or self.driver.safety.fault
         return f"the arm cannot be enabled again within {FAULTS.patience:g} s of work: {why}"
@@ -224,10 +224,6 @@ class WatchedStack(StackClient):
     def _goes_on(self) -> bool:
         end = self.driver.stamp + self.shared.timing.outer_period_ns
         return self.wait(lambda: self.driver.stamp > end, 3.0) and self.driver.safety.mode is Mode.ENABLED
-
-    def ask(self, service: str, switch: bool | None = None) -> str:
-        """Call a service of the driver; returns its message."""
-        return self.request(Call("driver", service, switch)).message
 
     # faults
 

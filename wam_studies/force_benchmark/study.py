@@ -11,7 +11,7 @@ import numpy as np
 
 from wam_studies.figures.panels import FEW, Panel, Panels, measured
 from wam_studies.force_benchmark.outcome import OUTCOME, TaskEnd, TaskResult
-from wam_studies.force_benchmark.tasks import RANGES, Task, draw, task_values
+from wam_studies.force_benchmark.tasks import POSES, RANGES, Task, draw, task_values
 from wam_studies.force_benchmark.trial import FORCE_LOOP, ForceTaskCase, ForceTrial, play
 from wam_studies.harness import Study, option
 from wam_studies.scores import ANY, NONE_AT_ALL, Row, Scores, ScoreTable, by_group, exact, percent, share
@@ -50,7 +50,7 @@ def _unknown(task: Task) -> int:
 
 
 FEEDBACK = TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: task.is_dithered)
-POSE = TaskGrouping("pose", list(RANGES.poses), lambda task: list(RANGES.poses).index(task.pose))
+POSE = TaskGrouping("pose", list(POSES), lambda task: list(POSES).index(task.pose))
 CONTACT = TaskGrouping(
     "contact",
     ("plane at the tip", "rod across the outer link", "rod across the inner link"),
@@ -124,7 +124,7 @@ class ForceStudy(Study[ForceTaskCase, ForceTrial]):
 
     def score(self, records: Sequence[ForceTrial]) -> Scores:
         """Shares of accepted tasks, what must not happen, outcomes by class, reasons."""
-        rows = [*_accepted(records), *_of_feasible(records), *_forbidden(records), *_further(records)]
+        rows = [*_accepted(records), *_of_feasible(records), *_of_all(records)]
         tables = [by_group("Outcomes", {"all": [trial.result for trial in records]}, _results)]
         tables += [by_group(f"Outcomes by {one.title}", one.results(records), _results) for one in GROUPINGS]
         return Scores(rows, [*_controllers(records), *tables, _reasons(records)])
@@ -204,31 +204,21 @@ def _results(results: Sequence[TaskResult]) -> Iterator[Row]:
     yield Row("cycles that nothing reports", exact(sum(one.cycles_silently for one in results), count), "tasks")
 
 
-def _forbidden(trials: Sequence[ForceTrial]) -> Iterator[Row]:
-    """What must not happen."""
-    over = f"true force above the impact (3.1) plus {OUTCOME.overshoot:g} times the commanded force"
-    for title, number in (
-        (over, sum(trial.result.is_over for trial in trials)),
-        ("limit cycles that nothing reports", sum(trial.result.cycles_silently for trial in trials)),
-    ):
-        yield Row(title, exact(number, len(trials)), "tasks", required=NONE_AT_ALL)
+def _of_all(trials: Sequence[ForceTrial]) -> Iterator[Row]:
+    """What must not happen, what is reported of right forces, and how many tasks are declined."""
+    _, *declined, _, _, over, cycling = _results([trial.result for trial in trials])
+    limit = f"true force above the impact (3.1) plus {OUTCOME.overshoot:g} times the commanded force"
+    yield over._replace(name=limit, required=NONE_AT_ALL)
+    yield cycling._replace(name="limit cycles that nothing reports", required=NONE_AT_ALL)
     for is_mistaken, what, required in ((False, "", NONE_AT_ALL), (True, ", the position declared wrongly", ANY)):
         ends = _ends([trial for trial in trials if bool(trial.task.mistake) is is_mistaken])
         silent = exact(ends[TaskEnd.SILENT], ends.total())
         yield Row(f"wrong force without a reason{what}", silent, "tasks", required=required)
-
-
-def _further(trials: Sequence[ForceTrial]) -> Iterator[Row]:
-    """What is reported of right forces, and how many tasks are declined."""
-    ends = _ends(trials)
     quiet = _ends([trial for trial in trials if not trial.result.reason])
-    done, still = ends[TaskEnd.DONE], quiet[TaskEnd.DONE]
-    for title, hits, of in (
-        ("tasks within 10 % of which a warning is reported all the same", done - still, done),
-        ("tasks without any reason reported, within 10 %", still, quiet.total()),
-        *((f"tasks {end.value}", ends[end], len(trials)) for end in (TaskEnd.REFUSED, TaskEnd.GIVEN_UP)),
-    ):
-        yield percent(title, share(hits, of))
+    done, still = _ends(trials)[TaskEnd.DONE], quiet[TaskEnd.DONE]
+    yield percent("tasks within 10 % of which a warning is reported all the same", share(done - still, done))
+    yield percent("tasks without any reason reported, within 10 %", share(still, quiet.total()))
+    yield from (row._replace(name=f"tasks {row.name}") for row in declined)
 
 
 def _reasons(trials: Sequence[ForceTrial]) -> ScoreTable:

@@ -6,7 +6,7 @@ contacts anywhere on both links, and a true arm that differs from the configured
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +24,8 @@ Range = tuple[float, float]
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
 
 
-def _poses() -> dict[str, float]:
-    return {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}
+# share of each class of poses
+POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,6 @@ class TaskRanges:
     at_rest: float = 1.5  # s of the whole force, until a surface moves
     full_friction: float = 0.5  # sd of the friction of a moving surface, which is there in full: rms of `frictions`
 
-    poses: Mapping[str, float] = field(default_factory=_poses)  # share of each class
     margin: float = 0.1  # rad, of a start from the ends of the joints
     near: float = 0.3  # rad, of a singular pose
 
@@ -168,7 +167,7 @@ class ElbowJoint(NamedTuple):
         return cls(joint, exact if abs(exact - straight) < ROUNDING else straight)
 
     def pose(self, q: Sequence[float]) -> str:
-        """The class of a pose, one of `TaskRanges.poses`; the shoulder's second joint is two before the elbow."""
+        """The class of a pose, one of `POSES`; the shoulder's second joint is two before the elbow."""
         bend = abs(q[self.joint] - self.straight)
         if bend < RANGES.near:
             return "elbow nearly straight"
@@ -252,7 +251,7 @@ def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[flo
     joints = arm.joints
     ends = zip(joints.lower, joints.upper, strict=True)
     q = [float(random.uniform(low + RANGES.margin, high - RANGES.margin)) for low, high in ends]
-    kind = random.choice(list(RANGES.poses), p=list(RANGES.poses.values()))
+    kind = random.choice(list(POSES), p=list(POSES.values()))
     near = float(random.uniform(-RANGES.near, RANGES.near))
     if kind == "elbow nearly straight":
         q[elbow.joint] = elbow.straight + near

@@ -199,10 +199,6 @@ class IdentificationStudy(Study[IdentificationTrial, IdentificationResult]):
         ratios = [row for row in every if "standard error, rms" in row.name]
         return Scores([*_rows(records), *ratios], [by_group("By kind of plant", kinds, _rows)])
 
-    def failure(self, record: IdentificationResult) -> str:
-        """Why the motion ended early."""
-        return record.failure
-
 
 def _rows(records: Sequence[IdentificationResult]) -> Iterator[Row]:
     """Errors of friction, of Coulomb friction alone and of gravity."""
