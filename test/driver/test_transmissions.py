@@ -62,8 +62,7 @@ def test_torque_of_a_circuit_over_its_stretch_is_that_of_a_slack_strand_and_of_b
             plant.data.qpos[:] = (stretch, 0.0)
             mujoco.mj_forward(plant.model, plant.data)
             found.append(plant.circuit_torque[0])
-        expected = law(stretches)
-        assert found == pytest.approx(expected, rel=0.0, abs=1e-6 * np.abs(expected).max())
+        assert found == pytest.approx(law(stretches), rel=0.0, abs=1e-6 * np.abs(law(stretches)).max())
 
 
 def test_link_moves_within_the_play_and_not_beyond() -> None:

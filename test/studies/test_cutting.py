@@ -45,21 +45,16 @@ def written(path: Path, is_turned: bool = False) -> Path:
     return path
 
 
-def messages(file: Path) -> list[tuple[str, int, int, int, bytes]]:
-    """Every message of a file by the library of its format, in the order in which it stands there."""
-    with file.open("rb") as stream:
+def messages(part: Path) -> list[tuple[str, int, int, int, bytes]]:
+    """Every message of a part by the library of its format, in the order in which it stands there."""
+    with (part / "part_0.mcap").open("rb") as stream:
         found = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
         return [(c.topic, m.log_time, m.publish_time, m.sequence, bytes(m.data)) for _, c, m in found]
 
 
-def made(source: Path, target: Path, part: SampleDefinition) -> Path:
-    """The file of a part."""
-    cut(source, target, part)
-    return target / "part_0.mcap"
-
-
 def test_the_part_has_the_messages_of_its_time_and_what_was_latched_before(tmp_path: Path) -> None:
-    found = messages(made(written(tmp_path / "whole"), tmp_path / "part", PART))
+    cut(written(tmp_path / "whole"), tmp_path / "part", PART)
+    found = messages(tmp_path / "part")
     assert [time for topic, time, *_ in found if topic == LATCHED] == [5_000_000, 50_000_000]
     assert [entry for entry in found if entry[0] == "/wam/fast"] == [
         ("/wam/fast", k * 1_000_000, k * 1_000_000 + 7, k + 1, bool_message(k % 3 == 0)) for k in range(20, 60)
@@ -77,17 +72,18 @@ def test_the_part_has_the_messages_of_its_time_and_what_was_latched_before(tmp_p
 
 def test_a_thinned_topic_has_the_first_of_so_many_messages_and_the_part_says_so(tmp_path: Path) -> None:
     part = PART._replace(thinned={"fast": 10}, topics=("fast",))
-    found = messages(made(written(tmp_path / "whole"), tmp_path / "part", part))
+    cut(written(tmp_path / "whole"), tmp_path / "part", part)
+    found = messages(tmp_path / "part")
     assert [time for _, time, *_ in found] == [20_000_000, 30_000_000, 40_000_000, 50_000_000]
     said = read(tmp_path / "part").metadata[CUT]
     assert (said["thinned"], said["topics"]) == ("fast:10", "fast")
 
 
 def test_equal_messages_give_an_equal_file_however_they_were_recorded(tmp_path: Path) -> None:
-    one = made(written(tmp_path / "one"), tmp_path / "a" / "part", PART)
-    other = made(written(tmp_path / "other", is_turned=True), tmp_path / "b" / "part", PART)
-    assert one.read_bytes() == other.read_bytes()
-    assert (one.parent / "metadata.yaml").read_bytes() == (other.parent / "metadata.yaml").read_bytes()
+    cut(written(tmp_path / "one"), tmp_path / "a" / "part", PART)
+    cut(written(tmp_path / "other", is_turned=True), tmp_path / "b" / "part", PART)
+    for name in ("part_0.mcap", "metadata.yaml"):
+        assert (tmp_path / "a" / "part" / name).read_bytes() == (tmp_path / "b" / "part" / name).read_bytes()
 
 
 def test_what_cannot_be_cut_is_refused_and_nothing_is_overwritten(tmp_path: Path) -> None:

@@ -24,9 +24,8 @@ def test_a_transmission_by_4_10_would_cost_the_arm_a_tenth_of_its_bandwidth() ->
     """By the eigenvalues of two masses: so little do 3 % of the asymptote say against the transmission."""
     configuration = Configuration.load(packaged("wam"))
     m = measures(configuration)
-    columns = stiffness_rule(configuration).values()
-    for row, jm, jl in zip(zip(*columns, strict=True), m.rotor_inertia, m.link_inertia, strict=True):
-        transmission, contact, best, _, bandwidth, _, with_best = row
+    joints = zip(*stiffness_rule(configuration).values(), m.rotor_inertia, m.link_inertia, strict=True)
+    for transmission, contact, best, _, bandwidth, _, with_best, jm, jl in joints:
         for cable, expected in ((transmission, bandwidth), (best, with_best)):
             stiffness = np.array([[cable, -cable], [-cable, cable + contact]])
             lowest = np.linalg.eigvals(np.linalg.solve(np.diag([jm, jl]), stiffness)).real.min()
