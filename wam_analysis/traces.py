@@ -127,6 +127,12 @@ class Traces(NamedTuple):
         """Whether a contact is estimated and there is none, (k,)."""
         return self.is_compared & ~self.true.acts & self.estimated.acts
 
+    @property
+    def false_percent(self) -> float:
+        """In how much of the time without contact one is estimated, %; NaN where there is no such time."""
+        free = np.count_nonzero(self.is_compared & ~self.true.acts)
+        return 100.0 * np.count_nonzero(self.is_false) / free if free else NAN
+
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)

@@ -201,14 +201,18 @@ def too_short(settling_times: Sequence[tuple[int, float]], steps: Iterable[StepS
 
 
 def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:
-    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why."""
+    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why.
+
+    Time and reason are those of the longest.
+    """
     lines = []
     for kind in dict.fromkeys(one.name for one in reactions):
-        first, *others = [one for one in reactions if one.name is kind]
-        verb = REFUSAL if kind is Code.REFUSED else f"{REFUSAL if first.holds else 'reported'} ({kind})"
-        again = f" and {len(others)} more time{'s' * (len(others) > 1)}" if others else ""
-        begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
-        lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
+        alike = [one for one in reactions if one.name is kind]
+        longest, others = max(alike, key=lambda one: one.end - one.begin), len(alike) - 1
+        verb = REFUSAL if kind is Code.REFUSED else f"{REFUSAL if longest.holds else 'reported'} ({kind})"
+        again = f" and {others} more time{'s' * (others > 1)}" if others else ""
+        begin, end = ((stamp - zero) / 1e9 for stamp in (longest.begin, longest.end))
+        lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {longest.reason}")
     return lines
 
 

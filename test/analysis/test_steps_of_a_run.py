@@ -648,6 +648,10 @@ def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(secon
     recording = Played()
     recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
     assert f"false detections for at most 10 % of the time without contact: {answer}" in verdict(recording.summary())
+    contact, said = section_of(recording.bag(), "contact"), answer.partition("(")[2].strip("()")
+    listed = contact.wrong if answer.startswith("NO") else contact.shows
+    assert any(one.startswith("False detections") and said in one for one in listed)
+    assert sum("False detections" in one for one in (*contact.wrong, *contact.shows)) == 1
 
 
 def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detection():

@@ -161,5 +161,7 @@ def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
     late = RecordedReaction(0, 1_005_000_000, Event(Code.NOT_REACHED, values={"reason": "why"}))
     assert within([late], 1_000_000_000, 2_000_000_000) == ()
     assert len(within([late], 0, 1_000_000_000)) == 1
-    again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]
-    assert sentences("press", again, 0) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 more time: why"]
+    lasting = RecordedReaction(2_000_000_000, 4_000_000_000, Event(Code.NOT_REACHED, values={"reason": "so"}))
+    assert sentences("press", [late, lasting], 0) == [
+        "press: reported (not_reached) from 2.00 to 4.00 s and 1 more time: so"
+    ]

@@ -114,8 +114,8 @@ def analyse(
         raise ValueError(
             f"--namespace chooses an arm of this stack, but {path} is a recording of another robot; leave it out"
         )
-    progress("it is a recording of another robot")
     if found is not None:
+        progress("it is a recording of another robot")
         return analyse_bag(foreign_bag(found, given), progress, given=given)
     bag, given = table_bag(path, series_of_csv(path), given)
     return analyse_bag(bag, progress, given=given)
@@ -176,16 +176,20 @@ def _verdict(recording: AnalysedRecording, sections: Sequence[Section]) -> Secti
     what = _foreign_line(recording) if recording.is_foreign else _own_line(recording)
     wrong = [sentence for section in sections for sentence in section.wrong]
     shows = [sentence for section in sections for sentence in section.shows]
-    lines = (_line("Wrong", wrong, "no defect was found."), _line("Shows", shows, "nothing that can be evaluated."))
+    lines = (
+        _line("Wrong", wrong, "no defect was found.", "defect"),
+        _line("Shows", shows, "nothing that can be evaluated.", "result"),
+    )
     return Section("verdict", "Verdict", (what, *lines))
 
 
-def _line(title: str, sentences: list[str], silent: str) -> str:
+def _line(title: str, sentences: list[str], silent: str, kind: str) -> str:
     """The first of some sentences in a line, and how many follow below."""
     if not sentences:
         return f"{title}: {silent}"
     kept = sentences[: LAYOUT.stated]
-    more = f" {len(sentences) - len(kept)} more below." * (len(sentences) > len(kept))
+    rest = len(sentences) - len(kept)
+    more = f" The sections below have {counted(rest, f'more {kind}')}." * (rest > 0)
     return f"{title}: {' '.join(kept)}{more}"
 
 

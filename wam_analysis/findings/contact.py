@@ -42,7 +42,7 @@ def contact_section(recording: AnalysedRecording) -> Section:
         away = 100.0 * float(np.median(position)) if len(position) else math.nan
         off = float(np.median(force)) if len(force) else math.nan
         findings += [
-            Finding("contact on the correct link", "%", right),
+            Finding("correct link, of all contact time", "%", right),
             Finding("position error, median", "cm", away, note="along the link, of all samples"),
             Finding(
                 "force error (vector), median",
@@ -51,14 +51,19 @@ def contact_section(recording: AnalysedRecording) -> Section:
                 note="norm of the error vector; without forces that are lower bounds",
             ),
         ]
-        shows.append(f"Contacts: correct link for {right:.0f} % of the time{_errors(away, off)}.")
+        shows.append(f"Contacts: correct link for {right:.0f} % of all contact time{_errors(away, off)}.")
     if np.any(known):
         count = len(runs(traces.is_false))
         seconds = float(np.sum(traces.is_false)) * traces.period
         findings.append(Finding("false detections", "s", seconds, note=times(count)))
         if count:
-            sentences.append(f"False detections: {count}, together {shown(seconds, 's')}.")
-            wrong.insert(0, sentences[-1])
+            part = traces.false_percent
+            share = f"{shown(seconds, 's')} or {part:.1f} % of the time without contact"
+            sentences.append(f"False detections: {count}, together {share}.")
+            if part > TOUCH.false_tolerance:
+                wrong.insert(0, sentences[-1])
+            else:
+                shows.append(sentences[-1])
     elif recording.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
         shows.append(f"Contacts: {len(recording.contacts)} estimated; the true ones are not in this bag.")
@@ -114,5 +119,6 @@ def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
 
 
 def _errors(away: float, off: float) -> str:
-    errors = {"position": shown(away, "cm") * math.isfinite(away), "force": shown(off, "N") * math.isfinite(off)}
-    return "".join(f", median error of the {name} {error}" for name, error in errors.items() if error)
+    known = [f"{shown(away, 'cm')} of the position"] * math.isfinite(away)
+    known += [f"{shown(off, 'N')} of the force vector"] * math.isfinite(off)
+    return f"; median error {' and '.join(known)}" * bool(known)

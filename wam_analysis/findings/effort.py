@@ -16,8 +16,8 @@ from wam_bag.arrays import Mask, Numbers
 
 WEIGHT, DRAG = "weight", "drag"
 ALSO = {
-    WEIGHT: "with its weight",
-    DRAG: "with a drag by the square of the velocity",
+    WEIGHT: "the fit includes the joint's weight",
+    DRAG: "the fit includes a drag by the square of the velocity",
 }
 
 
@@ -44,11 +44,11 @@ def effort_section(recording: AnalysedRecording) -> Section:
         findings += [
             Finding(f"{one.label}: {what}", unit, known.value, error=known.error) for what, unit, known in numbers
         ]
-        brief.append(
-            f"{one.label}: {', '.join(f'{what} {shown(known.value, unit)}' for what, unit, known in numbers)}."
-        )
+        unexplained = f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"
+        values = [f"{what} {shown(known.value)} +- {shown(known.error, unit)}" for what, unit, known in numbers]
+        brief.append(f"{one.label}: {', '.join(values)}; {unexplained}.")
         missing = [what for what, _, known in every if not (math.isnan(known.value) or known.is_sure)]
-        remarks = [f"{100.0 * found.unexplained:.2g} % of the effort's rms is unexplained"]
+        remarks = [unexplained]
         if math.isnan(found.inertia.value):
             late = shown(1e-3 * abs(whole.per_lag))
             remarks.append(f"it moved at one frequency, where each ms of delay changes the viscous friction by {late}")
@@ -62,8 +62,8 @@ def effort_section(recording: AnalysedRecording) -> Section:
         why = "The friction of the joints cannot be identified: no effort determines a dry or viscous friction."
         return Section("friction", "Friction", (why, *doubts, *wrong), wrong=wrong)
     assumed = (
-        "The fit explains the whole effort by friction, inertia and the joint's own weight. It subtracts drag, by the "
-        "square of the velocity, and a delay if it finds them; otherwise they increase the errors:"
+        "The fit explains the effort by friction and inertia. Where they explain more, it includes the joint's weight, "
+        "a drag by the square of the velocity, and a delay. What it leaves out makes the standard errors larger."
     )
     if alone:
         doubts.append(

@@ -25,6 +25,7 @@ from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
 STEADY_PART = f"mean of the last {100.0 * HOLD.steady:.0f} % of the time in which it was commanded"
+WHOSE = "The force loop measures the force. The contact estimator estimates it."
 NO_FORCE = f"No constant force was commanded for {HOLD.shortest:g} s"
 
 
@@ -41,6 +42,7 @@ def force_section(recording: AnalysedRecording) -> Section:
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
+    sentences += [WHOSE] * any(not one.hold.is_refused for one in held)
     findings += _dynamic_range(recording)
     wrong = _reaction_verdict(reactions, zero)
     return Section("force", "Force", sentences, findings, lacking, _forces_verdict(held), wrong, by_gains=True)
@@ -91,11 +93,12 @@ def _dynamic_range(recording: AnalysedRecording) -> list[Finding]:
     limit = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
     smallest = max(accuracy.smallest for _, accuracy in known) or math.nan
     largest = max(one.hold.commanded + accuracy.bias for one, accuracy in known)
-    note = "largest force over the measured error; predicted: largest force that the limits allow"
-    by = f"largest held force; predicted limit: {limit.limited_by}" if limits else "largest held force"
+    note = "largest force over the largest error; predicted: of the largest possible force"
+    by = f"limited by {limit.limited_by}" if limits else ""
     return [
-        Finding("smallest controllable force", "N", smallest, note="bias and ripple of the worst force"),
-        Finding("largest controllable force", "N", largest, limit.force, by),
+        Finding("largest error, bias plus ripple", "N", smallest),
+        Finding("largest held force", "N", largest),
+        Finding("largest possible force", "N", math.nan, limit.force, by),
         Finding("dynamic range", "", largest / smallest, limit.force / smallest, note),
     ]
 

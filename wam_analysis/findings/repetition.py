@@ -95,11 +95,10 @@ def spectrum_section(recording: AnalysedRecording) -> Section:
                 findings.append(Finding(f"{name}: frequency", "Hz", line.frequency))
     if not begins:
         return Section("frequency", "Spectrum", ("No stretch is long enough.",))
-    span = f"from {shown(min(begins), 'Hz')} on, so that five cycles fit into the longest part without a gap"
-    if findings:
-        return Section("frequency", "Spectrum", (f"Looked for {span}.",), findings)
-    silent = (f"No frequency is above the noise {span}; slower ones were not looked for.",)
-    return Section("frequency", "Spectrum", silent, wrong=(), shows=silent)
+    least = shown(min(begins), "Hz")
+    span = f"Only frequencies above {least} are sought: the longest part without a gap has five cycles of each."
+    silent = [] if findings else [f"No frequency above {least} exceeds the noise."]
+    return Section("frequency", "Spectrum", (*silent, span), findings, shows=silent)
 
 
 def traced(sources: Iterable[Source]) -> Iterator[tuple[Source, str, str]]:

@@ -15,6 +15,11 @@ from wam_analysis.thresholds import HOLD, TOUCH
 from wam_analysis.unplanned_contact import LIMIT
 from wam_sim.reactions import OUTCOMES, STEADY, unmet
 
+HOW = (
+    "The brackets show the worst value of all steps. The error of a force includes its ripple. "
+    f"A contact of less than {TOUCH.bounce / 1e9:g} s does not count."
+)
+
 
 class VerdictResult(StrEnum):
     """What a recording shows of a question of the verdict."""
@@ -52,10 +57,7 @@ def steps_section(recording: AnalysedRecording) -> Section | None:
     outcomes, (brief, why) = _outcomes(recording), recording.unassessed
     wrong = [f"{what.upper()} in the end: {'; '.join(outcomes[what])}." for what in OUTCOMES[1:] if outcomes[what]]
     wrong += [f"{'; '.join(step.name for step in brief)}: {why}."] if brief else []
-    answers = [f"{answer}." for answer in verdict(recording)]
-    return Section(
-        "steps", "Result of the steps; in brackets the worst step (of a force: error plus ripple)", answers, wrong=wrong
-    )
+    return Section("steps", "Result of the steps", (HOW, *(f"{answer}." for answer in verdict(recording))), wrong=wrong)
 
 
 def _outcomes(recording: AnalysedRecording) -> dict[str, list[str]]:
@@ -139,12 +141,10 @@ def _position_verdict(recording: AnalysedRecording) -> VerdictAnswer:
 def _false_verdict(recording: AnalysedRecording) -> list[VerdictAnswer]:
     """Whether a contact was estimated where none is; none where that is not known."""
     traces = recording.traces
-    free = np.count_nonzero(traces.is_compared & ~traces.true.acts)
-    if not free:
+    part, seconds = traces.false_percent, np.count_nonzero(traces.is_false) * traces.period
+    if math.isnan(part):
         return []
-    false = np.count_nonzero(traces.is_false)
     question = f"false detections for at most {TOUCH.false_tolerance:g} % of the time without contact"
-    part, seconds = 100.0 * false / free, false * traces.period
     if part > TOUCH.false_tolerance and seconds <= TOUCH.ending:
         brief = f"only {1e3 * seconds:.0f} ms, which the end of a contact may take"
         return [VerdictAnswer(question, VerdictResult.NOTHING, remark=brief)]

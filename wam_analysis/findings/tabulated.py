@@ -1,6 +1,6 @@
 """The numbers of a section as tables: subjects by quantities, and a list of the rest."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ class Tabulated(NamedTuple):
     ----------
     columns : titles; the first is that of the rows.
     predicted : whether each column, the first included, holds predictions for the one before.
-    rows : cells, as many as columns; '' where nothing belongs, '-' where nothing was measured.
+    rows : cells, as many as columns; '' where nothing belongs, '-' where it could not be measured.
     """
 
     columns: tuple[str, ...]
@@ -35,7 +35,8 @@ def tabulated(findings: Sequence[Finding]) -> tuple[Tabulated, ...]:
     known = [one for one in findings if np.isfinite(one.measured) or not np.isnan(one.predicted)]
     having = [one for one in known if one.subject]
     alone = [one for one in known if not one.subject]
-    return tuple(_table(part) for part in (*_alike(having), alone) if part)
+    every = {one.name for one in findings}
+    return tuple(_table(part, every) for part in (*_alike(having), alone) if part)
 
 
 def _alike(findings: list[Finding]) -> list[list[Finding]]:
@@ -52,13 +53,14 @@ def _alike(findings: list[Finding]) -> list[list[Finding]]:
     return groups
 
 
-def _table(findings: list[Finding]) -> Tabulated:
+def _table(findings: list[Finding], every: Collection[str]) -> Tabulated:
+    """The table of some numbers; `every` has all names, also of what could not be measured."""
     subjects = list(dict.fromkeys(one.subject for one in findings))
     quantities = list(dict.fromkeys((one.quantity, one.unit) for one in findings))
     cells = {(one.subject, (one.quantity, one.unit)): one for one in findings}
     downwards = len(subjects) <= len(quantities)
     titles = [f"{quantity} [{unit}]" if unit else quantity for quantity, unit in quantities]
-    grid = [[cells.get((subject, quantity)) for quantity in quantities] for subject in subjects]
+    grid = [[cells.get((subject, one)) or _unknown(subject, one, every) for one in quantities] for subject in subjects]
     columned = grid if downwards else zip(*grid, strict=True)
     columns = [("quantity" if downwards else "", False, titles if downwards else subjects)]
     for head, found in zip(subjects if downwards else titles, columned, strict=True):
@@ -68,6 +70,12 @@ def _table(findings: list[Finding]) -> Tabulated:
             columns.append(("predicted", True, expected))
     heads, predicted, rows = zip(*columns, strict=True)
     return Tabulated(heads, predicted, tuple(zip(*rows, strict=True)))
+
+
+def _unknown(subject: str, quantity: tuple[str, str], every: Collection[str]) -> Finding | None:
+    """What could not be measured of a subject; None where it does not belong."""
+    name = f"{subject}: {quantity[0]}"
+    return Finding(name, quantity[1], np.nan) if name in every else None
 
 
 def _measured(one: Finding) -> str:

@@ -53,8 +53,9 @@ def _foreign_streams(recording: AnalysedRecording) -> Iterator[_Stream]:
         if others:
             name += f" ({first.frame})" if first.frame and all(one.frame != first.frame for one in others) else ""
             name += f" of {', '.join(one.name for one in those)}" if first.is_joint else ""
-        stamp, received = (1e9 * first.sent).round().astype(np.int64), (1e9 * first.received).astype(np.int64)
-        yield _Stream(name, stamp, received, math.nan)
+        stamp, received = ((1e9 * times).round().astype(np.int64) for times in (first.sent, first.received))
+        is_table = np.array_equal(stamp, received)  # or messages without stamps
+        yield _Stream(name, stamp, None if is_table else received, math.nan)
 
 
 def timing_section(recording: AnalysedRecording) -> Section:
@@ -66,14 +67,14 @@ def timing_section(recording: AnalysedRecording) -> Section:
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * found.period, 1e3 * expected),
             Finding(f"{name}: missed periods", "", float(found.missed)),
-            Finding(f"{name}: longest gap", "s", found.longest_gap),
+            Finding(f"{name}: longest gap between stamps", "s", found.longest_gap),
         ]
         if found.backwards:
             findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards)))
         if received is not None:
             findings += [
                 Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
-                Finding(f"{name}: longest wait", "ms", 1e3 * found.worst),
+                Finding(f"{name}: longest gap between receptions", "s", found.worst),
             ]
         if found.missed:
             gap = shown(found.longest_gap, "s")

@@ -36,6 +36,8 @@ def topics_section(recording: AnalysedRecording) -> Section:
     wrong += _fast(found, given)
     if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
+    if computed := [one.label for one in found if _lacks_velocity(one)]:
+        sentences.append(f"The velocity was not recorded and is computed from the position: {', '.join(computed)}.")
     sentences += [*wrong, *_alike(found), *_unread(bag)]
     if not found:
         wrong += _unread(bag) or ["nothing in it can be analysed."]
@@ -71,12 +73,16 @@ def _fast(found: Sequence[Source], given: TopicMap) -> Iterator[str]:
     """Which joints would move faster than few do, where their velocity was not recorded."""
     most, _ = UNUSUAL["velocity"]
     for one in found:
-        lacks_velocity = "position" in one.values and "velocity" not in one.values
-        if lacks_velocity and "position" not in given.units and not one.is_command:
+        if _lacks_velocity(one) and "position" not in given.units:
             speeds = [np.percentile(np.abs(piece.values["velocity"]), 99.0) for piece in pieces(one, "position")]
             if max(speeds, default=0.0) > most:
                 fast = f"moves at up to {shown(float(max(speeds)), 'rad/s')}"
                 yield f"{one.label}: {fast}; if its position is in deg, give --unit position=deg."
+
+
+def _lacks_velocity(one: Source) -> bool:
+    """Whether the velocity of a joint is that of its position."""
+    return "position" in one.values and "velocity" not in one.values and not one.is_command
 
 
 DONE_TO = {

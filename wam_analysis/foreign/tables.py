@@ -25,10 +25,13 @@ def series_of_csv(path: Path) -> dict[str, tuple[str, ...]]:
     Raises
     ------
     BagError
-        if it has no row, or one with more cells than titles, as where decimal commas divide numbers.
+        if it cannot be opened, has no row, or one with more cells than titles, as where decimal commas divide numbers.
     """
-    with path.open(newline="", encoding="utf-8-sig") as stream:
-        lines = [line for line in stream if line.strip()]
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            lines = [line for line in stream if line.strip()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise BagError(f"{path} cannot be read: {getattr(error, 'strerror', '') or error}") from error
     while len(lines) > 1 and lines[0].startswith("#") and not lines[1].lstrip(' "+-.')[:1].isdigit():
         del lines[0]  # a comment above the titles, which may begin with '#', too
     head, *rows = csv.reader(lines, delimiter=max(DELIMITERS, key=lines[0].count)) if lines else [[]]
@@ -56,7 +59,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
 
     Raises
     ------
-    ValueError
+    BagError
         if it has no time, or nothing that can be analysed.
     """
     parts: dict[str, dict[str, Numbers]] = {}
@@ -69,7 +72,7 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
     clock = next((one for one in _columns(series, "stamp", given) if not one.name), None)
     title = given.fields.get("stamp", "time")
     if clock is None:
-        raise ValueError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
+        raise BagError(f"{path} has no column '{title}'; name the column of the time with --map stamp=COLUMN")
     given = given._replace(units=units | ({"stamp": clock[:2]} if clock.has_unit else {}))
     times, known = _times(f"{path}: the column '{title}'", clock.values, given)
     nothing = np.full(len(times), "", object)
@@ -83,9 +86,9 @@ def table_bag(path: Path, series: Mapping[str, Any], given: TopicMap = NOTHING_G
         vectors = (np.column_stack([parts[q].get(n, 0.0 * known) for n in "xyz"])[known] for q in ("force", "torque"))
         topics["wrench"] = WrenchColumns(times, times, nothing, *vectors)
     if not topics:
-        raise ValueError(
-            f"{path} has the columns {', '.join(map(str, series))}; rename them, for example position.JOINT, or use "
-            "--map"
+        raise BagError(
+            f"{path} has the columns {', '.join(map(str, series))}; rename each that you need to position.JOINT, "
+            "velocity.JOINT or effort.JOINT; for a single joint, --map position=COLUMN does it"
         )
     counts = dict.fromkeys(topics, len(times))
     return Bag(path, topics, dict.fromkeys(topics, "table"), {}, {}, counts), given
@@ -156,4 +159,4 @@ def _times(label: str, column: Any, given: TopicMap) -> tuple[Times, Mask]:
     try:
         return _times(label, np.array([str(one).removesuffix("Z") for one in column], "M8[ns]"), given)
     except ValueError:
-        raise ValueError(f"{label} has no times") from None
+        raise BagError(f"{label} has no times") from None
