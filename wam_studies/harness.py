@@ -136,10 +136,8 @@ def chosen_cases(
     study: Study[Case, Any], seed: int, count: int | None = None, numbers: Sequence[int] = ()
 ) -> list[Case]:
     """The first cases of a seed, or those of some numbers."""
-    if not numbers:
-        return list(islice(study.cases(seed), count or study.count))
-    first = list(islice(study.cases(seed), max(numbers) + 1))
-    return [first[number] for number in numbers if number < len(first)]
+    first = list(islice(study.cases(seed), max(numbers) + 1 if numbers else count or study.count))
+    return [first[number] for number in numbers if number < len(first)] if numbers else first
 
 
 def evaluate(

@@ -124,7 +124,7 @@ def record(drive: Drive) -> DriveRecording:
     configured = drive.configuration.with_values(values)
     arm, period = configured.shared.arm, seconds(configured.shared.timing.period_ns)
     run = Simulation(configured, steps)
-    rows: list[tuple[list[float], list[float], list[float], float]] = []
+    rows: list[list[float]] = []
     nominal = np.array(arm.joints.dynamic_friction)
     drift_every = max(1, round(drive.seconds / period / TIMES.drift_steps))
     done = False
@@ -133,15 +133,13 @@ def record(drive: Drive) -> DriveRecording:
         if degradation.drift and k % drift_every == 0:
             run.driver.set_added_friction((degradation.drift * k * period / drive.seconds * nominal).tolist())
         state = run.driver.motor_state
-        rows.append(
-            (list(state.position), list(state.velocity), list(state.effort), max(map(abs, run.driver.plant.qd)))
-        )
+        rows.append([*state.position, *state.velocity, *state.effort, max(map(abs, run.driver.plant.qd))])
         _push(run, arm, contacts, k * period)
         done = run.step() or run.driver.safety.mode is Mode.FAULT
-    theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
+    theta, thetad, torque, speed = np.split(np.array(rows), len(arm.motors.names) * np.arange(1, 4), axis=1)
     failure = run.driver.safety.fault or run.scenario.failure
     model = _identified(configured, degradation, drive.seed) if drive.is_identified else {}
-    return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure, model)
+    return DriveRecording(degradation, theta, thetad, torque, speed[:, 0], tuple(contacts), failure, model)
 
 
 def _identified(configured: Configuration, degradation: Degradation, seed: int) -> Values:

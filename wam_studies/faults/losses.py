@@ -151,10 +151,8 @@ def _lost(case: FaultCase, chain: NodeProcesses, name: str, way: signal.Signals)
         escapes.append(reason)
     is_new_arm = name == "driver" and way != signal.SIGSTOP
     motion = 0.0 if is_new_arm else max(abs(a - b) for a, b in zip(q, chain.q, strict=True))
-    if motion > FAULTS.motion:
-        escapes.append(f"the arm moved {motion:.3f} rad")
-    if chain.force > FAULTS.force:
-        escapes.append(f"{chain.force:.0f} N")
+    escapes += [f"the arm moved {motion:.3f} rad"] * (motion > FAULTS.motion)
+    escapes += [f"{chain.force:.0f} N"] * (chain.force > FAULTS.force)
     return FaultTrial(case.kind, what, 1, tuple(escapes), motion, chain.force, delay)
 
 

@@ -4,6 +4,7 @@ A second publisher of another type cannot be tried here: the middleware allows o
 """
 
 from functools import partial
+from itertools import product
 from random import Random
 from typing import Final, NamedTuple
 
@@ -42,9 +43,7 @@ class MessagePlan(NamedTuple):
 
 def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
     """Topic, publisher and fault of a trial: all combinations, in an order drawn from the seed, then again."""
-    every = [
-        MessagePlan(topic, foreign, fault) for topic in topics for foreign in (False, True) for fault in MESSAGE_FAULTS
-    ]
+    every = [MessagePlan(*one) for one in product(topics, (False, True), MESSAGE_FAULTS)]
     Random(f"messages {seed}").shuffle(every)
     return every[index % len(every)]
 

@@ -98,9 +98,13 @@ def _code(field: Field) -> int:
 
 def _scaled(field: Field, value: Any, chance: Random) -> Assignment:
     """A value between a fifth and five times the present one, each number of an array by itself."""
-    numbers = value if field.is_array else [value]
-    scaled = [one * 5.0 ** chance.uniform(-1.0, 1.0) if field.kind is float else one for one in numbers]
-    return Assignment(field.name, _code(field), scaled if field.is_array else scaled[0])
+
+    def scaled(one: Any) -> Any:
+        if field.kind is int:
+            return max(0, one + chance.choice([-1, 0, 1, 5]))
+        return one * 5.0 ** chance.uniform(-1.0, 1.0) if field.kind is float else not one if field.kind is bool else one
+
+    return Assignment(field.name, _code(field), list(map(scaled, value)) if field.is_array else scaled(value))
 
 
 def _extreme(field: Field, value: Any, chance: Random) -> Assignment:

@@ -73,8 +73,7 @@ class WatchedStack(StackClient):
     def __init__(self, configuration: Configuration, domain_id: int | None = None) -> None:
         shared = configuration.shared
         self.cover, self.interface = shared.arm.covers.names[-1], Interface(shared)
-        paced = {"timing.real_time_factor": 0.0} if hasattr(shared.timing, "real_time_factor") else {}
-        configuration = configuration.with_values({"timing.timeout": 2.0, **paced})
+        configuration = configuration.with_values({"timing.timeout": 2.0, "timing.real_time_factor": 0.0})
         self._clock = AnsweredClock(shared.timing.period)
         with self._clock.of_new_nodes(shared.timing.mode):
             self._composition = Composition(configuration, domain_id=domain_id)

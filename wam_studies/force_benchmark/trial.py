@@ -158,9 +158,9 @@ class TaskWatch:
 
     def _along(self, q: list[float]) -> Array:
         """Position of each touched point along its force, m."""
-        found = []
+        covers, found = self._arm.covers, []
         for (surface, _), direction in zip(self._task.forces, self._directions, strict=True):
-            point = (surface.position, *self._arm.covers.aside(surface.cover, surface.position))
+            point = (surface.position, *covers.aside(surface.cover, surface.position))
             found.append(float(direction @ self._body.point(q, surface.cover, point)))
         return np.array(found)
 
