@@ -74,7 +74,13 @@ def diagnosed_name(namespace: str, node: str) -> str:
 
 
 def guidance(
-    mode: str, before: str, absent: Sequence[str], faulty: Sequence[str], namespace: str, is_played: bool
+    mode: str,
+    before: str,
+    absent: Sequence[str],
+    faulty: Sequence[str],
+    namespace: str,
+    is_played: bool,
+    held: str = "the brakes are on",
 ) -> str:
     """What the console shows of the driver's state, and what to call next.
 
@@ -85,6 +91,7 @@ def guidance(
     faulty : nodes that report a fault.
     namespace : of the arm.
     is_played : whether a scenario makes the calls.
+    held : what holds an arm that is not enabled.
     """
     if absent:
         return f"{mode}; not connected yet: {', '.join(absent)}"
@@ -93,13 +100,11 @@ def guidance(
     if mode == ENABLED:
         return "enabled: the brakes are released"
     if is_played or (mode == "braked" and before == ENABLED):
-        return f"{mode}: the brakes are on"
+        return f"{mode}: {held}"
     if mode == "braked":
         call = _call(namespace, "enable", "SetBool '{data: true}'")
         return f"braked, all nodes are connected; to release the brakes: {call}"
-    return (
-        f"fault, the brakes are on; when its cause is gone: {_call(namespace, 'reset_fault', 'Trigger')}, then enable"
-    )
+    return f"fault, {held}; when its cause is gone: {_call(namespace, 'reset_fault', 'Trigger')}, then enable"
 
 
 def _call(namespace: str, service: str, request: str) -> str:

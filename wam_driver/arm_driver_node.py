@@ -43,11 +43,13 @@ class ArmDriver(StackNode):
     warnings : what a person should know, though the arm may move.
     unready : what the arm still lacks before the brakes may be released, '' where nothing.
     is_paused : whether the time of the arm is stopped.
+    held : what holds the arm while it is not enabled.
     """
 
     is_first = True
     safety: Safety
     lateness = unready = ""
+    held = "the brakes are on"
     warnings: tuple[str, ...] = ()
     is_paused = False
 
@@ -224,4 +226,5 @@ class ArmDriver(StackNode):
         if mode and state != self._informed:
             before, self._informed = self._informed[0], state
             is_played = "scenario" in self.shared.nodes
-            self.get_logger().info(guidance(mode, before, absent, faulty, self.get_namespace(), is_played))
+            text = guidance(mode, before, absent, faulty, self.get_namespace(), is_played, self.held)
+            self.get_logger().info(text)

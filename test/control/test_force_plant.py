@@ -97,6 +97,25 @@ def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
 
 
 @pytest.mark.slow
+def test_a_payload_that_a_scenario_tares_is_no_part_of_a_force_in_another_pose() -> None:
+    """9.2 N pressed in place of 8 N, as the zero was torques of one pose; 8.3 N do so without a payload."""
+    rest, press = (0.0, -1.0, 0.0, 1.0), ForceCommand(OUTER, (0.0, -8.0, 0.0))
+    steps = [
+        ScenarioStep("release", 0.3, request="enable"),
+        ScenarioStep("go", 2.0, posture=rest),
+        ScenarioStep("rest", 0.8, posture=rest),
+        ScenarioStep("tare", 0.3, posture=rest, request="tare"),
+        ScenarioStep("above", 1.5, posture=(0.0, -1.8, 0.0, 1.45)),
+        ScenarioStep("lower", 3.0, posture=(0.0, -2.1, 0.0, 1.45), until_force=1.5),
+        ScenarioStep("press", 2.0, force=press),
+    ]
+    payload = {"driver:mismatch.payload": 0.3, "contact_estimator:observer.payload": (0.0, 0.5)}
+    run = Simulation(CONFIGURATION.with_values(payload), steps)
+    assert run.play() == ""
+    assert math.hypot(*run.rows["sim/contact/wrench"][-1].values[:3]) == pytest.approx(8.3, abs=0.3)
+
+
+@pytest.mark.slow
 def test_the_guard_counts_a_payload() -> None:
     """Its margin is that of the loaded arm."""
     own = CONFIGURATION.node("force_loop", ForceLoopParameters)

@@ -254,7 +254,7 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
             "posture: joint2 is to be at -9 rad; allowed: -2.356 to",
         ),
         ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
-        ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable"),
+        ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable, tare"),
         ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),
         ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
         ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),

@@ -48,13 +48,13 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm on a link "
     "(`cover`). `contact_position` is in m along the link, `newtons` in the frame of the link. Optional: `begin` and "
     "`end`, s from the start of the step",
-    "request": "`enable` or `disable` at the start of the step",
+    "request": "`enable` or `disable`, or `tare` of an arm at rest, at the start of the step",
     "set": "`{force_loop: {force_gain: [0.01]}}`: sets live parameters of driver or force_loop at the start of the "
     "step",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
-REQUESTS = ("", "enable", "disable")
+REQUESTS = ("", "enable", "disable", "tare")
 CHIRP_KEYS = ("newtons", "from", "to")
 NO_FORCE = ForceCommand("base", ZERO)
 FORCE_LOOP, FOLLOWED, LARGEST_FORCE = "force_loop", "joint_speed_limit", "force_limit"
@@ -117,7 +117,7 @@ class ScenarioStep(NamedTuple):
     until_force: float = 0.0  # N; above zero the step ends when a contact of this force is detected
     force: ForceCommand = NO_FORCE
     push: Push | None = None
-    request: str = ""  # to the driver, when the step begins
+    request: str = ""  # to driver or force loop, when the step begins
     chirp: Chirp | None = None  # along the force
     settings: tuple[Setting, ...] = ()  # applied when the step begins
     task: TaskCommand | None = None  # in place of a force
@@ -554,7 +554,9 @@ def _require_step(where: str, step: ScenarioStep, shared: Shared) -> None:
     require(
         isinstance(step.name, str) and step.name != "", f"{where}: name is {step.name!r}; it must be a text (quote it)"
     )
-    require(is_one_of(step.request, REQUESTS), f"{where}: request is {step.request!r}; allowed: enable, disable")
+    require(
+        is_one_of(step.request, REQUESTS), f"{where}: request is {step.request!r}; allowed: {', '.join(REQUESTS[1:])}"
+    )
     seconds = number(where, "seconds", step.seconds)
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
     until = number(where, "until_force", step.until_force)

@@ -82,7 +82,9 @@ class ScenarioNode:
     def _request(self, out: ScenarioOutput) -> None:
         if out.request:
             self._was_enabled |= out.request == "enable"  # or this one fails
-            self.requests.append(Call("driver", "enable", out.request == "enable"))
+            is_tare = out.request == "tare"
+            call = Call("force_loop", "tare") if is_tare else Call("driver", "enable", out.request == "enable")
+            self.requests.append(call)
         for node in dict.fromkeys(setting.node for setting in out.settings):
             values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
             self.requests.append(SetParameters(node, values))

@@ -25,6 +25,7 @@ class BusDriver(ArmDriver):
     """
 
     entry = "wam_driver.bus.interface:BusInterface"
+    held = "only the windings of the motors brake, and the arm sinks"
 
     def __init__(self, **ros: Any) -> None:
         super().__init__(declared(self.entry), **ros)
