@@ -120,6 +120,9 @@ def test_dither_feels_5_newton_at_rest() -> None:
     tip = [row.values[:4] for row in run.rows["sim/joint_states"][60:100]]
     moved = np.ptp([RigidBody(WAM).tool_pose(q).position for q in tip], axis=0)
     assert 0.0 < np.linalg.norm(moved) < 0.6e-3
+    # shafts that do not slip both ways still hide the push
+    weak, _ = resting(5.0, **{"timing.dither_cycle": 40, "velocity_loop:dither.level": 0.6})
+    assert np.divide(weak.torque_sd, found.torque_sd).min() > 2.0
 
 
 @pytest.mark.slow

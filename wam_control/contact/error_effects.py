@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from wam_control.contact.model_errors import Observation
 from wam_control.contact.motor_side import MotorSide
 from wam_control.contact.observer_parameters import ObserverParameters
+from wam_control.contact.thresholds import CONTACT
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -98,9 +99,13 @@ class ErrorEffects:
         residual, model, pose, signals = means
         sliding, moving, uncertain = signals[: 2 * n], signals[2 * n : 4 * n], signals[4 * n : 8 * n]
         if self._has_dither:
-            # a shaft that slips in both directions within a cycle stops at both limits of its stiction
+            # a shaft that slips in both directions within a cycle passes at its stops from one limit of its friction to
+            # the other: what it slips further in one of them is all that is left of both
             resting, shape = uncertain.reshape(2, -1)
-            uncertain = np.concatenate((resting * resting, np.minimum(shape, np.abs(sliding))))
+            uneven = np.abs(sliding)
+            both_ways = np.maximum(1.0 - resting - uneven, 0.0)
+            unknown = np.maximum(1.0 - both_ways / CONTACT.slips_both_ways, uneven)
+            uncertain = np.concatenate((resting * unknown, np.minimum(shape, uneven)))
         modelled = self._from_motors.T.dot(model)
         driving = modelled - self._from_motors.T.dot(residual)
         effects = np.zeros((n, 11 * n + 2))

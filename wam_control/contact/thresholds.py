@@ -89,6 +89,8 @@ class ContactThresholds:
     shallow_shape: float = 3.2  # the same: the part that decays fast
     shallow_angle: float = 0.2  # its angle, in seconds at the rest velocity
     rest_noise: float = 3.0  # sd of the measured velocity that the rest velocity is at least
+    # of the cycle of a dither, in which a shaft that slips in both directions has surely been at both its limits
+    slips_both_ways: float = 0.25
     # velocity of a motor
     half_windows: tuple[int, ...] = (0, 1, 2, 4)  # samples on each side of the fitted one
     longest_window: float = 0.0081  # s, of a window: motion is nearly uniform in it
