@@ -145,7 +145,8 @@ def test_a_stiff_surface_yields_as_the_cables_do() -> None:
 @pytest.mark.parametrize("q", POSES)
 @pytest.mark.parametrize("stiffness", [400.0, 2e4, 6e4, 3e5])
 def test_what_shakes_the_free_arm_shakes_it_on_a_surface(q: tuple[float, ...], stiffness: float) -> None:
-    """Links on the cables, and motors on their velocity loops, as one system of both."""
+    """Links on the cables, and motors on their velocity loops, as one system of both; without dry friction."""
+    forces = ForceAxes(replace(WAM, joints=replace(WAM.joints, dynamic_friction=(0.0,) * 4)), BODY, PLAIN.sensing)
     shared, dt, frequency = CONFIGURATION.shared, 0.005, 2.0 * math.pi * 25.0
     at_joints = TransmissionMap.of(WAM).at_joints
     cables, servo = at_joints([circuit.stiffness for circuit in WAM.circuits]), shared.servo
@@ -162,7 +163,19 @@ def test_what_shakes_the_free_arm_shakes_it_on_a_surface(q: tuple[float, ...], s
     free, shaking = motion(0.0), Shaking(replace(shared.timing, dither_cycle=40))
     for k in range(50):
         swing = np.real(free[4:] * np.exp(1j * frequency * k * dt))
-        shaking.is_watching((np.array(q) + swing + 1e-3 * k * dt).tolist(), FORCES, servo, dt)
+        shaking.is_watching((np.array(q) + swing + 1e-3 * k * dt).tolist(), forces, servo, dt)
     pressed = motion(stiffness)
     own = replace(OWN, guard=replace(OWN.guard, contact_stiffness=stiffness))
     assert shaking.swing(axis, own) == pytest.approx(2.0 * stiffness * abs(axis.along @ pressed[:4]), rel=1e-3)
+
+
+@pytest.mark.parametrize("q", POSES)
+def test_dry_friction_takes_4_over_pi_of_itself_from_a_vibration_and_holds_a_weak_one(q: tuple[float, ...]) -> None:
+    motion, frequency, servo = np.array([4e-4, 3e-4j, -8e-4, 1e-3]), 2.0 * math.pi * 25.0, CONFIGURATION.shared.servo
+    for size, is_held in ((1.0, False), (0.01, True)):
+        damping = FORCES.friction_damping(q, size * motion, frequency)
+        free, _ = FORCES.vibration(q, size * motion, frequency, damping, servo)
+        assert max(abs(free)) < 1e-4 * size * max(abs(motion)) if is_held else min(abs(free)) > 0.1 * min(abs(motion))
+        if not is_held:
+            taken = damping * frequency * abs(free)
+            assert taken == pytest.approx(4.0 / math.pi * np.array(WAM.joints.dynamic_friction), rel=1e-3)

@@ -65,7 +65,7 @@ class Shaking:
 
     What shakes the free arm also shakes it on a surface of stiffness k.  With the vibration x of the free links and
     their receptance G, the swing of the force along a lever l is the sum of 2 |l.x| / |1/k + l.G l| over the harmonics
-    of the dither that friction makes.
+    of the dither that friction makes.  Dry friction damps the joints, the smaller harmonics half as much as the first.
 
     Parameters
     ----------
@@ -83,8 +83,10 @@ class Shaking:
         self._poses.append(np.array(q))
         if len(self._poses) * dt > max(FORCE.watched_time, self._cycle):
             frequency = 2.0 * math.pi / self._cycle
-            motions = harmonics(np.array(self._poses), frequency * dt)
-            self._free = [forces.vibration(q, one, (i + 1) * frequency, servo) for i, one in enumerate(motions)]
+            first, *others = harmonics(np.array(self._poses), frequency * dt)
+            damping = forces.friction_damping(q, first, frequency)
+            each = [(first, damping), *((one, 0.5 * damping) for one in others)]
+            self._free = [forces.vibration(q, one[0], i * frequency, one[1], servo) for i, one in enumerate(each, 1)]
         return True
 
     def swing(self, axis: CommandedAxis, own: ForceLoopParameters) -> float:

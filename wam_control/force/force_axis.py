@@ -147,6 +147,7 @@ class ForceAxes:
         self._map = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)
         self._rotors = self._map.at_joints(arm.motors.inertia)
+        self._friction = np.array(arm.joints.dynamic_friction)
         self._compliance = np.linalg.inv(self._map.at_joints([circuit.stiffness for circuit in arm.circuits]))
 
     def inertia(self, q: Sequence[float]) -> Array:
@@ -157,25 +158,46 @@ class ForceAxes:
         """The same with rotors: what hits a surface."""
         return self.inertia(q) + self._rotors
 
-    def vibration(self, q: Sequence[float], motion: Phasors, frequency: float, servo: Servo) -> tuple[Phasors, Phasors]:
+    def friction_damping(self, q: Sequence[float], motion: Phasors, frequency: float) -> Array:
+        """Damping of the joints (n,), N m s/rad, that takes as much energy as their dry friction: 4 F/(pi w |x|).
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        motion : complex amplitude of the motors' vibration at the joints (n,), rad; the links are free.
+        frequency : of it, rad/s.
+        """
+        links, damping = self.inertia(q), np.zeros(len(q))
+        for i in range(FORCE.balances):
+            swing = np.maximum(np.abs(self._free(links, motion, frequency, damping)), FORCE.negligible)
+            balanced = 4.0 * self._friction / (math.pi * frequency * swing)
+            damping = np.sqrt(damping * balanced) if i else balanced
+        return damping
+
+    def vibration(
+        self, q: Sequence[float], motion: Phasors, frequency: float, damping: Array, servo: Servo
+    ) -> tuple[Phasors, Phasors]:
         """Vibration of the free links (n,), rad, and their receptance, motion per torque on them (n, n), rad/(N m).
 
         The links swing on the cables, and the motors on their velocity loops.
 
         Parameters
         ----------
-        q : joint angles (n,), rad.
-        motion : complex amplitude of the motors' vibration at the joints (n,), rad.
-        frequency : of it, rad/s.
+        q, motion, frequency : as those of `friction_damping`.
+        damping : of the joints (n,), N m s/rad.
         servo : gains of the velocity loops.
         """
         links, square = self.inertia(q), frequency * frequency
-        damping, stiffness = (self._map.at_joints(gain) for gain in (servo.proportional_gain, servo.integral_gain))
-        motors = stiffness + 1j * frequency * damping - square * self._rotors
-        free = np.linalg.solve(np.eye(len(q)) - square * self._compliance @ links, motion)
+        damped, stiffness = (self._map.at_joints(gain) for gain in (servo.proportional_gain, servo.integral_gain))
+        motors = stiffness + 1j * frequency * damped - square * self._rotors
         through = np.linalg.inv(self._compliance + np.linalg.inv(motors))
-        receptance = np.linalg.inv(through - square * links)
-        return np.asarray(free, np.complex128), np.asarray(receptance, np.complex128)
+        receptance = np.linalg.inv(through + _impedance(links, frequency, damping))
+        return self._free(links, motion, frequency, damping), np.asarray(receptance, np.complex128)
+
+    def _free(self, links: Array, motion: Phasors, frequency: float, damping: Array) -> Phasors:
+        """Vibration of the free links (n,), rad, on the cables."""
+        on_cables = np.eye(len(links)) + self._compliance @ _impedance(links, frequency, damping)
+        return np.asarray(np.linalg.solve(on_cables, motion), np.complex128)
 
     def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
         """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""
@@ -290,6 +312,11 @@ class ForceAxes:
             weight,
             spread,
         )
+
+
+def _impedance(inertia: Array, frequency: float, damping: Array) -> Phasors:
+    """Torque per vibration (n, n), N m/rad, of an inertia (n, n), kg m^2, and damping of the joints (n,), N m s/rad."""
+    return np.asarray(1j * frequency * np.diag(damping) - frequency**2 * inertia, np.complex128)
 
 
 def _passive(weight: Array, press: Array, carried: Array, least: float) -> Array:

@@ -49,6 +49,7 @@ class ForceThresholds:
     slow_joint: float = 0.002  # rad/s, the same of a joint
     # shaking by a dither
     watched_time: float = 0.2  # s, for which it is watched before the arm moves, or a whole cycle
+    balances: int = 30  # steps, in which friction and vibration balance
     # events
     hysteresis: float = 1.25  # of the doubt, above which an arm that has not touched yet holds again
     quarter: float = 0.25  # of the settling time, in which a force that has been reached may be off
