@@ -13,7 +13,7 @@ from wam_control.force.belief import Belief, WorldTorques, belief
 from wam_control.force.contact_place import ContactPlace
 from wam_control.force.feed_forward import FeedForward
 from wam_control.force.force_axis import ForceAxes, Phasors
-from wam_control.force.force_loop_parameters import ForceLoopParameters
+from wam_control.force.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force.force_measurement import ForceMeasurement
 from wam_control.force.force_watch import ForceWatch, MotionWatch
 from wam_control.force.held_arm import HeldArm
@@ -162,6 +162,7 @@ class CommandRun:
     arm : the arm as the controller knows it.
     timing : of the loops.
     resting : torques of the world on the joints (n,), N m, of the arm at rest as it begins.
+    still_sd : standard deviations of the torques of the world (n,), N m, then; later, as the arm last held.
     is_moving : whether the arm moves too fast for these to be known.
 
     Attributes
@@ -179,7 +180,14 @@ class CommandRun:
     """
 
     def __init__(
-        self, key: object, task: TaskCommand | None, arm: Arm, timing: Timing, resting: Array, is_moving: bool
+        self,
+        key: object,
+        task: TaskCommand | None,
+        arm: Arm,
+        timing: Timing,
+        resting: Array,
+        still_sd: Array,
+        is_moving: bool,
     ) -> None:
         self.key, self.frame = key, task.frame if task else ""
         self.axes = [AxisRun(axis, arm.covers) for axis in (task.axes if task else ())]
@@ -188,6 +196,7 @@ class CommandRun:
         self.free_at: Array | None = None
         self.before: Array | None = None
         self.fed, self.is_moving = np.zeros_like(resting), is_moving
+        self.still_sd = still_sd
         self.delayed: deque[list[float]] = deque()
         self.joints = {name: MotionWatch() for name in arm.joints.names}
         self.feed_forward, self.advice, self.fallback = FeedForward(arm), Advice(), ""
@@ -208,6 +217,10 @@ class CommandRun:
     def believe(self, axis: CommandedAxis, size: float, torques: WorldTorques, own: ForceLoopParameters) -> Belief:
         """What is known of the force along an axis, N; `size` is that of the command."""
         swing, is_slow = self.shaking.swing(axis, own), is_too_slow(axis, own)
+        if own.is_estimated and axis.sensed is not None and not self.is_touching:
+            # it will press at rest: on the way there, the friction of the moving motors is less certain
+            pressed = sensing_of(own).torque_fraction * axis.desired * axis.sensed.press
+            torques = torques._replace(sd=np.hypot(self.still_sd, pressed))
         return belief(axis, size, torques, own, self.is_touching, self.resting.torques, swing, is_slow)
 
     def move(self, moved: Array, axes: Sequence[CommandedAxis], forces: ForceAxes, q: Sequence[float]) -> None:

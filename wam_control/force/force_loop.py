@@ -93,7 +93,8 @@ class ForceLoop:
         self.refused, self.refusals = 0, dict[str, Event]()
         self.events: tuple[Event, ...] = ()
         self._take(servo, parameters)
-        self._run = CommandRun(None, None, arm, timing, np.zeros(len(self._velocity)), False)
+        zero = np.zeros(len(self._velocity))
+        self._run = CommandRun(None, None, arm, timing, zero, zero, False)
 
     def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
         arm = self._body.arm
@@ -254,6 +255,7 @@ class ForceLoop:
     def _begin(self, task: TaskCommand | None, key: object, is_free: bool = False) -> None:
         """Something else is commanded: what a free arm at rest measures is the error of its model."""
         measurement, limit = self._measurement, self.parameters.sensing.zero_limit
+        still_sd = measurement.torques.sd
         is_at_rest = measurement.speed < MOTION.at_rest
         resting = np.zeros(len(self._velocity))
         if task is not None and limit and self._has_left and is_at_rest:
@@ -261,7 +263,7 @@ class ForceLoop:
                 measurement.zero(limit)
             resting = measurement.resting
         is_moving = task is not None and bool(limit) and FORCE.fast < measurement.speed < math.inf
-        before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, is_moving)
+        before, self._run = self._run, CommandRun(key, task, self._body.arm, self._timing, resting, still_sd, is_moving)
         self._run.go_on(before)
 
     def _find_axes(self, task: TaskCommand | None, contact: Contact) -> list[CommandedAxis]:
@@ -363,6 +365,9 @@ class ForceLoop:
         rows, least = list[VelocityRow](), list[VelocityRow]()
         is_watched = bool(axes) and own.is_estimated and not run.is_touching
         is_watching = is_watched and run.shaking.is_watching(self._q, self._axes.forces, self._supervision.servo, dt)
+        torque_sd = self._measurement.torques.sd
+        if (holds or is_watching) and torque_sd.any():  # none in the period in which the zero is taken
+            run.still_sd = torque_sd
         forces = [axis for axis in axes if axis.is_force and axis.place is not None]
         allowed = min([own.limits.contact_force, *(axis.desired for axis in forces if axis.desired)])
         if holds:
