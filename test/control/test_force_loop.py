@@ -422,7 +422,7 @@ def test_on_a_surface_stiffer_than_the_gain_allows_the_force_does_not_jump() -> 
     [
         ({"sensing": replace(OWN.sensing, torque_sd=1.0)}, "torques"),
         ({"contact_position_sd": 0.3}, "friction"),  # with other levers at other places
-        ({"contact_position_sd": 0.1, "sensing": replace(OWN.sensing, friction=2.0)}, "place"),
+        ({"contact_position_sd": 0.1, "sensing": replace(OWN.sensing, friction=2.0)}, "pinned_place"),
         ({"limits": replace(FREE, doubt=1.0, surface_speed=0.1)}, "moving_surface"),
         ({"limits": replace(FREE, doubt=1.0, settling_time=1e-3)}, "slow_arm"),
     ],
