@@ -193,7 +193,7 @@ class Configuration(NamedTuple):
             return build(cls, self.sections[section])
         except ParameterError as error:
             where = f"{self.path}, section '{SHARED if section == SHARED else f'/**/{section}'}'"
-            given = "a value given in place of the one in " if self._file_is_right(section, cls) else ""
+            given = "a value that you gave (as with --set), not one of " if self._file_is_right(section, cls) else ""
             raise ParameterError(f"{given}{where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:
@@ -251,8 +251,8 @@ def _changes(name: str, old: Any, new: Any) -> list[str]:
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         pairs = enumerate(zip(old, new, strict=True))
         return [f"  {name}[{i}]: {one}, now {other}" for i, (one, other) in pairs if one != other]
-    before = "not given" if old is None else old
-    return [f"  {name}: {textwrap.shorten(f'{before}, now {new}', FILES.longest_difference)}"]
+    change = f"added, {new}" if old is None else f"{old}, now {new}"
+    return [f"  {name}: {textwrap.shorten(change, FILES.longest_difference)}"]
 
 
 def option_values(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:

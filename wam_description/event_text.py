@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from wam_description.event import Code, Event
-from wam_description.number_text import brief
+from wam_description.number_text import brief, digits_apart
 from wam_description.reasons import Reason
 
 REASONS: Final = {
@@ -78,7 +78,8 @@ SENTENCES: Final = {  # by cause
     "command another posture or direction",
     "oscillating": "the measured force oscillates by {swing:b} N in {period:b} s about {desired:.3g} N; allowed: "
     "{allowed:g} times the commanded force (limits.cycle_force): lower force_gain, or use joint sensors",
-    "model_off": "the model is off: {part}; see /diagnostics, then run 'wam identify'",
+    "model_off": "the {part} differs from the configured one: if this lasts, declare the load (arm.payload) or run "
+    "'wam identify'; /diagnostics has the difference",
     # the driver has put the brakes on
     "emergency_stop": "emergency stop",
     "command_stale": "command stale: {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; {cure}",
@@ -103,12 +104,20 @@ SINCE: Final = ("without a contact", "since the force was last right or rising")
 
 
 class _Sentence(string.Formatter):
-    """Format as str.format does; `b` writes a number briefly, and one without a bound in words."""
+    """Format as str.format does; `b` writes a number briefly, and one without a bound in words.
+
+    Parameters
+    ----------
+    digits : of a brief number.
+    """
+
+    def __init__(self, digits: int) -> None:
+        self._digits = digits
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if format_spec != "b":
             return str(super().format_field(value, format_spec))
-        return "any number of" if value == math.inf else brief(value)
+        return "any number of" if value == math.inf else brief(value, self._digits)
 
 
 def sentence(event: Event) -> str:
@@ -118,7 +127,13 @@ def sentence(event: Event) -> str:
         return str(event.values.get("reason", cause or ("" if event.code is Code.NONE else event.code.value)))
     values = {**event.values, **_parts(event.values)}
     end = HOLDING if event.holds and "hold" not in SENTENCES[cause] and "goes back" not in SENTENCES[cause] else ""
-    return _Sentence().vformat(SENTENCES[cause], (), values) + end
+    return _Sentence(_digits(event.values)).vformat(SENTENCES[cause], (), values) + end
+
+
+def _digits(values: Mapping[str, Any]) -> int:
+    """Of brief numbers: what is above an allowed number is written so that it is seen."""
+    value, allowed = values.get("error", values.get("force")), values.get("allowed")
+    return 2 if value is None or allowed in (None, value) else digits_apart(value, allowed)
 
 
 def reasons_in_words(reasons: Reason) -> str:

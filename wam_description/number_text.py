@@ -4,9 +4,14 @@ import math
 from typing import Any
 
 
-def brief(value: float) -> str:
-    """A number to two digits, without an exponent from 1e-4 to 1e10, or a sign of zero: 0.0042, 7.1, 120, 0."""
-    return f"{float(f'{value:.2g}') + 0.0:.10g}"
+def brief(value: float, digits: int = 2) -> str:
+    """A number to a few digits, without an exponent from 1e-4 to 1e10, or a sign of zero: 0.0042, 7.1, 120, 0."""
+    return f"{float(f'{value:.{digits}g}') + 0.0:.10g}"
+
+
+def digits_apart(value: float, other: float) -> int:
+    """With how many digits `brief` writes two different numbers differently; at least two, at most six."""
+    return next((digits for digits in range(2, 6) if brief(value, digits) != brief(other, digits)), 6)
 
 
 def as_number(value: Any) -> str:

@@ -232,7 +232,8 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
     if missing or unknown:
         parts = [f"missing parameter '{name}'" for name in missing]
         parts += [f"unknown parameter '{name}'" for name in unknown]
-        raise ParameterError("; ".join(parts) + " (compare with docs/parameters.md)")
+        listed_in = "docs/parameters.md" if cls.__module__.startswith("wam_") else f"the class {cls.__qualname__}"
+        raise ParameterError(f"{'; '.join(parts)}; all are in {listed_in}")
     return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
 
 

@@ -4,6 +4,7 @@
 """
 
 import itertools
+import linecache
 import math
 import os
 import time
@@ -233,10 +234,11 @@ class RunningArm:
                 if condition():
                     return
                 look()
-                assert stamp <= limit, f"condition not met within {seconds} s of the arm's time: {condition}"
-                assert now < end, (
-                    f"condition not met within {TEST_LIMITS.patience} s: {condition}; the arm is at {stamp} ns"
-                )
+                if stamp > limit:
+                    raise AssertionError(f"not met within {seconds:g} s of the arm's time: {_source(condition)}")
+                if now > end:
+                    at = f"the arm is at {stamp / SECOND:.3f} s"
+                    raise AssertionError(f"not met within {TEST_LIMITS.patience:g} s: {_source(condition)}; {at}")
             self.executor.spin_once(timeout_sec=TEST_LIMITS.look)
 
     def run(self, seconds: float) -> None:
@@ -353,6 +355,14 @@ class RunningArm:
     def _require_start(self) -> None:
         if self._composition is None:
             self.start()
+
+
+def _source(condition: Callable[[], Any]) -> str:
+    """The line of a condition, with its file and number; its name where it has none."""
+    if (code := getattr(condition, "__code__", None)) is None:
+        return str(condition)
+    line = linecache.getline(code.co_filename, code.co_firstlineno).strip()
+    return f"{line} ({Path(code.co_filename).name}:{code.co_firstlineno})"
 
 
 def configured(

@@ -260,7 +260,9 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "lowered": lowered or "nothing",
         "worst": assessment.where,
         f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
-        f"stable error [{force}]": "any" if math.isinf(assessment.stable_error) else f"{assessment.stable_error:.4g}",
+        f"largest stable saturation [{force}]": "no limit"
+        if math.isinf(assessment.stable_error)
+        else f"{assessment.stable_error:.4g}",
         f"limit cycle [{force}]": f"{cycle.peak_to_peak:.4g}",
         "limit cycle [s]": f"{cycle.period:.4g}",
         f"deadband that removes it [{force}]": f"{cycle.deadband:.4g}",
