@@ -517,9 +517,7 @@ def test_a_number_far_from_its_prediction_is_flagged(samples: dict[str, Analysis
     assert known in " ".join(text(samples["wam-touch"]).split())
     (viscous,) = [one for one in friction.findings if one.name == "motor2: viscous friction"]
     assert (math.isnan(viscous.measured), "not identifiable: " in viscous.note) == (True, True)
-    assert deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),)) == (
-        "More than 3 standard errors from the prediction: a 1 +- 0.05 N, predicted 1.2.",
-    )
+    assert "a 1 +- 0.05 N, predicted 1.2" in deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),))[0]
     assert Finding("a", "N", 1.0, 1.2, "", 0.05).deviates
     assert not Finding("a", "N", 1.0, 1.1, "", 0.05).deviates
     assert not Finding("a", "s", 1.0, 0.1, "", 0.05, is_ideal=True).deviates

@@ -88,11 +88,8 @@ def cycle_in_a_window_with_gaps(path: Path) -> tuple[Made, dict[str, float]]:
     kept = ~(((time > 3.0) & (time < 3.5)) | ((time > 26.0) & (time < 26.5)))
     sent = joints("/joint_states", time[kept], UR, position=position[kept], velocity=np.zeros_like(position[kept]))
     planted = {"wrist_2_joint: frequency": 7.3, "wrist_2_joint: cycle, peak to peak": 0.004}
-    planted |= {
-        "wrist_2_joint: begin": 8.0,
-        "wrist_2_joint: end": 22.0,
-        "/joint_states: longest gap between stamps": 0.5,
-    }
+    planted |= {"wrist_2_joint: begin": 8.0, "wrist_2_joint: end": 22.0}
+    planted |= {"/joint_states: longest gap between stamps": 0.5}
     return (by_rosbags(path, sent), TopicMap()), planted | {"wrist_2_joint, 7.3 Hz: frequency": 7.3}
 
 

@@ -74,9 +74,7 @@ def test_every_other_shared_parameter_is_compared() -> None:
     ids=["short", "fewer", "more", "other names", "zeros", "long"],
 )
 def test_digests_of_other_parameters_are_those_of_another_version(text: str) -> None:
-    assert disagreement("gravity", OWN, text) == (
-        "gravity was started with another version of wam_stack than the driver; start all nodes with the same version"
-    )
+    assert "gravity was started with another version" in disagreement("gravity", OWN, text)
 
 
 def test_a_node_without_digests_is_not_compared() -> None:
@@ -155,10 +153,7 @@ def test_a_node_that_was_started_with_another_parameter_keeps_the_arm_braked_unt
     ros: Network, tmp_path: Path
 ) -> None:
     stack = Apart(ros, tmp_path, {"gravity": HEAVY})
-    assert stack.refusal() == (
-        "refused: gravity was started with another arm.payload than the driver; "
-        "start all nodes with the same configuration"
-    )
+    assert "gravity was started with another arm.payload than the driver" in stack.refusal()
     stack.restart("gravity")
     ros.wait(lambda: not stack.nodes["driver"].health.problem, what="the same parameters")
     stack.enable()
