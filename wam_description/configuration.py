@@ -192,9 +192,9 @@ class Configuration(NamedTuple):
         try:
             return build(cls, self.sections[section])
         except ParameterError as error:
-            where = f"{self.path}, section '{SHARED if section == SHARED else f'/**/{section}'}'"
-            given = "a value that you gave (as with --set), not one of " if self._file_is_right(section, cls) else ""
-            raise ParameterError(f"{given}{where}: {error}") from error
+            where = f"section '{SHARED if section == SHARED else f'/**/{section}'}'"
+            given = "a value that you gave (as with --set)" if self._file_is_right(section, cls) else self.path
+            raise ParameterError(f"{given}, {where}: {error}") from error
 
     def _file_is_right(self, section: str, cls: type[Any]) -> bool:
         """Whether the file itself has usable parameters, so that what was replaced is at fault."""
