@@ -394,6 +394,15 @@ def test_with_the_brakes_nothing_moves_and_nothing_is_late() -> None:
 # --- limits and doubt
 
 
+@pytest.mark.parametrize(("probability", "is_refused"), [(0.5, True), (1.0, False)])
+def test_a_force_that_may_be_that_of_another_link_is_refused(probability: float, is_refused: bool) -> None:
+    own = replace(limited(doubt=1.0), contact_source="estimated", contact_cover=COVER, contact_position=PLACE)
+    contact = ON_INNER._replace(cover=COVER, position=math.nan, position_sd=math.nan, probability=probability)
+    loop, world = force_loop(ARM, own), World(force=7.0)
+    moved(loop, world, 8.0, 5, contact=contact)
+    assert (loop.event.code is Code.REFUSED and loop.event.values["part"] == "place") is is_refused
+
+
 def test_a_force_without_a_lever_commands_no_motion_along_it() -> None:
     out = ask(force_loop(ARM, OWN), World(q=[0.0, 0.0, 0.0, math.pi / 2]), 5.0)  # arm straight up
     assert out.velocity == pytest.approx(STILL, abs=1e-9)

@@ -299,7 +299,7 @@ class ForceLoop:
         run.before = q
         for axis in axes[:1]:
             run.resting.judge(self._q, axis, self._measurement, self._axes.forces, float(torques.sd.max()))
-        known = [self._believe(self._q, axis, axes) for axis in axes]
+        known = [self._doubting(axis, self._believe(self._q, axis, axes), contact) for axis in axes]
         run.move(moved, axes, self._axes.forces, self._q)
         found: list[Event] = []
         if run.is_moving:
@@ -322,6 +322,21 @@ class ForceLoop:
         if run.free_at is None or not (contact.cover or run.is_touching):
             run.free_at = q
         return found, known
+
+    def _doubting(self, axis: CommandedAxis, known: Belief, contact: Contact) -> Belief:
+        """The same where it is not known which link is touched: the force on another one may be meant, too."""
+        place, forces, q = axis.place, self._axes.forces, self._q
+        is_sure = not contact.cover or contact.probability >= self.parameters.link_probability_limit
+        if place is None or place.is_pinned or place.is_known or is_sure:
+            return known
+        covers, apart = forces.covers, 0.0
+        for name, length in zip(covers.names, covers.length, strict=True):
+            if name != place.cover:
+                other = place._replace(cover=name, position=FORCE.middle * length)
+                there = axis._replace(sensed=forces.axis(q, other.pressed(axis.direction, axis.desired)))
+                apart = max(apart, abs(there.force(self._measurement.torques.now) - known.force))
+        apart *= math.sqrt(contact.probability * (1.0 - contact.probability))  # sd of one of two forces
+        return known._replace(errors=known.errors._replace(place=math.hypot(known.errors.place, apart)))
 
     def _believe(self, q: Sequence[float], axis: CommandedAxis, axes: Sequence[CommandedAxis]) -> Belief:
         """What is known in a pose of the force along an axis of those that are commanded."""
